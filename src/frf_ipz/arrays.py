@@ -1,0 +1,89 @@
+"""Names of array types, and the checks of arrays at the public edge."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from frf_ipz.errors import ShapeError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """Give a view of an array that cannot be written to.
+
+    Parameters
+    ----------
+    array : array
+        Any array; it is not copied.
+
+    Returns
+    -------
+    array
+        The same data, read-only.
+
+    Examples
+    --------
+    >>> read_only(np.zeros(2)).flags.writeable
+    False
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def require_shape(name: str, array: npt.NDArray[Scalar], shape: Sequence[int | None]) -> None:
+    """Refuse an array that does not have the shape wanted.
+
+    Parameters
+    ----------
+    name : str
+        What the array is, for the message.
+    array : array
+        The array to check.
+    shape : sequence of int or None
+        The lengths wanted; None stands for any length.
+
+    Raises
+    ------
+    ShapeError
+        If the number of axes or a length differs.
+    """
+    fits = array.ndim == len(shape) and all(
+        wanted is None or wanted == length for wanted, length in zip(shape, array.shape, strict=False)
+    )
+    if not fits:
+        wanted_text = ", ".join("any" if length is None else str(length) for length in shape)
+        raise ShapeError(f"{name} has the shape {array.shape}; needed is ({wanted_text})")
+
+
+def require_finite(name: str, array: npt.NDArray[Scalar]) -> None:
+    """Refuse an array that holds NaN or infinity.
+
+    Parameters
+    ----------
+    name : str
+        What the array is, for the message.
+    array : array
+        The array to check.
+
+    Raises
+    ------
+    ShapeError
+        If a value is not finite; the message names the first place.
+    """
+    wrong = ~np.isfinite(array)
+    if wrong.any():
+        place = tuple(int(index) for index in np.argwhere(wrong)[0])
+        raise ShapeError(f"{name} holds {int(wrong.sum())} values that are not finite, the first at {place}")

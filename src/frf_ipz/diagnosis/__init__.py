@@ -1,0 +1,1 @@
+"""What physics the model left out."""

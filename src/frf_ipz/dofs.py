@@ -1,0 +1,73 @@
+"""Degrees of freedom: which node, which direction, which sign."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from frf_ipz.errors import InputError
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+_LABEL = re.compile(r"^\s*(\d+)\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Dof:
+    """One direction of one node; the sign is that of the sensor or of the blow.
+
+    Parameters
+    ----------
+    node : int
+        Node number; 0 is the ground.
+    direction : str
+        One of x, y, z, rx, ry, rz.
+    sign : int
+        +1 or -1.
+    """
+
+    node: int
+    direction: str
+    sign: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.node}:{'+' if self.sign > 0 else '-'}{self.direction}"
+
+    @property
+    def unsigned(self) -> Dof:
+        """The same DOF in the positive direction, as a model has it."""
+        return replace(self, sign=1)
+
+    @property
+    def name(self) -> str:
+        """The label without a sign, as in ``101:z``."""
+        return f"{self.node}:{self.direction}"
+
+
+def parse_dof(text: str) -> Dof:
+    """Read a label such as ``18:+z``, ``20:-z`` or ``7:rz``.
+
+    Parameters
+    ----------
+    text : str
+        ``NODE:SIGN DIRECTION`` without the blank; without a sign it is ``+``.
+
+    Returns
+    -------
+    Dof
+        The DOF.
+
+    Raises
+    ------
+    InputError
+        If the text is no such label.
+
+    Examples
+    --------
+    >>> str(parse_dof("18:z"))
+    '18:+z'
+    """
+    match = _LABEL.match(text)
+    if match is None:
+        raise InputError(f"'{text}' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'")
+    node, sign, direction = match.groups()
+    return Dof(int(node), direction, -1 if sign == "-" else 1)

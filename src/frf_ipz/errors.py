@@ -1,0 +1,117 @@
+"""The errors and the warning of frf_ipz.
+
+::
+
+    FrfIpzError
+    ├── InputError (ValueError)            the user's input is wrong: exit status 2
+    │   ├── ShapeError                     an array has the wrong shape, or holds NaN or infinity
+    │   ├── QuantityError                  a unit or a quantity does not fit
+    │   └── FileFormatError                a file cannot be read as what it should be
+    └── NumericalError (RuntimeError)      the computation cannot give a result
+        ├── ConvergenceError               an iteration stopped without reaching its goal; carries ``result``
+        ├── PairingError                   measured and computed poles or zeros cannot be matched
+        └── IllConditionedError            a matrix is too close to singular to be used
+
+Every message says what was given, what was needed, and what to try.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+
+class FrfIpzError(Exception):
+    """Any error that frf_ipz raises on purpose."""
+
+
+class InputError(FrfIpzError, ValueError):
+    """The input is wrong: says which file, which place, what was expected, what to do."""
+
+
+class ShapeError(InputError):
+    """An array has the wrong shape, or holds values that are not finite."""
+
+
+class QuantityError(InputError):
+    """A unit or a physical quantity does not fit where it is used."""
+
+
+class FileFormatError(InputError):
+    """A file cannot be read as what it should be.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    problem : str
+        What is wrong, what was expected and what to do, as one sentence.
+    where : str, optional
+        The place in the file: a line, a column or a key.
+    """
+
+    def __init__(self, path: Path | str, problem: str, *, where: str = "") -> None:
+        self.path = path
+        self.where = where
+        super().__init__(f"{path}{f', {where}' if where else ''}: {problem}")
+
+
+class NumericalError(FrfIpzError, RuntimeError):
+    """A computation cannot give a result."""
+
+
+class ConvergenceError(NumericalError):
+    """An iteration stopped without reaching its goal.
+
+    Parameters
+    ----------
+    message : str
+        Why it stopped.
+    result : object
+        What was reached, of the type that the function returns when it converges.
+    """
+
+    def __init__(self, message: str, *, result: object = None) -> None:
+        self.result = result
+        super().__init__(message)
+
+
+class PairingError(NumericalError):
+    """Measured and computed poles or zeros cannot be matched."""
+
+
+class IllConditionedError(NumericalError):
+    """A matrix is too close to singular to be used."""
+
+
+class FrfIpzWarning(UserWarning):
+    """The result stands, and something about it has to be known."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Say which known words there are, the closest one first.
+
+    Parameters
+    ----------
+    word : str
+        What was given.
+    known : iterable of str
+        What could have been given.
+
+    Returns
+    -------
+    str
+        ``"did you mean 'dofs'?"`` or, where nothing is close, the list of what is known.
+
+    Examples
+    --------
+    >>> did_you_mean("dof", ["dofs", "mass"])
+    "did you mean 'dofs'?"
+    """
+    choices = list(known)
+    close = get_close_matches(word, choices, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(choices) or 'none'}"

@@ -1,0 +1,1 @@
+"""State spaces and tables for other programs."""

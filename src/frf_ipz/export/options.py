@@ -1,0 +1,35 @@
+"""What a user may choose in ``[export]`` of a pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from frf_ipz.toml_files import STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """What the state space looks like.
+
+    Parameters
+    ----------
+    outputs : str
+        ``measured`` (as each sensor measures), ``displacement``, ``velocity`` or ``acceleration``.
+    residual : str
+        Residual flexibility as ``dynamics`` (proper) or as ``feedthrough``.
+    pade_order : int
+        Order of the Pade approximant of known delays; 0 leaves them out.
+    sample_time_s : float
+        0 for a continuous model, else the sample time of a discrete one (zero-order hold).
+    ensemble : int
+        Members of the posterior to write beside it.
+    """
+
+    __pydantic_config__ = STRICT
+
+    outputs: Literal["measured", "displacement", "velocity", "acceleration"] = "measured"
+    residual: Literal["dynamics", "feedthrough"] = "dynamics"
+    pade_order: int = 0
+    sample_time_s: float = 0.0
+    ensemble: int = 0

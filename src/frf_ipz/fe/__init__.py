@@ -1,0 +1,1 @@
+"""FE models: read, assembled, reduced; their modes and FRFs."""

@@ -1,0 +1,222 @@
+"""Measured frequency response functions: values, what they connect, and how well they are known.
+
+The one container that leaves ingest, and the only measured data that fitting, pairing, updating and diagnosis see.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
+from frf_ipz.quantities import FrfQuantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+ARRAYS = ("frequency_hz", "values", "variance", "coherence", "averages")
+
+
+@dataclass(frozen=True, slots=True)
+class FrfLabel:
+    """What one FRF connects.
+
+    Parameters
+    ----------
+    output_dof, input_dof : Dof
+        Sensor and blow, with the signs of the test.
+    quantity : FrfQuantity
+        What was measured.
+    output_channel, input_channel : str
+        Columns of the recordings that it comes from.
+    """
+
+    output_dof: Dof
+    input_dof: Dof
+    quantity: FrfQuantity
+    output_channel: str = ""
+    input_channel: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.output_dof} / {self.input_dof}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the values."""
+        return self.quantity.unit(self.output_dof.direction, self.input_dof.direction)
+
+    @property
+    def sign(self) -> int:
+        """Product of the signs of sensor and blow: the model's FRF times this is the measured one."""
+        return self.output_dof.sign * self.input_dof.sign
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrfSet:
+    """Measured FRFs on common frequency lines.
+
+    Not every pair of sensor and blow need be measured (roving sensors), so FRFs stand in a row, not in a matrix;
+    `matrix` gives the block of those that are.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Frequencies, ascending, Hz.
+    values : (n_lines, n_frfs) complex array
+        In SI units of each label's quantity. The time convention is exp(+i omega t).
+    labels : tuple of FrfLabel
+        One an FRF.
+    variance : (n_lines, n_frfs) array
+        E of the squared modulus of the error, half in each part; NaN where unknown.
+    coherence : (n_lines, n_frfs) array
+        NaN where unknown.
+    averages : (n_frfs,) int array
+        Blows or segments behind each FRF; 0 where unknown.
+    window_decay_1_s : float
+        Rate sigma of an exponential window that force and response share. The values are then exactly the transfer
+        function at s = sigma + i omega, and whoever fits evaluates the model there: that takes the added damping
+        back without an approximation. 0 without a window.
+    unknown_scale : str
+        ``none``, ``common`` or ``per_channel``: gains that are not known and may be fitted.
+
+    Raises
+    ------
+    ShapeError
+        If shapes disagree or a value is not finite.
+    """
+
+    frequency_hz: FloatArray
+    values: ComplexArray
+    labels: tuple[FrfLabel, ...]
+    variance: FloatArray
+    coherence: FloatArray
+    averages: IntArray
+    window_decay_1_s: float = 0.0
+    unknown_scale: str = "none"
+
+    def __post_init__(self) -> None:
+        shape = (len(self.frequency_hz), len(self.labels))
+        for name in ("values", "variance", "coherence"):
+            require_shape(f"the FRFs' {name}", getattr(self, name), shape)
+        require_shape("the FRFs' averages", self.averages, shape[1:])
+        require_finite("the FRFs' values", self.values)
+        for name in ARRAYS:
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def n_lines(self) -> int:
+        """Number of frequency lines."""
+        return len(self.frequency_hz)
+
+    @property
+    def n_frfs(self) -> int:
+        """Number of FRFs."""
+        return len(self.labels)
+
+    @property
+    def s(self) -> ComplexArray:
+        """Where the transfer function was measured: sigma + i omega, (n_lines,) array, rad/s."""
+        return np.asarray(self.window_decay_1_s + 2j * np.pi * self.frequency_hz, np.complex128)
+
+    @property
+    def output_dofs(self) -> tuple[Dof, ...]:
+        """The sensors' DOFs, each once, in the order of the labels."""
+        return tuple(dict.fromkeys(label.output_dof for label in self.labels))
+
+    @property
+    def input_dofs(self) -> tuple[Dof, ...]:
+        """The struck DOFs, each once, in the order of the labels."""
+        return tuple(dict.fromkeys(label.input_dof for label in self.labels))
+
+    def in_band(self, band_hz: tuple[float, float], exclude_hz: Sequence[tuple[float, float]] = ()) -> BoolArray:
+        """Tell which lines lie in a band.
+
+        Parameters
+        ----------
+        band_hz : pair of float
+            Lowest and highest frequency, both included, Hz.
+        exclude_hz : sequence of pairs of float
+            Stretches to leave out, Hz.
+
+        Returns
+        -------
+        (n_lines,) bool array
+            True for the lines to use.
+
+        Raises
+        ------
+        InputError
+            If no line is left.
+        """
+        frequency = self.frequency_hz
+        used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+        for low, high in exclude_hz:
+            used &= (frequency < low) | (frequency > high)
+        if not used.any():
+            raise InputError(
+                f"no frequency line is left in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; the measured lines go "
+                f"from {frequency[0]:g} to {frequency[-1]:g} Hz, so set another [fit] band_hz"
+            )
+        return used
+
+    def lines(self, used: BoolArray) -> FrfSet:
+        """Keep some frequency lines.
+
+        Parameters
+        ----------
+        used : (n_lines,) bool array
+            True for those to keep.
+
+        Returns
+        -------
+        FrfSet
+            The same FRFs on fewer lines.
+        """
+        rows = ("values", "variance", "coherence")
+        return replace(self, frequency_hz=self.frequency_hz[used], **{name: getattr(self, name)[used] for name in rows})
+
+    def frfs(self, indices: Sequence[int]) -> FrfSet:
+        """Keep some FRFs.
+
+        Parameters
+        ----------
+        indices : sequence of int
+            Which, in the order wanted.
+
+        Returns
+        -------
+        FrfSet
+            Those FRFs on the same lines.
+        """
+        chosen = list(indices)
+        columns = ("values", "variance", "coherence")
+        return replace(
+            self,
+            labels=tuple(self.labels[index] for index in chosen),
+            averages=self.averages[chosen],
+            **{name: getattr(self, name)[:, chosen] for name in columns},
+        )
+
+    def matrix(self) -> tuple[ComplexArray, BoolArray]:
+        """Arrange the FRFs as a matrix of output by input.
+
+        Returns
+        -------
+        values : (n_lines, n_outputs, n_inputs) complex array
+            Rows and columns as `output_dofs` and `input_dofs`; 0 where nothing was measured.
+        measured : (n_outputs, n_inputs) bool array
+            True where it was.
+        """
+        rows = {dof: index for index, dof in enumerate(self.output_dofs)}
+        columns = {dof: index for index, dof in enumerate(self.input_dofs)}
+        values = np.zeros((self.n_lines, len(rows), len(columns)), complex)
+        measured = np.zeros((len(rows), len(columns)), bool)
+        for index, label in enumerate(self.labels):
+            place = rows[label.output_dof], columns[label.input_dof]
+            values[:, *place] = self.values[:, index]
+            measured[place] = True
+        return values, measured

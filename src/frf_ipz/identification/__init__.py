@@ -1,0 +1,1 @@
+"""Poles, residues and zeros of measured FRFs, with covariance."""

@@ -1,0 +1,74 @@
+"""What identification gives: poles, residues and zeros with their covariance, and how they were found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from frf_ipz.arrays import BoolArray, FloatArray, require_shape
+from frf_ipz.frf import FrfLabel
+from frf_ipz.rational import PoleResidueModel, ZeroSet
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalFit:
+    """A rational model of a set of measured FRFs.
+
+    Parameters
+    ----------
+    model : PoleResidueModel
+        Fitted to the FRFs as they were measured (signs and quantities of the labels). Its first `n_modes` poles are the
+        modes of the band, by ascending frequency; further ones stand for what lies outside.
+    n_modes : int
+        Number of modes in the band.
+    labels : tuple of FrfLabel
+        Columns of the residues.
+    band_hz : pair of float
+        The band that was fitted.
+    used_lines : (n_lines,) bool array
+        Lines of the FrfSet that were fitted.
+    zeros : ZeroSet
+        Zeros of every FRF, in the band and near it.
+    covariance : (2 n, 2 n) array
+        Joint covariance of the `n_modes` poles, then of the zeros: real and imaginary part of each in turn, (rad/s)^2.
+        Rows of zeros that are not identifiable hold infinity on the diagonal and 0 elsewhere.
+    residue_covariance : (n_modes, n_frfs, 2, 2) array
+        Covariance of real and imaginary part of each residue.
+    value_std : (n_used, n_frfs) array
+        Standard deviation of the fitted FRF on the used lines, in units of the FRF (of the complex value's modulus).
+    stabilization : DataFrame
+        One row a pole of the start: ``order, frequency_hz, damping_ratio, stable_frequency, stable_damping,
+        stable_shape, taken``.
+    decisions : DataFrame
+        What was added, dropped, pinned and struck: ``frequency_hz, damping_ratio, action, reason``.
+    modes : DataFrame
+        One row a mode: ``pole_id, frequency_hz, damping_ratio, mpc, quality`` and what the quality is made of.
+    misfit : DataFrame
+        One row an FRF and band: ``frf, output_dof, input_dof, band_low_hz, band_high_hz, misfit, noise, ratio``.
+    noise_from : str
+        ``recordings`` or ``misfit``: where the covariance's sigma comes from.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    model: PoleResidueModel
+    n_modes: int
+    labels: tuple[FrfLabel, ...]
+    band_hz: tuple[float, float]
+    used_lines: BoolArray
+    zeros: ZeroSet
+    covariance: FloatArray
+    residue_covariance: FloatArray
+    value_std: FloatArray
+    stabilization: pd.DataFrame
+    decisions: pd.DataFrame
+    modes: pd.DataFrame
+    misfit: pd.DataFrame
+    noise_from: str
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        size = 2 * (self.n_modes + len(self.zeros.values))
+        require_shape("the covariance of poles and zeros", self.covariance, (size, size))
+        require_shape("the covariance of the residues", self.residue_covariance, (self.n_modes, len(self.labels), 2, 2))

@@ -1,0 +1,59 @@
+"""What a user may choose in ``[fit]`` of a pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from frf_ipz.toml_files import STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StruckPole:
+    """A pole that the user has struck out.
+
+    Parameters
+    ----------
+    hz : float
+        Its frequency.
+    why : str
+        The reason, kept with the results.
+    """
+
+    __pydantic_config__ = STRICT
+
+    hz: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitOptions:
+    """How poles, residues and zeros are fitted.
+
+    Parameters
+    ----------
+    band_hz : pair of float, optional
+        Band to fit; where it is left out, the whole of the measured band that carries signal.
+    exclude_hz : tuple of pairs of float
+        Stretches to leave out: mains lines, a band of low coherence.
+    pin_hz : tuple of float
+        Frequencies at which a mode must be: never dropped.
+    strike : tuple of StruckPole
+        Poles that are no modes, and why.
+    modes : str
+        ``complex`` or ``real`` (normal modes: proportional damping).
+    max_order : int, optional
+        Highest model order of the start; chosen from band and lines where it is left out.
+    delay : bool
+        Fit a pure delay for each output channel too.
+    """
+
+    __pydantic_config__ = STRICT
+
+    band_hz: tuple[float, float] | None = None
+    exclude_hz: tuple[tuple[float, float], ...] = ()
+    pin_hz: tuple[float, ...] = ()
+    strike: tuple[StruckPole, ...] = ()
+    modes: Literal["complex", "real"] = "complex"
+    max_order: int | None = None
+    delay: bool = False

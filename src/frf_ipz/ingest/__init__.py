@@ -1,0 +1,1 @@
+"""Recordings and FRF files in, FRFs with their uncertainty out."""

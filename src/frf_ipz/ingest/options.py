@@ -1,0 +1,37 @@
+"""What a user may choose in ``[ingest]`` of a pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from frf_ipz.toml_files import STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IngestOptions:
+    """How recordings become FRFs.
+
+    Parameters
+    ----------
+    estimator : str
+        H1 (noise on the responses), H2 (noise on the force) or Hv (on both).
+    force_window_s : float, optional
+        Length of the force that is kept, from the blow on, s; chosen from the pulse where it is left out.
+    exponential_window_s : float, optional
+        Time constant of an exponential window on force and response, s; 0 for none. Where it is left out, one is used
+        only if decays are cut off, and just as strong as that needs.
+    segment_s : float, optional
+        Length of the segments of long records (kind ``random``), s.
+    keep, drop : tuple of str
+        Files, or ``file#2`` for the second blow in a file, that are used or left out whatever the checks say.
+    """
+
+    __pydantic_config__ = STRICT
+
+    estimator: Literal["H1", "H2", "Hv"] = "H1"
+    force_window_s: float | None = None
+    exponential_window_s: float | None = None
+    segment_s: float | None = None
+    keep: tuple[str, ...] = ()
+    drop: tuple[str, ...] = ()

@@ -1,0 +1,57 @@
+"""What ingest gives: FRFs, and the blows behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.frf import FrfSet
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trace:
+    """A stretch of one recording, thinned for drawing.
+
+    Parameters
+    ----------
+    name : str
+        Which blow, as in the table of blows.
+    channel : str
+        Column of the recording.
+    unit : str
+        SI unit of `values`.
+    time_s, values : (n_points,) array
+        Points to draw; minima and maxima are kept.
+    """
+
+    name: str
+    channel: str
+    unit: str
+    time_s: FloatArray
+    values: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recordings:
+    """FRFs and the quality of what they were made from.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        The estimated FRFs.
+    blows : DataFrame
+        One row a blow or record: ``blow`` (file, or file#number), ``input_dof``, ``peak_force_N``, ``pulse_s``,
+        ``used`` (bool), ``weight``, ``marks`` (what is wrong, joined by "; "), and what was measured to say so.
+        Empty for FRFs that were estimated elsewhere.
+    traces : tuple of Trace
+        Forces and responses to draw.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    frfs: FrfSet
+    blows: pd.DataFrame
+    traces: tuple[Trace, ...] = ()
+    warnings: tuple[str, ...] = ()

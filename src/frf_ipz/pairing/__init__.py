@@ -1,0 +1,1 @@
+"""Which measured pole and zero is which of the model."""

@@ -1,0 +1,70 @@
+"""What pairing gives: every measured pole and zero against its counterpart in the model, with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Verdict(Enum):
+    """What became of a pole or zero."""
+
+    PAIRED = "paired"
+    MISSING_IN_MODEL = "missing in the model"
+    MISSING_IN_MEASUREMENT = "missing in the measurement"
+    AMBIGUOUS = "ambiguous"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """One measured pole or zero and its counterpart.
+
+    Parameters
+    ----------
+    kind : str
+        ``pole`` or ``zero``.
+    frf : int
+        Which FRF a zero belongs to; -1 for poles.
+    measured, computed : int
+        Place among the fit's poles or zeros, and among the model's (by ascending modulus, per FRF for zeros); -1 where
+        there is none.
+    measured_value, computed_value : complex
+        rad/s; NaN where there is none.
+    distance : float
+        What the assignment minimised: relative frequency error, and what shapes or residues say.
+    verdict : Verdict
+        What became of it.
+    reason : str
+        Why, in words.
+    """
+
+    kind: str
+    frf: int
+    measured: int
+    computed: int
+    measured_value: complex
+    computed_value: complex
+    distance: float
+    verdict: Verdict
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pairs:
+    """All poles and zeros of measurement and model.
+
+    Parameters
+    ----------
+    rows : tuple of Pair
+        Poles first, then the zeros FRF by FRF.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    rows: tuple[Pair, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def targets(self) -> tuple[Pair, ...]:
+        """Those that updating aims at: the paired ones."""
+        return tuple(row for row in self.rows if row.verdict is Verdict.PAIRED)

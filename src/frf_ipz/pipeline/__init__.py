@@ -1,0 +1,1 @@
+"""The chain: recordings, FRFs, fitted model, pairs, updated model, prediction, export, report."""

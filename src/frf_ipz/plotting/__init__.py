@@ -1,0 +1,1 @@
+"""Pictures for publications: one function a picture, results in, Matplotlib axes out."""

@@ -1,0 +1,1 @@
+"""FRFs at points that were never measured, with honest bands."""

@@ -1,0 +1,67 @@
+"""What an FRF is the ratio of: receptance, mobility or accelerance; and the SI units that follow.
+
+All values inside the program are SI. An FRF of the quantity q is the receptance times ``s**q.power``.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class FrfQuantity(Enum):
+    """The kind of response in an FRF (response per force or moment)."""
+
+    RECEPTANCE = "receptance"
+    MOBILITY = "mobility"
+    ACCELERANCE = "accelerance"
+
+    @property
+    def power(self) -> int:
+        """The power of s that makes this quantity out of a receptance: 0, 1 or 2."""
+        return list(FrfQuantity).index(self)
+
+    @property
+    def response(self) -> str:
+        """The response that it is a ratio of: displacement, velocity or acceleration."""
+        return RESPONSES[self.power]
+
+    def unit(self, output_direction: str = "z", input_direction: str = "z") -> str:
+        """SI unit of an FRF between two directions, for labels and metadata.
+
+        Parameters
+        ----------
+        output_direction, input_direction : str
+            ``x``, ``y``, ``z``, or ``rx``, ``ry``, ``rz`` for rotations and moments.
+
+        Returns
+        -------
+        str
+            For example ``m/s^2/N``.
+
+        Examples
+        --------
+        >>> FrfQuantity.ACCELERANCE.unit()
+        'm/s^2/N'
+        """
+        length = "rad" if output_direction.startswith("r") else "m"
+        force = "(N m)" if input_direction.startswith("r") else "N"
+        return f"{length}{('', '/s', '/s^2')[self.power]}/{force}"
+
+
+RESPONSES = ("displacement", "velocity", "acceleration")
+
+
+def frf_quantity_of(response: str) -> FrfQuantity:
+    """Return the FRF quantity whose response is measured.
+
+    Parameters
+    ----------
+    response : str
+        ``displacement``, ``velocity`` or ``acceleration``.
+
+    Returns
+    -------
+    FrfQuantity
+        Receptance, mobility or accelerance.
+    """
+    return list(FrfQuantity)[RESPONSES.index(response)]

@@ -1,0 +1,331 @@
+"""A run's folder: results that are re-used where hashes agree, tables that appear whole or not at all.
+
+Everything is first written to a staging folder inside the run's folder, and moved into place when the whole command
+has succeeded. A reader never sees half a file, and a run that fails leaves what was there.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.runs.codec import load_result, save_result
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+RECORD = "run.json"
+STAGES = "stages"
+STAGING = ".partial-"
+
+Result = TypeVar("Result")
+
+
+@dataclass(kw_only=True, eq=False)
+class RunFolder:
+    """What a run has left in a folder, and what the command at work will add to it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    staging : Path
+        Where files are written until the command has succeeded.
+    record : dict
+        What `run.json` says.
+    """
+
+    path: Path
+    staging: Path
+    record: dict[str, Any]
+    computed: list[str] = field(default_factory=list)
+
+    def stage(
+        self,
+        name: str,
+        key: str,
+        compute: Callable[[], Result],
+        write: Callable[[Result, RunFolder], None],
+    ) -> Result:
+        """Give the result of a stage: the one in the folder where the key agrees, else a new one.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+        key : str
+            Digest of all that the result depends on.
+        compute : callable
+            Gives the result.
+        write : callable
+            Writes the tables that users read from a new result.
+
+        Returns
+        -------
+        object
+            The result.
+        """
+        known = self.record.setdefault("stages", {})
+        kept = self.path / STAGES / f"{name}.npz"
+        if known.get(name, {}).get("key") == key and kept.is_file():
+            try:
+                result: Result = load_result(kept)
+            except FileFormatError:
+                pass
+            else:
+                return result
+        started = time.perf_counter()
+        result = compute()
+        with self.writing(f"{STAGES}/{name}.npz") as target:
+            save_result(result, target)
+        write(result, self)
+        self.computed.append(name)
+        known[name] = {"key": key, "seconds": round(time.perf_counter() - started, 3)}
+        return result
+
+    @contextmanager
+    def writing(self, name: str) -> Iterator[Path]:
+        """Give the path to write a file of the run to.
+
+        Parameters
+        ----------
+        name : str
+            Its name inside the run's folder.
+
+        Yields
+        ------
+        Path
+            Where to write it for now.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written, for want of space or permission.
+        """
+        target = self.staging / name
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            yield target
+        except OSError as error:
+            raise _cannot_write(self.path / name, error) from None
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a text file of the run.
+
+        Parameters
+        ----------
+        name : str
+            Its name inside the run's folder.
+        text : str
+            What it says.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        with self.writing(name) as target:
+            target.write_text(text, encoding="utf-8", newline="\n")
+
+    def load(self, name: str) -> object:
+        """Give a stage's result as it stands in the folder, whatever it was made from.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+
+        Returns
+        -------
+        object
+            The result, or None where the stage has not run.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is damaged.
+        """
+        staged, kept = (folder / STAGES / f"{name}.npz" for folder in (self.staging, self.path))
+        place = staged if staged.is_file() else kept
+        return load_result(place) if place.is_file() else None
+
+    def commit(self) -> None:
+        """Move everything that was written into place, `run.json` last.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be moved.
+        """
+        self.write_text(RECORD, json.dumps(self.record, indent=1, ensure_ascii=False) + "\n")
+        files = sorted(file for file in self.staging.rglob("*") if file.is_file())
+        files.sort(key=lambda file: file.name == RECORD)
+        for file in files:
+            with file.open("rb") as stream:
+                os.fsync(stream.fileno())
+        for file in files:
+            target = self.path / file.relative_to(self.staging)
+            try:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
+            except OSError as error:
+                raise _cannot_write(target, error) from None
+
+
+@contextmanager
+def open_run(path: Path) -> Iterator[RunFolder]:
+    """Open a run's folder for a command, and commit when the command succeeds.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made where there is none.
+
+    Yields
+    ------
+    RunFolder
+        To compute and write with.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written to.
+    """
+    made = not path.exists()
+    staging = path / f"{STAGING}{os.getpid()}"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        _sweep(path)
+        staging.mkdir()
+    except OSError as error:
+        raise _cannot_write(path, error) from None
+    succeeded = False
+    try:
+        folder = RunFolder(path=path, staging=staging, record=read_record(path))
+        yield folder
+        folder.commit()
+        succeeded = True
+    finally:
+        shutil.rmtree(path if made and not succeeded else staging, ignore_errors=True)
+
+
+def read_run(path: Path) -> RunFolder:
+    """Open a run's folder for reading only.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    RunFolder
+        To load results from.
+
+    Raises
+    ------
+    InputError
+        If no run has been made there.
+    """
+    if not (path / RECORD).is_file():
+        raise InputError(
+            f"{path}: there is no run here (no {RECORD}); make one with 'frf-ipz run PIPELINE --out {path}'"
+        )
+    return RunFolder(path=path, staging=path / STAGING, record=read_record(path))
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read `run.json`.
+
+    Parameters
+    ----------
+    path : Path
+        The run's folder.
+
+    Returns
+    -------
+    dict
+        What it says; empty where there is none or it is damaged, so that everything is computed anew.
+    """
+    try:
+        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
+def digest(parts: Mapping[str, Any]) -> str:
+    """Digest what a result depends on.
+
+    Parameters
+    ----------
+    parts : mapping
+        Options, digests of files and of earlier stages; what is no JSON value enters by its representation.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
+    text = json.dumps(parts, sort_keys=True, default=repr)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest_file(path: Path) -> str:
+    """Digest a file's content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
+
+
+def _sweep(path: Path) -> None:
+    """Remove what commands that were killed have left."""
+    for left in path.glob(f"{STAGING}*"):
+        owner = left.name.removeprefix(STAGING)
+        if not owner.isdigit() or int(owner) == os.getpid() or not _is_running(int(owner)):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    advice = {
+        errno.ENOSPC: "the disk is full; free some space or choose another --out",
+        errno.EDQUOT: "the quota is used up; free some space or choose another --out",
+    }.get(error.errno or 0, f"{error.strerror}; choose another --out that can be written to")
+    return InputError(f"{path}: cannot be written: {advice}")

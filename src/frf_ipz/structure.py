@@ -1,0 +1,240 @@
+"""Structural models: the full FE model, its parts, and its reduced form.
+
+Data only. The stage `fe` builds and reduces them, `updating` changes the reduced form, `diagnosis` adds what was
+missing to the full one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray, require_shape
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
+
+Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Part:
+    """An additive part of a model that can be named: an element, a spring, a group, a point mass.
+
+    Parameters
+    ----------
+    kind : str
+        ``element``, ``spring``, ``group`` or ``point``.
+    name : str
+        Element number, spring id or group name.
+    nodes : tuple of int
+        The nodes it joins.
+    indices : (k,) int array
+        Its rows among `StructuralModel.all_dofs`.
+    stiffness, mass : (k, k) array
+        Its share of the matrices, N/m and kg (and their rotational counterparts).
+    """
+
+    kind: str
+    name: str
+    nodes: tuple[int, ...]
+    indices: IntArray
+    stiffness: FloatArray
+    mass: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Geometry:
+    """Where the nodes are, for drawing and for positions along the structure.
+
+    Parameters
+    ----------
+    nodes : (n_nodes,) int array
+        Node numbers.
+    coordinates_m : (n_nodes, 3) array
+        Positions; for a lumped model the masses in a row.
+    lines : (n_lines, 2) int array
+        Pairs of node numbers that are drawn as lines.
+    supports : mapping of int to str
+        How a node is held: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
+    """
+
+    nodes: IntArray
+    coordinates_m: FloatArray
+    lines: IntArray
+    supports: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StructuralModel:
+    """A linear FE model ``M x'' + B x' + K x = f`` with modal damping besides B.
+
+    The matrices are those of all DOFs; the ones that are held (`fixed`) are kept, so that a support can be released.
+
+    Parameters
+    ----------
+    name : str
+        As the user calls it.
+    kind : str
+        ``beam``, ``lumped`` or ``matrices``.
+    all_dofs : tuple of Dof
+        Rows of the matrices.
+    fixed : (n_all,) bool array
+        True for DOFs that are held.
+    mass_all, stiffness_all : (n_all, n_all) sparse array
+        kg and N/m (and their rotational counterparts), symmetric.
+    damping_all : (n_all, n_all) sparse array
+        Viscous damping that the model states as a matrix, N s/m; empty where it states none.
+    modal_damping : (n,) array
+        Damping ratios of the modes; the last one holds for all further modes. Empty where the model states none.
+    geometry : Geometry
+        Where the nodes are.
+    parts : tuple of Part
+        What can be named.
+    source : object
+        The options it was built from (`fe.model_file`), for effects that build it anew; None for a model without.
+    """
+
+    name: str
+    kind: str
+    all_dofs: tuple[Dof, ...]
+    fixed: BoolArray
+    mass_all: Matrix
+    stiffness_all: Matrix
+    damping_all: Matrix
+    modal_damping: FloatArray
+    geometry: Geometry
+    parts: tuple[Part, ...] = ()
+    source: object = None
+
+    def __post_init__(self) -> None:
+        n_all = len(self.all_dofs)
+        for name in ("mass_all", "stiffness_all", "damping_all"):
+            if getattr(self, name).shape != (n_all, n_all):
+                raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {n_all} DOFs")
+        require_shape("the marks of held DOFs", self.fixed, (n_all,))
+
+    @property
+    def dofs(self) -> tuple[Dof, ...]:
+        """The DOFs that are free, in the order of `mass` and `stiffness`."""
+        return tuple(dof for dof, fixed in zip(self.all_dofs, self.fixed, strict=True) if not fixed)
+
+    @property
+    def mass(self) -> Matrix:
+        """(n, n) mass matrix of the free DOFs."""
+        return self._free(self.mass_all)
+
+    @property
+    def stiffness(self) -> Matrix:
+        """(n, n) stiffness matrix of the free DOFs."""
+        return self._free(self.stiffness_all)
+
+    @property
+    def damping(self) -> Matrix:
+        """(n, n) viscous damping matrix of the free DOFs, without the modal damping."""
+        return self._free(self.damping_all)
+
+    def index(self, dof: Dof) -> int:
+        """Row of a DOF among the free ones.
+
+        Parameters
+        ----------
+        dof : Dof
+            The sign is ignored.
+
+        Returns
+        -------
+        int
+            Row of `mass` and `stiffness`.
+
+        Raises
+        ------
+        InputError
+            If the model has no such DOF, or holds it.
+        """
+        try:
+            place = self.all_dofs.index(dof.unsigned)
+        except ValueError:
+            raise InputError(self._unknown(dof)) from None
+        if self.fixed[place]:
+            raise InputError(f"the DOF {dof.name} is held in the model '{self.name}': nothing moves there")
+        return int(np.count_nonzero(~self.fixed[:place]))
+
+    def _free(self, matrix: Matrix) -> Matrix:
+        keep = np.flatnonzero(~self.fixed)
+        return matrix[keep][:, keep]
+
+    def _unknown(self, dof: Dof) -> str:
+        directions = sorted({other.direction for other in self.all_dofs if other.node == dof.node})
+        if directions:
+            return f"node {dof.node} of the model '{self.name}' has no DOF {dof.direction}, it has {directions}"
+        nodes = self.geometry.nodes
+        return f"the model '{self.name}' has no node {dof.node}; its nodes go from {nodes.min()} to {nodes.max()}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReducedModel:
+    """A reduced model in physical DOFs, eq. (2) of [Dorosti2018] (doi:10.1016/j.conengprac.2017.11.002).
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (r, r) array
+        M_r, B_r and K_r. Symmetric when they leave the reduction; `ipz` may leave K_r and B_r slightly unsymmetric.
+    dofs : tuple of Dof
+        The retained DOFs, unsigned, one a row.
+    expansion : (n_expanded, r) array
+        Motion of other DOFs of the full model for unit motions of the retained ones.
+    expanded_dofs : tuple of Dof
+        Rows of `expansion`, unsigned; they contain the retained ones.
+    n_modes : int
+        Eigenmodes in the reduction basis, rigid-body modes included.
+    residual_dofs : tuple of Dof
+        DOFs whose residual flexibility is in the basis.
+    choices : tuple of str
+        What the program chose by itself, in words.
+    """
+
+    mass: FloatArray
+    damping: FloatArray
+    stiffness: FloatArray
+    dofs: tuple[Dof, ...]
+    expansion: FloatArray
+    expanded_dofs: tuple[Dof, ...]
+    n_modes: int
+    residual_dofs: tuple[Dof, ...] = ()
+    choices: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        order = len(self.dofs)
+        for name in ("mass", "damping", "stiffness"):
+            require_shape(f"the reduced {name} matrix", getattr(self, name), (order, order))
+        require_shape("the expansion", self.expansion, (len(self.expanded_dofs), order))
+
+    def row(self, dof: Dof) -> FloatArray:
+        """Motion of a DOF for unit motions of the retained ones.
+
+        Parameters
+        ----------
+        dof : Dof
+            Its sign counts.
+
+        Returns
+        -------
+        (r,) array
+            A row of the output or input matrix.
+
+        Raises
+        ------
+        InputError
+            If the DOF is not among the expanded ones.
+        """
+        try:
+            place = self.expanded_dofs.index(dof.unsigned)
+        except ValueError:
+            raise InputError(
+                f"the reduced model does not know the DOF {dof.name}; add it to [predict] points"
+            ) from None
+        return np.asarray(dof.sign * self.expansion[place])

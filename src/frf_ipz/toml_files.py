@@ -1,0 +1,153 @@
+"""TOML files into option dataclasses, with errors that a user can act on.
+
+Every TOML file of the contract is described by plain frozen dataclasses that live in the stage they belong to; pydantic
+checks them here and nowhere else. A dataclass refuses unknown keys by ``__pydantic_config__ = STRICT``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+
+from frf_ipz.errors import FileFormatError, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
+
+Options = TypeVar("Options")
+
+
+def read_text(path: Path) -> str:
+    """Read a text file in UTF-8 (with or without a BOM), else in Latin-1.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Its text; lines end with LF.
+
+    Raises
+    ------
+    FileFormatError
+        If it does not exist or cannot be read.
+    """
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise FileFormatError(path, "there is no such file") from None
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n")
+
+
+def read_toml(path: Path, options_type: type[Options], *, required: str = "") -> Options:
+    """Read a TOML file into an options dataclass.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options_type : type
+        A dataclass that describes the whole file.
+    required : str
+        The section without which the file is not of this kind, for the message.
+
+    Returns
+    -------
+    options_type
+        The options, checked.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, is no TOML, or does not fit: names the key, what was expected and the closest known key.
+    """
+    text = read_text(path)
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(path, f"is not valid TOML: {error}") from None
+    if required and required not in table:
+        raise FileFormatError(path, f"has no section [{required}]; is it the right file?")
+    return to_options(table, options_type, path)
+
+
+def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path) -> Options:
+    """Check a table against an options dataclass.
+
+    Parameters
+    ----------
+    table : mapping
+        What was read.
+    options_type : type
+        The dataclass.
+    path : Path
+        Where it came from, for the message.
+
+    Returns
+    -------
+    options_type
+        The options.
+
+    Raises
+    ------
+    FileFormatError
+        On the first thing that does not fit.
+    """
+    try:
+        return TypeAdapter(options_type).validate_python(dict(table))
+    except ValidationError as error:
+        first = min(error.errors(), key=lambda item: item["type"] not in {"unexpected_keyword_argument", "missing"})
+        where = ".".join(_key_text(part) for part in first["loc"] if not _is_type_tag(part))
+        raise FileFormatError(path, _explain(first, options_type), where=where and f"key '{where}'") from None
+
+
+def _key_text(part: int | str) -> str:
+    return f"[{part + 1}]" if isinstance(part, int) else part
+
+
+def _is_type_tag(part: int | str) -> bool:
+    """Pydantic names the branch of a union in the location, which is no key of the user's."""
+    return isinstance(part, str) and ("[" in part or part in {"str", "float", "int", "bool", "constrained-str"})
+
+
+def _explain(error: Any, options_type: type) -> str:
+    if error["type"] == "unexpected_keyword_argument":
+        key = str(error["loc"][-1])
+        known = [field.name for field in fields(_dataclass_at(options_type, error["loc"][:-1]))]
+        return f"unknown key '{key}'; {did_you_mean(key, known)}"
+    if error["type"] in {"missing", "missing_argument", "missing_keyword_only_argument"}:
+        return f"the key '{error['loc'][-1]}' is missing"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    given = error.get("input")
+    return f"{message[:1].lower()}{message[1:]}; given is {given!r}"
+
+
+def _dataclass_at(options_type: Any, location: tuple[int | str, ...]) -> Any:
+    """Follow the keys of a location down to the dataclass that has them."""
+    for part in location:
+        if isinstance(part, str) and is_dataclass(options_type):
+            hints = get_type_hints(options_type)
+            if part in hints:
+                options_type = _inner_dataclass(hints[part]) or options_type
+    return options_type
+
+
+def _inner_dataclass(hint: Any) -> Any:
+    if is_dataclass(hint):
+        return hint
+    return next((found for argument in get_args(hint) if (found := _inner_dataclass(argument))), None)

@@ -1,0 +1,1 @@
+"""The reduced model brought to the measured poles and zeros."""

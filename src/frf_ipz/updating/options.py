@@ -1,0 +1,36 @@
+"""What a user may choose in ``[update]`` of a pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from frf_ipz.toml_files import STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpdateOptions:
+    """How the reduced model is brought to the measured poles and zeros.
+
+    Parameters
+    ----------
+    method : str
+        ``minimal-change`` or ``ipz`` (as published), or the name of a further module in `updating.methods`.
+    mass : bool
+        Let the mass change too (minimal-change).
+    max_iterations : int, optional
+        Stop after that many; the method's own limit where it is left out.
+    alpha, beta, delta : float
+        Regularisation, step and stop of ``ipz``, eqs. (15), (19) and (20) of the paper.
+    cross_sensitivities : bool
+        Use the off-diagonal blocks of eq. (14) (``ipz``).
+    """
+
+    __pydantic_config__ = STRICT
+
+    method: str = "minimal-change"
+    mass: bool = False
+    max_iterations: int | None = None
+    alpha: float = 0.1
+    beta: float = 0.3
+    delta: float = 1e-3
+    cross_sensitivities: bool = True

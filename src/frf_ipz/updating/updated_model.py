@@ -1,0 +1,59 @@
+"""What updating gives: the updated reduced model, how it was reached, and what remains open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import pandas as pd
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.structure import ReducedModel
+
+
+class UpdateStatus(Enum):
+    """How an update ended; the values are the message."""
+
+    CONVERGED = "converged"
+    MAX_ITERATIONS = "stopped at the largest number of iterations: allow more, or look at the pairs"
+    NOTHING_TO_DO = "there is no target in the band: the model is left as it was"
+    DIVERGED = "the misfit grew: a smaller step or other pairs may help"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UpdatedModel:
+    """A reduced model after updating.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        With the updated matrices.
+    nominal : ReducedModel
+        What it was before.
+    method : str
+        Which method.
+    status : UpdateStatus
+        How it ended.
+    history : DataFrame
+        One row an iteration: ``phase`` (stiffness or damping), ``iteration``, ``misfit``, ``step``, and the parameters.
+    before, after : (n_targets,) complex array
+        Poles and zeros of the model before and after, in the order of `Pairs.targets`, rad/s.
+    ensemble : (n_members, 3, r, r) array
+        Mass, damping and stiffness of models drawn from what targets and prior leave open; empty for a method that
+        does not say.
+    unmet : tuple of str
+        Targets that cannot be met, and why.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    model: ReducedModel
+    nominal: ReducedModel
+    method: str
+    status: UpdateStatus
+    history: pd.DataFrame
+    before: ComplexArray
+    after: ComplexArray
+    ensemble: FloatArray
+    unmet: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
