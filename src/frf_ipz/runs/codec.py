@@ -12,7 +12,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from zipfile import BadZipFile
 
 import numpy as np
@@ -90,7 +90,7 @@ def _encode(value: Any, arrays: dict[str, Any]) -> Any:
 
 def _encode_mapping(value: Any, arrays: dict[str, Any]) -> Any:
     if sparse.issparse(value):
-        part = sparse.csr_array(value)
+        part: Any = sparse.csr_array(cast("Any", value))
         return {"csr": [_keep(part.data, arrays), _keep(part.indices, arrays), _keep(part.indptr, arrays), part.shape]}
     if isinstance(value, pd.DataFrame):
         columns = [[str(name), _encode(_column(value[name]), arrays)] for name in value.columns]
