@@ -13,9 +13,9 @@ import os
 import shutil
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.runs.codec import load_result, save_result
@@ -28,6 +28,7 @@ STAGES = "stages"
 STAGING = ".partial-"
 
 Result = TypeVar("Result")
+Writers: TypeAlias = "Mapping[str, Callable[[Path], None]]"
 
 
 @dataclass(kw_only=True, eq=False)
@@ -49,13 +50,7 @@ class RunFolder:
     record: dict[str, Any]
     computed: list[str] = field(default_factory=list)
 
-    def stage(
-        self,
-        name: str,
-        key: str,
-        compute: Callable[[], Result],
-        write: Callable[[Result, RunFolder], None],
-    ) -> Result:
+    def stage(self, name: str, key: str, compute: Callable[[], Result], files: Callable[[Result], Writers]) -> Result:
         """Give the result of a stage: the one in the folder where the key agrees, else a new one.
 
         Parameters
@@ -66,17 +61,16 @@ class RunFolder:
             Digest of all that the result depends on.
         compute : callable
             Gives the result.
-        write : callable
-            Writes the tables that users read from a new result.
+        files : callable
+            Gives what writes each file that users read, by name.
 
         Returns
         -------
         object
             The result.
         """
-        known = self.record.setdefault("stages", {})
         kept = self.path / STAGES / f"{name}.npz"
-        if known.get(name, {}).get("key") == key and kept.is_file():
+        if self._is_current(name, key) and kept.is_file():
             try:
                 result: Result = load_result(kept)
             except FileFormatError:
@@ -85,12 +79,27 @@ class RunFolder:
                 return result
         started = time.perf_counter()
         result = compute()
-        with self.writing(f"{STAGES}/{name}.npz") as target:
-            save_result(result, target)
-        write(result, self)
-        self.computed.append(name)
-        known[name] = {"key": key, "seconds": round(time.perf_counter() - started, 3)}
+        self._write({f"{STAGES}/{name}.npz": lambda path: save_result(result, path), **files(result)})
+        self._note(name, key, started)
         return result
+
+    def page(self, name: str, key: str, files: Writers) -> None:
+        """Write files that no later stage reads, unless they are there and the key agrees.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+        key : str
+            Digest of all that the files depend on.
+        files : mapping of str to callable
+            What writes each file, by name.
+        """
+        if self._is_current(name, key) and all((self.path / file).is_file() for file in files):
+            return
+        started = time.perf_counter()
+        self._write(files)
+        self._note(name, key, started)
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
@@ -157,6 +166,19 @@ class RunFolder:
         staged, kept = (folder / STAGES / f"{name}.npz" for folder in (self.staging, self.path))
         place = staged if staged.is_file() else kept
         return load_result(place) if place.is_file() else None
+
+    def _is_current(self, name: str, key: str) -> bool:
+        return bool(self.record.get("stages", {}).get(name, {}).get("key") == key)
+
+    def _write(self, files: Writers) -> None:
+        for file, write in files.items():
+            with self.writing(file) as target:
+                write(target)
+
+    def _note(self, name: str, key: str, started: float) -> None:
+        self.computed.append(name)
+        seconds = round(time.perf_counter() - started, 3)
+        self.record.setdefault("stages", {})[name] = {"key": key, "seconds": seconds}
 
     def commit(self) -> None:
         """Move everything that was written into place, `run.json` last.
@@ -278,6 +300,26 @@ def digest(parts: Mapping[str, Any]) -> str:
     """
     text = json.dumps(parts, sort_keys=True, default=repr)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def plain(options: Any) -> Any:  # noqa: ANN401  options are trees of dataclasses and plain values
+    """Turn options into plain values for JSON.
+
+    Parameters
+    ----------
+    options : object
+        A dataclass, or what can stand in one.
+
+    Returns
+    -------
+    object
+        Dictionaries, lists and plain values.
+    """
+    if is_dataclass(options) and not isinstance(options, type):
+        return {item.name: plain(getattr(options, item.name)) for item in fields(options)}
+    if isinstance(options, tuple | list):
+        return [plain(item) for item in options]
+    return options if isinstance(options, str | int | float | bool | None) else str(options)
 
 
 def digest_file(path: Path) -> str:

@@ -1,0 +1,44 @@
+"""What a user may choose in ``[diagnose]`` of a pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from frf_ipz.toml_files import STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnoseOptions:
+    """What may be missing, and what a nominal model may be wrong by without anything missing.
+
+    Parameters
+    ----------
+    apply : bool
+        The finding flows on into updating and prediction.
+    effects : tuple of str
+        Look for these effects only; all of the contract's table where it is empty.
+    extra_effects : tuple of str
+        Further effects as ``file.py:ClassName``, or the name of one that is shipped and off by default.
+    stiffness_tolerance, frequency_tolerance : float
+        Relative standard deviation of local stiffness, and of natural frequencies.
+    damping_tolerance : float
+        Relative tolerance of each modal damping ratio.
+    gain_tolerance : float
+        Relative tolerance of sensor gains.
+    position_tolerance_m_per_m : float
+        Tolerance of positions of sensors and blows, as a part of the structure's length.
+    seed : int
+        Of everything that is drawn at random.
+    """
+
+    __pydantic_config__ = STRICT
+
+    apply: bool = False
+    effects: tuple[str, ...] = ()
+    extra_effects: tuple[str, ...] = ()
+    stiffness_tolerance: float = 1e-3
+    frequency_tolerance: float = 1e-3
+    damping_tolerance: float = 0.3
+    gain_tolerance: float = 5e-3
+    position_tolerance_m_per_m: float = 1e-3
+    seed: int = 0

@@ -1,0 +1,303 @@
+"""The tables of a run: what is in each file of the contract."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.export.tables import Column, make_table, repeated
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    import pyarrow as pa
+
+    from frf_ipz.frf import FrfLabel, FrfSet
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+FREQUENCY = Column("frequency_hz", "float", "Hz", "frequency line")
+LABEL = (
+    Column("output_dof", "text", "", "sensor, with the sign of the test"),
+    Column("input_dof", "text", "", "struck DOF, with the sign of the test"),
+    Column("quantity", "text", "", "accelerance, mobility or receptance"),
+)
+VALUE = (
+    Column("real", "float", "SI of the quantity per N", "real part"),
+    Column("imag", "float", "SI of the quantity per N", "imaginary part"),
+)
+FRF = (
+    FREQUENCY,
+    *LABEL,
+    *VALUE,
+    Column("coherence", "float", "1", "ordinary coherence; null for one blow"),
+    Column(
+        "variance", "float", "SI squared", "E of the squared modulus of the error, half in each part; null if unknown"
+    ),
+    Column("averages", "int", "1", "blows or segments averaged"),
+)
+ROOT = (
+    Column("frequency_hz", "float", "Hz", "undamped natural frequency |s| / 2 pi"),
+    Column("damping_ratio", "float", "1", "-Re s / |s|"),
+    Column("real_rad_s", "float", "rad/s", "real part"),
+    Column("imag_rad_s", "float", "rad/s", "imaginary part, >= 0"),
+    Column("frequency_std_hz", "float", "Hz", "standard deviation of the frequency"),
+    Column("damping_ratio_std", "float", "1", "standard deviation of the damping ratio"),
+    Column("real_std_rad_s", "float", "rad/s", "standard deviation of the real part"),
+    Column("imag_std_rad_s", "float", "rad/s", "standard deviation of the imaginary part"),
+)
+POLE = (Column("pole_id", "int", "", "number of the pole, by ascending frequency"), *ROOT)
+ZERO = (
+    Column("zero_id", "int", "", "number of the zero"),
+    *LABEL,
+    Column("kind", "text", "", "complex, real or quadruple"),
+    Column("identifiable", "flag", "", "false where the data do not support the number"),
+    Column("reason", "text", "", "why it is not identifiable"),
+    *ROOT,
+)
+PAIR = (
+    Column("kind", "text", "", "pole or zero"),
+    *LABEL[:2],
+    Column("measured_id", "int", "", "pole_id or zero_id; null if missing in the measurement"),
+    Column("verdict", "text", "", "paired, missing in the model, missing in the measurement or ambiguous"),
+    Column("reason", "text", "", "why"),
+    Column("distance", "float", "1", "what the assignment minimised"),
+    Column("measured_hz", "float", "Hz", "measured frequency"),
+    Column("before_hz", "float", "Hz", "frequency in the model before updating"),
+    Column("after_hz", "float", "Hz", "frequency in the model after updating"),
+    Column("measured_damping_ratio", "float", "1", "measured damping ratio"),
+    Column("before_damping_ratio", "float", "1", "damping ratio in the model before updating"),
+    Column("after_damping_ratio", "float", "1", "damping ratio in the model after updating"),
+)
+PREDICTION = (
+    FREQUENCY,
+    *LABEL,
+    *VALUE,
+    Column("magnitude_low", "float", "SI of the quantity per N", "lower end of the 90 % band of the magnitude"),
+    Column("magnitude_high", "float", "SI of the quantity per N", "upper end of the 90 % band of the magnitude"),
+)
+
+
+def frf_table(frfs: FrfSet) -> pa.Table:
+    """Table of measured FRFs, one row a line and FRF.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        The FRFs.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``frf.parquet``.
+    """
+    values = {
+        **_label_columns(frfs.labels, frfs.n_lines),
+        **_value_columns(frfs.values),
+        "frequency_hz": np.tile(frfs.frequency_hz, frfs.n_frfs),
+        "coherence": frfs.coherence.T.ravel(),
+        "variance": frfs.variance.T.ravel(),
+        "averages": np.repeat(frfs.averages, frfs.n_lines),
+    }
+    return make_table(FRF, values, about={"window_decay_1_s": repr(frfs.window_decay_1_s)})
+
+
+def pole_table(fit: ModalFit) -> pa.Table:
+    """Table of the modes' poles.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``poles.parquet``.
+    """
+    count = fit.n_modes
+    covariance = fit.covariance[: 2 * count, : 2 * count]
+    return make_table(POLE, {"pole_id": range(1, count + 1), **_roots(fit.model.poles[:count], covariance)})
+
+
+def zero_table(fit: ModalFit) -> pa.Table:
+    """Table of the zeros of all FRFs; numbers are null where they are not identifiable.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``zeros.parquet``.
+    """
+    zeros = fit.zeros
+    start = 2 * fit.n_modes
+    roots = _roots(zeros.values, fit.covariance[start:, start:])
+    return make_table(
+        ZERO,
+        {
+            "zero_id": range(1, len(zeros.values) + 1),
+            **_label_columns([fit.labels[index] for index in zeros.frf], 1),
+            "kind": zeros.kind,
+            "identifiable": zeros.identifiable,
+            "reason": zeros.reason,
+            **{name: np.where(zeros.identifiable, column, np.nan) for name, column in roots.items()},
+        },
+    )
+
+
+def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) -> pa.Table:
+    """Table of measured against computed poles and zeros.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        The pairing.
+    labels : sequence of FrfLabel
+        What the zeros' FRF numbers stand for.
+    after : (n_targets,) complex array
+        Poles and zeros of the model after updating, in the order of `Pairs.targets`; NaN before it.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``pairs.parquet``.
+    """
+    rows = pairs.rows
+    reached = dict(zip(pairs.targets, after, strict=True))
+    stages = {
+        "measured": np.array([row.measured_value for row in rows], complex),
+        "before": np.array([row.computed_value for row in rows], complex),
+        "after": np.array([reached.get(row, complex(np.nan, np.nan)) for row in rows], complex),
+    }
+    dofs = [
+        ("", "") if row.frf < 0 else (str(labels[row.frf].output_dof), str(labels[row.frf].input_dof)) for row in rows
+    ]
+    values = {
+        "kind": [row.kind for row in rows],
+        "output_dof": [output for output, _ in dofs],
+        "input_dof": [struck for _, struck in dofs],
+        "measured_id": [row.measured + 1 if row.measured >= 0 else None for row in rows],
+        "verdict": [row.verdict.value for row in rows],
+        "reason": [row.reason for row in rows],
+        "distance": np.array([row.distance for row in rows], float),
+        **{f"{name}_hz": natural_frequency_hz(roots) for name, roots in stages.items()},
+        **{f"{name}_damping_ratio": damping_ratio(roots) for name, roots in stages.items()},
+    }
+    return make_table(PAIR, values)
+
+
+def prediction_table(prediction: Prediction) -> pa.Table:
+    """Table of the FRFs at the points of interest.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        The prediction.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``poi_frf.parquet``.
+    """
+    lines = len(prediction.frequency_hz)
+    values = {
+        **_label_columns(prediction.labels, lines),
+        **_value_columns(prediction.values),
+        "frequency_hz": np.tile(prediction.frequency_hz, len(prediction.labels)),
+        "magnitude_low": prediction.magnitude_low.T.ravel(),
+        "magnitude_high": prediction.magnitude_high.T.ravel(),
+    }
+    return make_table(PREDICTION, values)
+
+
+def history_table(updated: UpdatedModel) -> pa.Table:
+    """Table of the updating parameters, one row an iteration.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The result of updating.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``parameters.parquet``.
+    """
+    known = {
+        "phase": Column("phase", "text", "", "stiffness or damping"),
+        "iteration": Column("iteration", "int", "", "number of the iteration"),
+        "misfit": Column("misfit", "float", "1", "what is minimised"),
+        "step": Column("step", "float", "1", "size of the step relative to the parameters"),
+    }
+    return frame_table(updated.history, known, meaning="updating parameter", unit="as the parameter")
+
+
+def frame_table(frame: pd.DataFrame, known: dict[str, Column], *, meaning: str, unit: str = "1") -> pa.Table:
+    """Table of a data frame.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Columns of floats, ints, texts or flags.
+    known : dict of str to Column
+        Columns that are described; others get `meaning` and `unit`.
+    meaning, unit : str
+        Of the columns that are not described.
+
+    Returns
+    -------
+    pyarrow.Table
+        The table.
+    """
+    kinds = {"f": "float", "i": "int", "u": "int", "b": "flag"}
+    columns = [
+        known.get(str(name)) or Column(str(name), kinds.get(frame[name].dtype.kind, "text"), unit, meaning)
+        for name in frame.columns
+    ]
+    return make_table(columns, {str(name): frame[name].to_numpy() for name in frame.columns})
+
+
+def _label_columns(labels: Sequence[FrfLabel], repeat: int) -> dict[str, pa.Array]:
+    return {
+        "output_dof": repeated([str(label.output_dof) for label in labels], repeat),
+        "input_dof": repeated([str(label.input_dof) for label in labels], repeat),
+        "quantity": repeated([label.quantity.value for label in labels], repeat),
+    }
+
+
+def _value_columns(values: ComplexArray) -> dict[str, FloatArray]:
+    return {"real": values.real.T.ravel(), "imag": values.imag.T.ravel()}
+
+
+def _roots(values: ComplexArray, covariance: FloatArray) -> dict[str, FloatArray]:
+    """Frequency and damping of roots with their standard deviations, to first order."""
+    pairs = np.arange(len(values))
+    blocks = covariance.reshape(len(values), 2, len(values), 2)[pairs, :, pairs, :]
+    modulus = np.maximum(np.abs(values), np.finfo(float).tiny)
+    to_frequency = np.stack([values.real, values.imag], 1) / (2 * np.pi * modulus)[:, None]
+    to_damping = np.stack([-(values.imag**2), values.real * values.imag], 1) / modulus[:, None] ** 3
+    return {
+        "frequency_hz": natural_frequency_hz(values),
+        "damping_ratio": damping_ratio(values),
+        "real_rad_s": values.real,
+        "imag_rad_s": values.imag,
+        "frequency_std_hz": _std(to_frequency, blocks),
+        "damping_ratio_std": _std(to_damping, blocks),
+        "real_std_rad_s": np.sqrt(blocks[:, 0, 0]),
+        "imag_std_rad_s": np.sqrt(blocks[:, 1, 1]),
+    }
+
+
+def _std(gradient: FloatArray, blocks: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore"):  # roots that are not identifiable have an infinite variance
+        return np.asarray(np.sqrt(np.einsum("ki,kij,kj->k", gradient, blocks, gradient)))

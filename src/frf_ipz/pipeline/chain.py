@@ -1,0 +1,63 @@
+"""The chain, top to bottom: recordings, FRFs, fitted model, pairs, updated model, prediction, export, report.
+
+Every stage is a function of what stands before it. Its result is kept in the run's folder under a digest of all that it
+depends on, and taken from there where the digest agrees.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frf_ipz.pipeline import stages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frf_ipz.pipeline.job import Job
+    from frf_ipz.progress import Progress
+    from frf_ipz.runs.folder import RunFolder
+
+STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
+
+
+def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) -> Iterator[str]:
+    """Run the stages one after another.
+
+    Parameters
+    ----------
+    job : Job
+        What to work on.
+    folder : RunFolder
+        Where results are kept.
+    diagnosing : bool
+        Look for what the model left out.
+    progress : Progress
+        Told how far the work is.
+
+    Yields
+    ------
+    str
+        The name of each stage when it is done.
+    """
+    desk = stages.Desk(job=job, folder=folder, progress=progress)
+    recordings = stages.ingest(desk)
+    yield "ingest"
+    fit = stages.fit(desk, recordings.frfs)
+    yield "fit"
+    if job.model is not None:
+        model = job.model
+        if diagnosing:
+            diagnosis = stages.diagnose(desk, model, recordings.frfs, fit)
+            model, fit = stages.apply_diagnosis(desk, model, diagnosis, fit)
+            yield "diagnose"
+        reduced = stages.reduce(desk, model, fit)
+        pairs = stages.pair(desk, fit, reduced)
+        yield "pair"
+        updated = stages.update(desk, reduced, fit, pairs)
+        yield "update"
+        stages.predict(desk, updated, fit, recordings.frfs)
+        yield "predict"
+        stages.export(desk, updated, fit)
+        yield "export"
+    stages.report(desk)
+    yield "report"

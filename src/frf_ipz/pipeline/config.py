@@ -1,0 +1,116 @@
+"""``pipeline.toml``: which test, which model, and what the user chose for each stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.export.options import ExportOptions
+from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.prediction.options import PredictOptions
+from frf_ipz.toml_files import STRICT, read_toml
+from frf_ipz.updating.options import UpdateOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PipelineSection:
+    """``[pipeline]``: the only section that must be there.
+
+    Parameters
+    ----------
+    name : str
+        What the run is called.
+    test : str
+        Path of test.toml, relative to the pipeline file.
+    model : str, optional
+        Path of model.toml; without it the run ends with the fit.
+    """
+
+    __pydantic_config__ = STRICT
+
+    name: str = ""
+    test: str
+    model: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PipelineFile:
+    """All sections of ``pipeline.toml``.
+
+    Parameters
+    ----------
+    pipeline : PipelineSection
+        Test and model.
+    ingest, fit, reduce, update, predict, export : options
+        What the user chose for each stage.
+    diagnose : DiagnoseOptions, optional
+        None where the section is absent: then a run does not diagnose.
+    """
+
+    __pydantic_config__ = STRICT
+
+    pipeline: PipelineSection
+    ingest: IngestOptions = field(default_factory=IngestOptions)
+    fit: FitOptions = field(default_factory=FitOptions)
+    diagnose: DiagnoseOptions | None = None
+    reduce: ReduceOptions = field(default_factory=ReduceOptions)
+    update: UpdateOptions = field(default_factory=UpdateOptions)
+    predict: PredictOptions = field(default_factory=PredictOptions)
+    export: ExportOptions = field(default_factory=ExportOptions)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pipeline:
+    """A pipeline file with its paths resolved.
+
+    Parameters
+    ----------
+    path, test_path : Path
+        The pipeline file, and the test it names.
+    model_path : Path, optional
+        None where the run ends with the fit.
+    file : PipelineFile
+        What it says.
+    """
+
+    path: Path
+    test_path: Path
+    model_path: Path | None
+    file: PipelineFile
+
+    @property
+    def name(self) -> str:
+        """What the run is called; the file's name where it says nothing."""
+        return self.file.pipeline.name or self.path.stem
+
+
+def read_pipeline(path: Path) -> Pipeline:
+    """Read a pipeline file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Pipeline
+        Checked, with paths relative to the file resolved.
+
+    Raises
+    ------
+    FileFormatError
+        If the file, or a key in it, is wrong.
+    """
+    file = read_toml(path, PipelineFile, required="pipeline")
+    folder = path.resolve().parent
+    model = file.pipeline.model
+    return Pipeline(
+        path=path.resolve(),
+        test_path=folder / file.pipeline.test,
+        model_path=None if model is None else folder / model,
+        file=file,
+    )

@@ -1,0 +1,102 @@
+"""What a command is to work on: the files of the user, read and checked before anything is computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.fe.joining import with_point_masses
+from frf_ipz.fe.model_file import model_files, read_model
+from frf_ipz.ingest.test_file import Test, read_test
+from frf_ipz.pipeline.config import Pipeline, read_pipeline
+from frf_ipz.runs.folder import digest_file
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from frf_ipz.structure import StructuralModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """A pipeline with its test and model.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+        The pipeline file.
+    test : Test
+        The test.
+    model : StructuralModel, optional
+        The FE model with the sensors' known masses; None where the run ends with the fit.
+    points : tuple of Dof
+        Points of interest.
+    inputs : mapping of str to str
+        Digest of every file that the user handed in.
+    """
+
+    pipeline: Pipeline
+    test: Test
+    model: StructuralModel | None
+    points: tuple[Dof, ...]
+    inputs: Mapping[str, str]
+
+
+def read_job(path: Path) -> Job:
+    """Read a pipeline file and all that it names.
+
+    Parameters
+    ----------
+    path : Path
+        ``pipeline.toml``.
+
+    Returns
+    -------
+    Job
+        Ready to run.
+
+    Raises
+    ------
+    InputError
+        On the first thing that is wrong: which file, which place, what was expected.
+    """
+    pipeline = read_pipeline(path)
+    test = read_test(pipeline.test_path)
+    points = _points(pipeline)
+    model = None if pipeline.model_path is None else _model(pipeline.model_path, test, points)
+    if model is None and points:
+        raise FileFormatError(
+            pipeline.path, "points of interest need an FE model; name it as [pipeline] model", where="key 'predict.points'"
+        )
+    files = [pipeline.path, pipeline.test_path, *test.files]
+    if pipeline.model_path is not None:
+        files += model_files(pipeline.model_path)
+    return Job(
+        pipeline=pipeline,
+        test=test,
+        model=model,
+        points=points,
+        inputs={str(file): digest_file(file) for file in dict.fromkeys(files)},
+    )
+
+
+def _points(pipeline: Pipeline) -> tuple[Dof, ...]:
+    try:
+        return tuple(parse_dof(text) for text in pipeline.file.predict.points)
+    except InputError as error:
+        raise FileFormatError(pipeline.path, str(error), where="key 'predict.points'") from None
+
+
+def _model(path: Path, test: Test, points: tuple[Dof, ...]) -> StructuralModel:
+    model = read_model(path)
+    for dof in (*test.output_dofs, *test.input_dofs, *points):
+        try:
+            model.index(dof)
+        except InputError as error:
+            raise FileFormatError(path, f"{error}; it is needed for '{dof}' of the test or of [predict]") from None
+    if not len(model.modal_damping) and not model.damping_all.nnz and test.nominal_damping_ratio is not None:
+        model = replace(model, modal_damping=[test.nominal_damping_ratio])
+    return with_point_masses(model, test.sensor_masses)

@@ -1,0 +1,90 @@
+"""Run a pipeline file into a folder."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from frf_ipz import __version__
+from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.pipeline.chain import STAGES, chain
+from frf_ipz.pipeline.job import Job, read_job
+from frf_ipz.progress import Progress, silent
+from frf_ipz.runs.folder import RunFolder, open_run, plain, read_run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "control")
+
+
+def run_pipeline(
+    path: Path, out: Path, *, until: str = "report", diagnosing: bool | None = None, progress: Progress = silent
+) -> RunFolder:
+    """Run the chain of a pipeline file, re-using what the folder holds.
+
+    Parameters
+    ----------
+    path : Path
+        ``pipeline.toml``.
+    out : Path
+        The run's folder; made where there is none. A run that fails leaves what was there.
+    until : str
+        The last stage to run, one of `chain.STAGES`.
+    diagnosing : bool, optional
+        Look for what the model left out; where it is left out, if the file has a section ``[diagnose]``.
+    progress : Progress
+        Told how far the work is.
+
+    Returns
+    -------
+    RunFolder
+        What the folder holds now: ``run.load("fit")`` gives a stage's result.
+
+    Raises
+    ------
+    InputError
+        If the input is wrong; the message says what to do.
+    """
+    if until not in STAGES:
+        raise InputError(f"there is no stage '{until}'; {did_you_mean(until, STAGES)}")
+    job = read_job(path)
+    wanted = job.pipeline.file.diagnose is not None if diagnosing is None else diagnosing
+    if job.model is None and until not in {"ingest", "fit", "report"}:
+        raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
+    with open_run(out) as folder:
+        folder.record.update(_provenance(job))
+        done: list[str] = []
+        for stage in chain(job, folder, diagnosing=wanted, progress=progress):
+            done.append(stage)
+            if stage == until:
+                break
+        _forget_what_is_stale(folder, done)
+    return read_run(out)
+
+
+def _provenance(job: Job) -> dict[str, Any]:
+    return {
+        "frf_ipz": __version__,
+        "python": platform.python_version(),
+        "packages": {name: version(name) for name in PACKAGES},
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+        "pipeline": str(job.pipeline.path),
+        "name": job.pipeline.name,
+        "configuration": plain(job.pipeline.file),
+        "inputs": dict(job.inputs),
+    }
+
+
+def _forget_what_is_stale(folder: RunFolder, done: list[str]) -> None:
+    """Say which results of later stages were made from something else than what the folder holds now."""
+    if folder.computed:
+        for name, entry in folder.record["stages"].items():
+            if name not in folder.computed and STAGES.index(done[-1]) < _place(name):
+                entry["stale"] = True
+
+
+def _place(name: str) -> int:
+    return STAGES.index("pair" if name == "reduce" else name) if name in {*STAGES, "reduce"} else -1

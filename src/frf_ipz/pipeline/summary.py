@@ -1,0 +1,189 @@
+"""What a run found, on one screen of text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.rational import natural_frequency_hz
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.recordings import Recordings
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+MOST_MODES = 12
+
+
+def summarise(run: RunFolder) -> str:
+    """Sum up what a run's folder holds.
+
+    Parameters
+    ----------
+    run : RunFolder
+        The run.
+
+    Returns
+    -------
+    str
+        At most a screen of text.
+    """
+    writers = {
+        "ingest": recordings_lines,
+        "fit": fit_lines,
+        "reduce": reduced_lines,
+        "pair": pairs_lines,
+        "update": update_lines,
+        "predict": prediction_lines,
+    }
+    lines = [f"{run.record.get('name', '')}"]
+    for stage, write in writers.items():
+        result = run.load(stage) if stage in run.record.get("stages", {}) else None
+        if result is not None:
+            stale = " (stale: made before the last change; run it again)" if run.is_stale(stage) else ""
+            lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
+    seconds = sum(entry.get("seconds", 0.0) for entry in run.record.get("stages", {}).values())
+    lines.append(f"{'results':<12}{run.path}  ({seconds:.1f} s of computing)")
+    return "\n".join(lines)
+
+
+def recordings_lines(recordings: Recordings) -> list[tuple[str, str]]:
+    """Sum up recordings and FRFs.
+
+    Parameters
+    ----------
+    recordings : Recordings
+        The result of ingest.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    blows, frfs = recordings.blows, recordings.frfs
+    lines = []
+    if len(blows):
+        left_out = blows[~blows["used"].astype(bool)]
+        text = f"{len(blows)} blows or records, {len(blows) - len(left_out)} used"
+        lines.append(("recordings", text))
+        lines += [("", f"left out: {row.blow} ({row.marks})") for row in left_out.itertuples()]
+    coherence = frfs.coherence[np.isfinite(frfs.coherence)]
+    quality = f", median coherence {np.median(coherence):.4f}" if coherence.size else ""
+    span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz{quality}"
+    return [*lines, ("FRFs", span), *_warnings(recordings.warnings)]
+
+
+def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
+    """Sum up the fit.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    frequencies = natural_frequency_hz(fit.model.poles[: fit.n_modes])
+    shown = ", ".join(f"{value:.6g}" for value in frequencies[:MOST_MODES])
+    more = f" and {fit.n_modes - MOST_MODES} more" if fit.n_modes > MOST_MODES else ""
+    zeros = int(np.count_nonzero(fit.zeros.identifiable))
+    return [
+        ("fit", f"{fit.n_modes} modes: {shown}{more} Hz"),
+        ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
+        *_warnings(fit.warnings),
+    ]
+
+
+def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:
+    """Sum up the reduction.
+
+    Parameters
+    ----------
+    reduced : ReducedModel
+        The reduced model.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    dofs = " ".join(dof.name for dof in reduced.dofs)
+    return [("model", f"reduced to {len(reduced.dofs)} DOFs: {dofs}"), *[("", text) for text in reduced.choices]]
+
+
+def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:
+    """Sum up the pairing.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        Who belongs to whom.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    counts = {
+        kind: (
+            sum(row.kind == kind and row.verdict is Verdict.PAIRED for row in pairs.rows),
+            sum(row.kind == kind and row.measured >= 0 for row in pairs.rows),
+        )
+        for kind in ("pole", "zero")
+    }
+    text = ", ".join(f"{paired} of {measured} measured {kind}s" for kind, (paired, measured) in counts.items())
+    return [("pairs", f"{text} have a counterpart in the model"), *_warnings(pairs.warnings)]
+
+
+def update_lines(updated: UpdatedModel) -> list[tuple[str, str]]:
+    """Sum up the update.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The updated model.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    text = f"{updated.method}: {updated.status.value}, {len(updated.history)} iterations"
+    return [("update", text), *[("", f"cannot be met: {target}") for target in updated.unmet], *_warnings(updated.warnings)]
+
+
+def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
+    """Sum up the prediction.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        FRFs at the points of interest.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    lines = []
+    for index, label in enumerate(prediction.labels):
+        with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
+            width = 10 * np.log10(prediction.magnitude_high[:, index] / prediction.magnitude_low[:, index])
+        band = f", 90 % band +-{np.nanmedian(width):.2g} dB (median)" if np.isfinite(width).any() else ""
+        lines.append(("prediction", f"{label}{band}"))
+    return [*lines, *_warnings(prediction.warnings)]
+
+
+def _warnings(texts: Sequence[str]) -> list[tuple[str, str]]:
+    return [("  note", text) for text in texts]
