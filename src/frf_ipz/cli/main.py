@@ -20,7 +20,7 @@ EPILOG = """
   frf-ipz check FOLDER/pipeline.toml     validates everything and draws the set-up
   frf-ipz run FOLDER/pipeline.toml --out RESULTS
 
-[bold]Exit status[/bold]  0 done, 2 the input is wrong (one message says where and what to do), 1 a fault of the program.
+[bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 a fault of the program.
 """
 
 app = typer.Typer(

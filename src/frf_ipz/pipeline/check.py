@@ -49,9 +49,7 @@ def describe_setup(job: Job) -> str:
     return "\n".join(lines)
 
 
-def draw(
-    geometry: Geometry, sensors: Iterable[Dof], blows: Iterable[Dof], points: Iterable[Dof]
-) -> list[str]:
+def draw(geometry: Geometry, sensors: Iterable[Dof], blows: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
     """Draw a structure in characters.
 
     Parameters
@@ -70,10 +68,12 @@ def draw(
     canvas = [[" "] * WIDTH for _ in range(int(rows.max()) + 1)]
     place = {int(node): index for index, node in enumerate(geometry.nodes)}
     struck, sensed = {dof.node for dof in blows}, {dof.node for dof in sensors}
-    marks = dict.fromkeys(place, MARKS["node"]) | {node: MARKS["support"] for node in geometry.supports if node in place}
+    marks = dict.fromkeys(place, MARKS["node"]) | {
+        node: MARKS["support"] for node in geometry.supports if node in place
+    }
     marks |= {dof.node: MARKS["point"] for dof in points}
     marks |= {node: MARKS["both" if node in sensed else "blow"] for node in struck}
-    marks |= {node: MARKS["sensor"] for node in sensed - struck}
+    marks |= dict.fromkeys(sensed - struck, MARKS["sensor"])
     for node in sorted(marks, key=lambda node: marks[node] != MARKS["node"]):
         if node in place:
             canvas[rows[place[node]]][columns[place[node]]] = marks[node]

@@ -11,7 +11,7 @@ from frf_ipz.fe.joining import with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.test_file import Test, read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
-from frf_ipz.runs.folder import digest_file
+from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,7 +69,9 @@ def read_job(path: Path) -> Job:
     model = None if pipeline.model_path is None else _model(pipeline.model_path, test, points)
     if model is None and points:
         raise FileFormatError(
-            pipeline.path, "points of interest need an FE model; name it as [pipeline] model", where="key 'predict.points'"
+            pipeline.path,
+            "points of interest need an FE model; name it as [pipeline] model",
+            where="key 'predict.points'",
         )
     files = [pipeline.path, pipeline.test_path, *test.files]
     if pipeline.model_path is not None:

@@ -12,7 +12,8 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.pipeline.chain import STAGES, chain
 from frf_ipz.pipeline.job import Job, read_job
 from frf_ipz.progress import Progress, silent
-from frf_ipz.runs.folder import RunFolder, open_run, plain, read_run
+from frf_ipz.runs.digests import plain
+from frf_ipz.runs.folder import RunFolder, open_run, read_run
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,7 +20,7 @@ from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.pairing.assignment import pair as pair_roots
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.report.page import write_report
-from frf_ipz.runs.folder import digest
+from frf_ipz.runs.digests import digest
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class Desk:
 
 
 def ingest(desk: Desk) -> Recordings:
-    """Recordings into FRFs.
+    """Turn recordings into FRFs.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def ingest(desk: Desk) -> Recordings:
 
 
 def fit(desk: Desk, frfs: FrfSet) -> ModalFit:
-    """FRFs into poles, residues and zeros.
+    """Turn FRFs into poles, residues and zeros.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def fit(desk: Desk, frfs: FrfSet) -> ModalFit:
 
 
 def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedModel:
-    """FE model into a reduced model in physical DOFs.
+    """Turn the FE model into a reduced model in physical DOFs.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedMo
 
 
 def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
-    """Measured poles and zeros against those of the model.
+    """Set measured poles and zeros against those of the model.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
 
 
 def update(desk: Desk, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs) -> UpdatedModel:
-    """The reduced model brought to the measured poles and zeros.
+    """Bring the reduced model to the measured poles and zeros.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def update(desk: Desk, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs)
 
 
 def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
-    """FRFs at the points of interest, on the measured lines of the band.
+    """Predict FRFs at the points of interest, on the measured lines of the band.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet
 
 
 def export(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit) -> StateSpaceModel:
-    """The updated model as a state space.
+    """Turn the updated model into a state space.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def export(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit) -> StateSpace
 
 
 def report(desk: Desk) -> None:
-    """Everything that the folder holds as one page.
+    """Put everything that the folder holds on one page.
 
     Parameters
     ----------

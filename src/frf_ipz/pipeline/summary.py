@@ -160,7 +160,11 @@ def update_lines(updated: UpdatedModel) -> list[tuple[str, str]]:
         Title and text of each line.
     """
     text = f"{updated.method}: {updated.status.value}, {len(updated.history)} iterations"
-    return [("update", text), *[("", f"cannot be met: {target}") for target in updated.unmet], *_warnings(updated.warnings)]
+    return [
+        ("update", text),
+        *[("", f"cannot be met: {target}") for target in updated.unmet],
+        *_warnings(updated.warnings),
+    ]
 
 
 def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:

@@ -68,7 +68,7 @@ def load_result(path: Path) -> Any:
         If the file is damaged or was written by another version of the program.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return _decode(json.loads(str(archive[TREE])), archive)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ImportError, BadZipFile) as error:
         raise FileFormatError(path, f"is damaged or from another version ({error}); delete it and run again") from None

@@ -7,13 +7,12 @@ has succeeded. A reader never sees half a file, and a run that fails leaves what
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import os
 import shutil
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -145,7 +144,22 @@ class RunFolder:
         with self.writing(name) as target:
             target.write_text(text, encoding="utf-8", newline="\n")
 
-    def load(self, name: str) -> object:
+    def is_stale(self, name: str) -> bool:
+        """Tell whether a stage's result was made from something else than what the folder holds now.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+
+        Returns
+        -------
+        bool
+            True if an earlier stage has been run anew since.
+        """
+        return bool(self.record.get("stages", {}).get(name, {}).get("stale", False))
+
+    def load(self, name: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
         """Give a stage's result as it stands in the folder, whatever it was made from.
 
         Parameters
@@ -283,68 +297,6 @@ def read_record(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}
-
-
-def digest(parts: Mapping[str, Any]) -> str:
-    """Digest what a result depends on.
-
-    Parameters
-    ----------
-    parts : mapping
-        Options, digests of files and of earlier stages; what is no JSON value enters by its representation.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
-    text = json.dumps(parts, sort_keys=True, default=repr)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def plain(options: Any) -> Any:  # noqa: ANN401  options are trees of dataclasses and plain values
-    """Turn options into plain values for JSON.
-
-    Parameters
-    ----------
-    options : object
-        A dataclass, or what can stand in one.
-
-    Returns
-    -------
-    object
-        Dictionaries, lists and plain values.
-    """
-    if is_dataclass(options) and not isinstance(options, type):
-        return {item.name: plain(getattr(options, item.name)) for item in fields(options)}
-    if isinstance(options, tuple | list):
-        return [plain(item) for item in options]
-    return options if isinstance(options, str | int | float | bool | None) else str(options)
-
-
-def digest_file(path: Path) -> str:
-    """Digest a file's content.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-
-    Raises
-    ------
-    FileFormatError
-        If it cannot be read.
-    """
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
 
 
 def _sweep(path: Path) -> None:

@@ -1,0 +1,76 @@
+"""What a result depends on, as a digest; and options as plain values."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+from frf_ipz.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+def digest(parts: Mapping[str, Any]) -> str:
+    """Digest what a result depends on.
+
+    Parameters
+    ----------
+    parts : mapping
+        Options, digests of files and of earlier stages; what is no JSON value enters by its representation.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
+    text = json.dumps(parts, sort_keys=True, default=repr)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def plain(options: Any) -> Any:  # noqa: ANN401  options are trees of dataclasses and plain values
+    """Turn options into plain values for JSON.
+
+    Parameters
+    ----------
+    options : object
+        A dataclass, or what can stand in one.
+
+    Returns
+    -------
+    object
+        Dictionaries, lists and plain values.
+    """
+    if is_dataclass(options) and not isinstance(options, type):
+        return {item.name: plain(getattr(options, item.name)) for item in fields(options)}
+    if isinstance(options, tuple | list):
+        return [plain(item) for item in options]
+    return options if isinstance(options, str | int | float | bool | None) else str(options)
+
+
+def digest_file(path: Path) -> str:
+    """Digest a file's content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None

@@ -1,0 +1,125 @@
+"""A run's folder: everything or nothing, and nothing twice."""
+
+import errno
+import os
+import subprocess
+import sys
+
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.runs.digests import digest, digest_file
+from frf_ipz.runs.folder import STAGING, open_run, read_record, read_run
+
+
+def write_text(text):
+    return lambda path: path.write_text(text, encoding="utf-8")
+
+
+def stage(folder, key, value):
+    return folder.stage("fit", key, lambda: value, lambda result: {"fit.txt": write_text(str(result))})
+
+
+def test_a_stage_is_computed_once_for_a_key(tmp_path):
+    with open_run(tmp_path) as folder:
+        assert stage(folder, "a", 1) == 1
+    with open_run(tmp_path) as folder:
+        assert stage(folder, "a", 2) == 1
+        assert folder.computed == []
+    with open_run(tmp_path) as folder:
+        assert stage(folder, "b", 3) == 3
+        assert folder.computed == ["fit"]
+    assert (tmp_path / "fit.txt").read_text() == "3"
+    assert read_run(tmp_path).load("fit") == 3
+
+
+def test_a_damaged_result_is_computed_again(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    (tmp_path / "stages" / "fit.npz").write_bytes(b"no archive")
+    with open_run(tmp_path) as folder:
+        assert stage(folder, "a", 2) == 2
+
+
+def test_a_run_that_fails_leaves_what_was_there(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(ZeroDivisionError), open_run(tmp_path) as folder:
+        stage(folder, "b", 2)
+        _ = 1 / 0
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    assert not list(tmp_path.glob(f"{STAGING}*"))
+
+
+def test_a_first_run_that_fails_leaves_no_folder(tmp_path):
+    out = tmp_path / "new" / "results"
+    with pytest.raises(ZeroDivisionError), open_run(out):
+        _ = 1 / 0
+    assert not out.exists()
+
+
+def test_a_reader_never_sees_half_a_file(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+        assert not (tmp_path / "fit.txt").exists()
+    assert (tmp_path / "fit.txt").exists()
+
+
+def test_what_a_killed_run_left_is_swept(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    (tmp_path / f"{STAGING}{dead.pid}").mkdir()
+    alive = tmp_path / f"{STAGING}{os.getppid()}"
+    alive.mkdir()
+    with open_run(tmp_path):
+        pass
+    assert not (tmp_path / f"{STAGING}{dead.pid}").exists()
+    assert alive.exists()
+
+
+def test_a_full_disk_is_said_in_one_line_and_loses_nothing(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+
+    def fail(path):
+        path.write_text("half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(InputError, match="disk is full"), open_run(tmp_path) as folder:
+        folder.stage("fit", "b", lambda: 2, lambda _: {"fit.txt": fail})
+    assert (tmp_path / "fit.txt").read_text() == "1"
+
+
+def test_an_out_folder_that_cannot_be_made_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="choose another --out"), open_run(tmp_path / "file" / "results"):
+        pass
+
+
+def test_a_folder_without_a_run_is_said(tmp_path):
+    with pytest.raises(InputError, match="no run here"):
+        read_run(tmp_path)
+
+
+def test_a_damaged_record_means_computing_anew(tmp_path):
+    (tmp_path / "run.json").write_text("{half")
+    assert read_record(tmp_path) == {}
+
+
+def test_files_of_a_page_are_written_again_when_they_are_gone(tmp_path):
+    for expected in (["report"], [], ["report"]):
+        with open_run(tmp_path) as folder:
+            folder.page("report", "a", {"report.html": write_text("page")})
+            assert folder.computed == expected
+        if not expected:
+            (tmp_path / "report.html").unlink()
+
+
+def test_digests_follow_the_content(tmp_path):
+    assert digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
+    assert digest({"a": 1}) != digest({"a": 2})
+    (tmp_path / "file").write_text("1")
+    first = digest_file(tmp_path / "file")
+    (tmp_path / "file").write_text("2")
+    assert digest_file(tmp_path / "file") != first
