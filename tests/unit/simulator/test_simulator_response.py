@@ -1,0 +1,88 @@
+"""Responses against closed formulas: no droop, no wrap-around."""
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from simulator.channels import AntiAlias, Noise, quantise
+from simulator.hammer import Blow, draw_blows
+from simulator.receptance import Attachment, ModalReceptance
+from simulator.response import LaplaceGrid
+
+EXACT = 1e-4  # what comes round after twice the length of the record
+
+
+def oscillator(frequency_hz, ratio, attachments=()):
+    return ModalReceptance(
+        omega_rad_s=2 * np.pi * np.array([frequency_hz]), damping_ratio=np.array([ratio]), shapes=np.ones((1, 1)),
+        static=np.zeros((1, 1)), second_order=np.zeros((1, 1)), attachments=attachments,
+    )  # fmt: skip
+
+
+def test_the_response_of_an_oscillator_is_that_of_duhamels_integral():
+    grid = LaplaceGrid(n_samples=2000, rate_hz=1000.0, oversampling=16)
+    blow = Blow(peak_n=10.0, start_s=0.02, contact_s=0.004)
+    force = grid.spectrum(blow.force(grid.fine_time_s)) * AntiAlias().gain(grid)
+    for frequency in (30.0, 200.0, 400.0):
+        model = oscillator(frequency, 0.002)
+        got = grid.signal(model(grid.s, [0], [0])[:, 0, 0] * force)
+        omega = 2 * np.pi * frequency
+        pole = complex(-0.002 * omega, omega * np.sqrt(1 - 0.002**2))
+        contact = np.linspace(0.02, 0.024, 4001)
+        impulse = np.trapezoid(blow.force(contact) * np.exp(-pole * contact), contact)
+        time = np.arange(2000) / 1000
+        expected = (impulse * np.exp(pole * time) / pole.imag).imag
+        after = time > 0.12  # the filter rings for 0.08 s
+        assert_allclose(got[after], expected[after], rtol=0, atol=EXACT * np.abs(expected).max())
+
+
+def test_what_is_recorded_has_exactly_the_transfer_function_of_the_structure():
+    grid = LaplaceGrid(n_samples=4096, rate_hz=1000.0)
+    blow = Blow(peak_n=10.0, start_s=0.05, contact_s=0.002)
+    filtered = grid.spectrum(blow.force(grid.fine_time_s)) * AntiAlias().gain(grid)
+    model = oscillator(60.0, 0.01)
+    force, motion = grid.signal(filtered), grid.signal(model(grid.s, [0], [0])[:, 0, 0] * filtered)
+    sigma = 12 / 4.096  # an exponential window makes the cut-off record exact at s = sigma + i omega
+    window = np.exp(-sigma * np.arange(4096) / 1000)
+    lines = np.arange(10, 1600) / 4.096
+    ratio = (np.fft.rfft(motion * window) / np.fft.rfft(force * window))[10:1600]
+    expected = model(sigma + 2j * np.pi * lines, [0], [0])[:, 0, 0]
+    assert_allclose(ratio, expected, rtol=EXACT)
+
+
+def test_a_spring_attached_by_its_dynamic_stiffness_shifts_the_resonance():
+    extra = Attachment(rows=np.ones((1, 1)), stiffness=lambda s: np.full((s.size, 1, 1), (2 * np.pi * 40) ** 2 + 0j))
+    s = 2j * np.pi * np.linspace(1, 100, 300)
+    with_spring = oscillator(30.0, 0.0, (extra,))(s, [0], [0])[:, 0, 0]
+    assert_allclose(with_spring, oscillator(50.0, 0.0)(s, [0], [0])[:, 0, 0], rtol=1e-9)  # 30, 40, 50 Hz: Pythagoras
+
+
+def test_the_filter_passes_its_band_and_stops_what_would_fold():
+    for symmetric in (True, False):
+        grid = LaplaceGrid(n_samples=1000, rate_hz=1000.0, shift=0.0)
+        gain = np.abs(AntiAlias(symmetric=symmetric).gain(grid))
+        frequencies = np.arange(gain.size) / 2.0
+        assert_allclose(gain[frequencies < 420], 1.0, rtol=1e-3)  # ripple of a filter of 100 dB, with margin
+        assert gain[-1] < 1e-3
+
+
+def test_noise_has_its_rms_and_its_colour():
+    noise = Noise(rms=0.3, pink_fraction=0.5).draw(np.random.default_rng(1), 200_000)
+    assert_allclose(noise.std(), 0.3, rtol=0.02)  # four times the scatter of such a record
+    power = np.abs(np.fft.rfft(noise)) ** 2
+    assert power[10:1000].mean() > 5 * power[-50_000:].mean()
+
+
+def test_quantised_values_are_multiples_of_the_step_within_the_range():
+    values = quantise(np.linspace(-3, 3, 1001), 2.0, 8)
+    assert_allclose(values / (2.0 / 128), np.round(values / (2.0 / 128)), rtol=0, atol=1e-9)  # whole numbers
+    assert values.min() == -2.0
+    assert values.max() == 2.0 - 2.0 / 128
+
+
+def test_blows_spread_over_the_levels_asked_for():
+    blows = draw_blows(np.random.default_rng(3), 6, peak_n=100.0, spread=8.0, contact_s=1e-3, start_s=0.01)
+    peaks = [blow.peak_n for blow in blows]
+    assert max(peaks) == 100.0
+    assert 5 < max(peaks) / min(peaks) < 12
+    time = np.linspace(0, 0.02, 20_001)
+    assert_allclose(max(blows[0].force(time)), blows[0].peak_n, rtol=1e-3)  # the grid hardly misses the top
