@@ -35,15 +35,16 @@ class Part:
     indices : (k,) int array
         Its rows among `StructuralModel.all_dofs`.
     stiffness, mass : (k, k) array
-        Its share of the matrices, N/m and kg (and their rotational counterparts).
+        Its share of the matrices, N/m and kg (and their rotational counterparts); sparse for groups, which can be
+        large.
     """
 
     kind: str
     name: str
     nodes: tuple[int, ...]
     indices: IntArray
-    stiffness: FloatArray
-    mass: FloatArray
+    stiffness: FloatArray | Matrix
+    mass: FloatArray | Matrix
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,6 +97,13 @@ class StructuralModel:
         What can be named.
     source : object
         The options it was built from (`fe.model_file`), for effects that build it anew; None for a model without.
+    places : mapping of Dof to int
+        Row of each DOF among all; made here.
+
+    Raises
+    ------
+    InputError
+        If sizes disagree or a DOF is named twice.
     """
 
     name: str
@@ -109,9 +117,13 @@ class StructuralModel:
     geometry: Geometry
     parts: tuple[Part, ...] = ()
     source: object = None
+    places: Mapping[Dof, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         n_all = len(self.all_dofs)
+        object.__setattr__(self, "places", {dof: place for place, dof in enumerate(self.all_dofs)})
+        if len(self.places) < n_all:
+            raise InputError(f"the model '{self.name}' names a DOF twice")
         for name in ("mass_all", "stiffness_all", "damping_all"):
             if getattr(self, name).shape != (n_all, n_all):
                 raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {n_all} DOFs")
@@ -137,6 +149,29 @@ class StructuralModel:
         """(n, n) viscous damping matrix of the free DOFs, without the modal damping."""
         return self._free(self.damping_all)
 
+    def place(self, dof: Dof) -> int:
+        """Row of a DOF among all, the held ones included.
+
+        Parameters
+        ----------
+        dof : Dof
+            The sign is ignored.
+
+        Returns
+        -------
+        int
+            Row of `mass_all` and `stiffness_all`.
+
+        Raises
+        ------
+        InputError
+            If the model has no such DOF.
+        """
+        try:
+            return self.places[dof.unsigned]
+        except KeyError:
+            raise InputError(self._unknown(dof)) from None
+
     def index(self, dof: Dof) -> int:
         """Row of a DOF among the free ones.
 
@@ -155,12 +190,12 @@ class StructuralModel:
         InputError
             If the model has no such DOF, or holds it.
         """
-        try:
-            place = self.all_dofs.index(dof.unsigned)
-        except ValueError:
-            raise InputError(self._unknown(dof)) from None
+        place = self.place(dof)
         if self.fixed[place]:
-            raise InputError(f"the DOF {dof.name} is held in the model '{self.name}': nothing moves there")
+            raise InputError(
+                f"the DOF {dof.name} is held in the model '{self.name}', so nothing moves there: "
+                "use another DOF, or free that support in the model"
+            )
         return int(np.count_nonzero(~self.fixed[:place]))
 
     def _free(self, matrix: Matrix) -> Matrix:
@@ -168,11 +203,17 @@ class StructuralModel:
         return matrix[keep][:, keep]
 
     def _unknown(self, dof: Dof) -> str:
-        directions = sorted({other.direction for other in self.all_dofs if other.node == dof.node})
+        directions = [other.direction for other in self.all_dofs if other.node == dof.node]
         if directions:
-            return f"node {dof.node} of the model '{self.name}' has no DOF {dof.direction}, it has {directions}"
+            return (
+                f"node {dof.node} of the model '{self.name}' has no DOF '{dof.direction}'; "
+                f"it has {', '.join(directions)}: correct the test or the pipeline"
+            )
         nodes = self.geometry.nodes
-        return f"the model '{self.name}' has no node {dof.node}; its nodes go from {nodes.min()} to {nodes.max()}"
+        return (
+            f"the model '{self.name}' has no node {dof.node}; its nodes go from {nodes.min()} to {nodes.max()}: "
+            "correct the test or the pipeline"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

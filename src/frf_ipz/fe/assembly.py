@@ -1,0 +1,106 @@
+"""Matrices of a whole model from its parts, and the damping that its file states."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frf_ipz.fe.model_options import DampingSection
+    from frf_ipz.structure import Matrix, Part
+
+
+def apply(matrix: Matrix, vectors: FloatArray) -> FloatArray:
+    """Multiply a sparse matrix with full vectors.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+        The matrix.
+    vectors : (n,) or (n, k) array
+        The vectors.
+
+    Returns
+    -------
+    (n,) or (n, k) array
+        The product.
+    """
+    return np.asarray(matrix @ vectors)
+
+
+def add_up(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int) -> Matrix:
+    """Add up the shares of parts in a matrix.
+
+    Parameters
+    ----------
+    shares : iterable of pairs
+        Rows that a part occupies, (k,) int array, and its (k, k) matrix.
+    n_all : int
+        Order of the whole.
+
+    Returns
+    -------
+    (n_all, n_all) sparse array
+        Their sum.
+    """
+    rows, columns, values = [], [], []
+    for indices, share in shares:
+        local = sparse.coo_array(share)
+        rows.append(indices[local.row])
+        columns.append(indices[local.col])
+        values.append(local.data)
+    if not rows:
+        return sparse.csr_array((n_all, n_all), dtype=np.float64)
+    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_array(sparse.coo_array(triplets, shape=(n_all, n_all), dtype=np.float64))
+
+
+def mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matrix]:
+    """Add up what parts contribute to mass and stiffness.
+
+    Parameters
+    ----------
+    parts : iterable of Part
+        Elements, springs, groups, point masses and springs.
+    n_all : int
+        Number of DOFs, the held ones included.
+
+    Returns
+    -------
+    mass, stiffness : (n_all, n_all) sparse array
+        kg and N/m (and their rotational counterparts).
+    """
+    several = tuple(parts)
+    mass = add_up(((part.indices, part.mass) for part in several), n_all)
+    return mass, add_up(((part.indices, part.stiffness) for part in several), n_all)
+
+
+def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matrix) -> tuple[FloatArray, Matrix]:
+    """Damping as ``[damping]`` states it.
+
+    Parameters
+    ----------
+    section : DampingSection, optional
+        What the file says.
+    mass, stiffness : (n_all, n_all) sparse array
+        Matrices of all DOFs.
+
+    Returns
+    -------
+    modal_damping : (n,) array
+        Damping ratios of the elastic modes; empty where none is stated.
+    damping : (n_all, n_all) sparse array
+        alpha M + beta K, N s/m; empty without Rayleigh damping.
+    """
+    nothing = sparse.csr_array(mass.shape, dtype=np.float64)
+    if section is None:
+        return np.zeros(0), nothing
+    if section.rayleigh is None:
+        return np.array(section.modal_ratio), nothing
+    return np.zeros(0), sparse.csr_array(section.rayleigh.alpha_1_s * mass + section.rayleigh.beta_s * stiffness)

@@ -1,0 +1,1 @@
+"""Straight beams: elements, fields between the nodes, and other versions of a beam."""

@@ -1,0 +1,380 @@
+"""Undamped modes of an FE model, and the flexibility of the modes that are left out.
+
+``K phi = omega^2 M phi`` is solved by shift and inversion, ``(K + tau M)^-1 M``, with tau near the square of 0.4 times
+the first elastic mode: the low modes then keep their digits however fine the mesh, and a free structure stays positive
+definite. Small models take LAPACK, large ones ARPACK on a sparse factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+from scipy.sparse import linalg as sparse_linalg
+
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
+from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.factorization import DENSE_ORDER, Factorization, factorize
+from frf_ipz.fe.global_motions import quadratic_motions, rigid_body_motions
+from frf_ipz.modes import ModeSet
+
+if TYPE_CHECKING:
+    from frf_ipz.structure import Matrix, StructuralModel
+
+EPS = float(np.finfo(float).eps)
+SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding
+HELD_SHIFT = 0.01  # of the estimate, for a structure that is held: its stiffness needs no shift to be factored
+USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are lost; above, ARPACK crawls
+NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below cannot be told from none
+MAX_ROUNDING = 1e-9  # what a stiffness matrix printed with few digits may lack
+MOST_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
+NO_FREQUENCY = 1e-9  # of the highest Ritz value: below, a motion of the whole is one of a rigid body
+FIRST_MODES = 24  # ARPACK's first guess at how many modes lie below a frequency
+FLEXIBILITY_STEPS = 60
+FLEXIBILITY_TOLERANCE = 1e-12  # change of a step, relative: the limit of double precision
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalBasis:
+    """The lowest modes of a model, and the means to find what the others contribute.
+
+    Parameters
+    ----------
+    eigenvalues : (n_modes,) array
+        omega^2 in ascending order, (rad/s)^2; exactly 0 for rigid-body modes.
+    shapes : (n, n_modes) array
+        Mode shapes at the free DOFs, mass-normalised.
+    n_rigid : int
+        Number of rigid-body modes.
+    stiffness, mass : (n, n) sparse array
+        Matrices of the free DOFs.
+    factor : Factorization
+        Of K + shift M.
+    shift : float
+        tau, (rad/s)^2.
+    """
+
+    eigenvalues: FloatArray
+    shapes: FloatArray
+    n_rigid: int
+    stiffness: Matrix
+    mass: Matrix
+    factor: Factorization
+    shift: float
+
+    @property
+    def natural_frequency_hz(self) -> FloatArray:
+        """Natural frequencies, (n_modes,) array, Hz."""
+        return np.sqrt(self.eigenvalues) / (2 * np.pi)
+
+    def first(self, n_modes: int) -> ModalBasis:
+        """Keep the lowest modes.
+
+        Parameters
+        ----------
+        n_modes : int
+            How many.
+
+        Returns
+        -------
+        ModalBasis
+            The same basis with fewer modes.
+        """
+        return ModalBasis(
+            eigenvalues=self.eigenvalues[:n_modes],
+            shapes=self.shapes[:, :n_modes],
+            n_rigid=min(self.n_rigid, n_modes),
+            stiffness=self.stiffness,
+            mass=self.mass,
+            factor=self.factor,
+            shift=self.shift,
+        )
+
+    def residual_flexibility(self, loads: FloatArray) -> FloatArray:
+        """Find the static deflection under loads, without what the modes of the basis contribute.
+
+        The part of the loads that excites none of the modes is in balance, also on a free structure, and its deflection
+        is found by correcting that of K + tau M. Each step takes off the factor ``tau / (omega^2 + tau)`` of the
+        first mode left out.
+
+        Parameters
+        ----------
+        loads : (n, n_loads) array
+            Loads at the free DOFs, N.
+
+        Returns
+        -------
+        (n, n_loads) array
+            m; a sum over the modes left out of ``phi phi^T / omega^2`` times the loads.
+        """
+        loads = loads - apply(self.mass, self.shapes @ (self.shapes.T @ loads))
+        deflection = self._without_modes(self.factor.solve(loads))
+        for _ in range(FLEXIBILITY_STEPS):
+            step = self._without_modes(self.factor.solve(loads - apply(self.stiffness, deflection)))
+            deflection += step
+            if np.abs(step).max(initial=0.0) <= FLEXIBILITY_TOLERANCE * np.abs(deflection).max(initial=0.0):
+                break
+        return deflection
+
+    def _without_modes(self, motion: FloatArray) -> FloatArray:
+        return np.asarray(motion - self.shapes @ (self.shapes.T @ apply(self.mass, motion)))
+
+
+def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz: float | None = None) -> ModeSet:
+    """Find the lowest modes of a model.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    n_modes : int, optional
+        How many modes, rigid-body modes included; at most as many as free DOFs.
+    up_to_hz : float, optional
+        Only modes up to this frequency, Hz. With neither of the two, all modes of a model of fewer than 600 DOFs.
+
+    Returns
+    -------
+    ModeSet
+        By ascending frequency, at the free DOFs, mass-normalised; rigid-body modes have the frequency 0. The damping
+        ratios are those that the model states, and what its viscous damping adds to each mode by itself.
+
+    Raises
+    ------
+    InputError
+        If nothing limits the number of modes of a large model, or a limit makes no sense.
+    ConvergenceError
+        If the iteration for a large model ends without result.
+    IllConditionedError
+        If mass or stiffness is indefinite.
+    """
+    basis = solve_basis(model, n_modes=n_modes, up_to_hz=up_to_hz)
+    return ModeSet(
+        natural_frequency_hz=basis.natural_frequency_hz,
+        damping_ratio=damping_ratios(model, basis),
+        shapes=basis.shapes.astype(np.complex128),
+        dofs=model.dofs,
+    )
+
+
+def damping_ratios(model: StructuralModel, basis: ModalBasis) -> FloatArray:
+    """Damping ratio of each mode: what is stated for modes, and the viscous matrix's diagonal term.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    basis : ModalBasis
+        Its modes.
+
+    Returns
+    -------
+    (n_modes,) array
+        0 for rigid-body modes.
+    """
+    ratios = stated_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
+    viscous = np.sum(basis.shapes * apply(model.damping, basis.shapes), 0)
+    elastic = slice(basis.n_rigid, None)
+    ratios[elastic] += viscous[elastic] / (2 * np.sqrt(basis.eigenvalues[elastic]))
+    return ratios
+
+
+def stated_ratios(modal_damping: FloatArray, n_modes: int, n_rigid: int) -> FloatArray:
+    """Damping ratios of modes from those that a model states for its elastic ones.
+
+    Parameters
+    ----------
+    modal_damping : (n,) array
+        Ratios of the elastic modes; the last one holds for all further ones. May be empty.
+    n_modes, n_rigid : int
+        Number of modes, and of rigid-body modes among them.
+
+    Returns
+    -------
+    (n_modes,) array
+        0 for rigid-body modes, and for all where nothing is stated.
+    """
+    ratios = np.zeros(n_modes)
+    if modal_damping.size:
+        number = np.arange(n_modes - n_rigid)
+        ratios[n_rigid:] = modal_damping[np.minimum(number, modal_damping.size - 1)]
+    return ratios
+
+
+def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz: float | None = None) -> ModalBasis:
+    """Find the lowest modes of a model, and keep the factor for static solves.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    n_modes, up_to_hz
+        As for `solve_modes`.
+
+    Returns
+    -------
+    ModalBasis
+        The modes.
+
+    Raises
+    ------
+    InputError, ConvergenceError, IllConditionedError
+        As `solve_modes`.
+    """
+    order = int(np.count_nonzero(~model.fixed))
+    if order == 0:
+        raise InputError(f"every DOF of the model '{model.name}' is held: it has no modes")
+    if n_modes is not None and not 0 < n_modes <= order:
+        raise InputError(f"{n_modes} modes are asked for; the model '{model.name}' has {order} free DOFs")
+    if up_to_hz is not None and not up_to_hz > 0:
+        raise InputError(f"modes up to {up_to_hz:g} Hz are asked for; give a frequency above 0")
+    if order < DENSE_ORDER:
+        basis = _solve_dense(model, n_modes or order, up_to_hz)
+    elif n_modes is None and up_to_hz is None:
+        raise InputError(
+            f"the model '{model.name}' has {order} free DOFs: say how many modes, or up to which frequency"
+        )
+    else:
+        basis = _solve_sparse(model, n_modes, up_to_hz)
+    if up_to_hz is not None:
+        basis = basis.first(int(np.count_nonzero(basis.natural_frequency_hz <= up_to_hz)))
+    return basis
+
+
+def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -> ModalBasis:
+    stiffness, mass = model.stiffness, model.mass
+    order = mass.shape[0]
+    full_stiffness, full_mass = stiffness.toarray(), mass.toarray()
+    rough = linalg.eigh(full_stiffness, full_mass, eigvals_only=True)
+    if up_to_hz is not None:
+        # one mode more, so that rounding at the limit loses none
+        n_modes = min(n_modes, 1 + int(np.searchsorted(rough, (2 * np.pi * up_to_hz) ** 2)))
+    elastic = rough[rough > order * EPS * abs(rough[-1])]
+    shift = SHIFT**2 * float(elastic[0]) if elastic.size else 1.0
+    places = [order - min(n_modes, order), order - 1]
+    inverses, shapes = linalg.eigh(full_mass, full_stiffness + shift * full_mass, subset_by_index=places)
+    shapes = shapes[:, ::-1] / np.sqrt(inverses[::-1])
+    return _cleaned(model, stiffness, mass, shapes, factorize(stiffness + shift * mass, _nodes(model)), shift)
+
+
+def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
+    stiffness, mass = model.stiffness, model.mass
+    frequency_hz = _first_shift_hz(model, stiffness, mass, up_to_hz)
+    basis = _at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
+    elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
+    if elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]:
+        basis = _at_shift(model, stiffness, mass, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
+    return basis
+
+
+def _at_shift(
+    model: StructuralModel,
+    stiffness: Matrix,
+    mass: Matrix,
+    frequency_hz: float,
+    n_modes: int | None,
+    up_to_hz: float | None,
+) -> ModalBasis:
+    """Find modes with one factorization; more and more of them until the highest lies above the limit."""
+    shift = (2 * np.pi * frequency_hz) ** 2
+    order = mass.shape[0]
+    factor = factorize(stiffness + shift * mass, _nodes(model))
+    wanted = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
+    while True:
+        shapes = _lanczos(stiffness, mass, factor, shift, wanted)
+        basis = _cleaned(model, stiffness, mass, shapes, factor, shift)
+        most = min(n_modes or order - 1, order - 1)
+        if up_to_hz is None or wanted == most or basis.natural_frequency_hz[-1] > up_to_hz:
+            return basis
+        wanted = min(2 * wanted, most)
+
+
+def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: float, n_modes: int) -> FloatArray:
+    order = mass.shape[0]
+    inverse = sparse_linalg.LinearOperator((order, order), matvec=factor.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(order)  # ARPACK's own start differs from run to run
+    try:
+        inverses, shapes = sparse_linalg.eigsh(
+            stiffness, n_modes, M=mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
+        )
+    except sparse_linalg.ArpackNoConvergence as error:
+        raise ConvergenceError(
+            f"the eigensolver found {len(error.eigenvalues)} of {n_modes} modes; ask for fewer modes or a lower band"
+        ) from None
+    return np.asarray(shapes[:, np.argsort(inverses)])
+
+
+def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_to_hz: float | None) -> float:
+    """Guess a good shift before anything is factored, from motions that are polynomials in the coordinates."""
+    dofs = model.dofs
+    motions = quadratic_motions(dofs, model.geometry)
+    energies = _ritz(stiffness, mass, motions)
+    rigid = _ritz(stiffness, mass, rigid_body_motions(dofs, model.geometry))
+    is_free = bool(rigid.size and rigid[0] <= NO_FREQUENCY * energies[-1])
+    elastic = energies[energies > NO_FREQUENCY * energies[-1]]
+    estimate = float(np.sqrt(elastic[0])) / (2 * np.pi) if elastic.size else np.inf
+    estimate = min(estimate, up_to_hz or np.inf)
+    return (SHIFT if is_free else HELD_SHIFT) * (estimate if np.isfinite(estimate) else 1.0)
+
+
+def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> FloatArray:
+    """Rayleigh-Ritz values, ascending, without the combinations of motions that vanish."""
+    weights, axes = linalg.eigh(motions.T @ apply(mass, motions))
+    kept = axes[:, weights > 1e-10 * weights[-1]] / np.sqrt(weights[weights > 1e-10 * weights[-1]])
+    return np.asarray(linalg.eigvalsh(kept.T @ (motions.T @ apply(stiffness, motions)) @ kept))
+
+
+def _cleaned(
+    model: StructuralModel,
+    stiffness: Matrix,
+    mass: Matrix,
+    shapes: FloatArray,
+    factor: Factorization,
+    shift: float,
+) -> ModalBasis:
+    """Make shapes exactly orthonormal, their frequencies exact to second order, and rigid-body modes rigid."""
+    for _ in range(2):  # the second time takes off what rounding left in the first
+        lower = linalg.cholesky(shapes.T @ apply(mass, shapes), lower=True)
+        shapes = linalg.solve_triangular(lower, shapes.T, lower=True).T
+    eigenvalues = np.sum(shapes * apply(stiffness, shapes), 0)
+    largest = np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
+    unknown = NO_ENERGY * _rounding(model, stiffness) * largest
+    if (eigenvalues < -unknown).any():
+        raise IllConditionedError(
+            f"the stiffness matrix of the model '{model.name}' is indefinite: "
+            f"a mode has omega^2 = {eigenvalues.min():.4g}"
+        )
+    rigid = eigenvalues <= unknown
+    eigenvalues = np.where(rigid, 0.0, eigenvalues)
+    ascending = np.argsort(eigenvalues, kind="stable")
+    shapes = shapes[:, ascending]
+    top = shapes[np.argmax(np.abs(shapes), 0), np.arange(shapes.shape[1])]
+    return ModalBasis(
+        eigenvalues=eigenvalues[ascending],
+        shapes=shapes * np.sign(top),
+        n_rigid=int(np.count_nonzero(rigid)),
+        stiffness=stiffness,
+        mass=mass,
+        factor=factor,
+        shift=shift,
+    )
+
+
+def _rounding(model: StructuralModel, stiffness: Matrix) -> float:
+    """Relative rounding of the stiffness matrix: what a translation, which strains nothing inside, leaves in most rows.
+
+    It is that of double precision for a model built here, and that of the printed digits for one that was exported.
+    """
+    found = [EPS]
+    for translation in rigid_body_motions(model.dofs, model.geometry)[:, :3].T:
+        sizes = apply(abs(stiffness), np.abs(translation))
+        if sizes.any():
+            left = np.abs(apply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
+            found.append(float(np.quantile(left, MOST_ROWS)))
+    return max(rounding for rounding in found if rounding <= MAX_ROUNDING)
+
+
+def _nodes(model: StructuralModel) -> IntArray:
+    return np.array([dof.node for dof in model.dofs])

@@ -1,0 +1,256 @@
+"""``kind = "beam"``: a straight beam along x that bends in z."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import FileFormatError
+from frf_ipz.fe.assembly import mass_and_stiffness, stated_damping
+from frf_ipz.fe.beams.beam_options import BeamFile, BeamOptions
+from frf_ipz.fe.beams.elements import BeamElements, mass_matrices, shear_coefficient, stiffness_matrices
+from frf_ipz.structure import Geometry, Part, StructuralModel
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.arrays import BoolArray, IntArray
+
+KIND = "beam"
+DIRECTIONS = ("z", "ry")
+FILE = BeamFile
+HELD = {"clamped": ("z", "ry"), "pinned": ("z",), "sliding": ("ry",), "free": ()}
+
+
+def files(file: BeamFile, path: Path) -> tuple[Path, ...]:
+    """Files besides ``model.toml``: none.
+
+    Parameters
+    ----------
+    file : BeamFile
+        What ``model.toml`` says.
+    path : Path
+        Where it is.
+
+    Returns
+    -------
+    tuple of Path
+        Empty.
+    """
+    del file, path
+    return ()
+
+
+def read(file: BeamFile, path: Path) -> StructuralModel:
+    """Check what the single keys cannot show, and build the beam.
+
+    Parameters
+    ----------
+    file : BeamFile
+        What ``model.toml`` says.
+    path : Path
+        Where it is, for messages.
+
+    Returns
+    -------
+    StructuralModel
+        The beam.
+
+    Raises
+    ------
+    FileFormatError
+        If a section, a point mass or a spring lies outside the beam, sections overlap, or nothing can move.
+    """
+    _check_sections(file.beam, path)
+    _check_points(file.beam, path)
+    model = build_beam(file)
+    if model.fixed.all():
+        raise FileFormatError(path, "the supports hold every DOF of the beam; use more elements", where="key 'beam'")
+    return model
+
+
+def build_beam(file: BeamFile) -> StructuralModel:
+    """Build a beam from options that have been checked.
+
+    Parameters
+    ----------
+    file : BeamFile
+        Options of the whole file; kept as the model's `source`.
+
+    Returns
+    -------
+    StructuralModel
+        The beam with its elements, point masses and springs as parts.
+    """
+    beam = file.beam
+    dofs = tuple(Dof(node, direction) for node in range(1, beam.elements + 2) for direction in DIRECTIONS)
+    parts = (*element_parts(beam), *_point_parts(beam))
+    mass, stiffness = mass_and_stiffness(parts, len(dofs))
+    modal_damping, damping = stated_damping(file.damping, mass, stiffness)
+    return StructuralModel(
+        name=file.model.name,
+        kind=KIND,
+        all_dofs=dofs,
+        fixed=_held(beam, dofs),
+        mass_all=mass,
+        stiffness_all=stiffness,
+        damping_all=damping,
+        modal_damping=modal_damping,
+        geometry=_geometry(beam),
+        parts=parts,
+        source=file,
+    )
+
+
+def beam_elements(beam: BeamOptions) -> BeamElements:
+    """Properties of a beam's elements.
+
+    Parameters
+    ----------
+    beam : BeamOptions
+        The beam.
+
+    Returns
+    -------
+    BeamElements
+        One number an element.
+    """
+    width, thickness = np.full(beam.elements, beam.width_m), np.full(beam.elements, beam.thickness_m)
+    for section in beam.section:
+        stretch = slice(section.elements[0] - 1, section.elements[1])
+        width[stretch] = section.width_m or beam.width_m
+        thickness[stretch] = section.thickness_m or beam.thickness_m
+    length = np.full(beam.elements, beam.length_m / beam.elements)
+    area, second_moment = width * thickness, width * thickness**3 / 12
+    bending = beam.youngs_modulus_Pa * second_moment
+    shear_modulus = beam.youngs_modulus_Pa / (2 * (1 + beam.poisson_ratio))
+    shear = shear_coefficient(beam.poisson_ratio) * shear_modulus * area
+    is_timoshenko = float(beam.formulation == "timoshenko")
+    return BeamElements(
+        length=length,
+        bending_stiffness=bending,
+        shear_parameter=is_timoshenko * 12 * bending / (shear * length**2),
+        mass_per_length=beam.density_kg_m3 * area,
+        rotary_inertia_per_length=is_timoshenko * beam.density_kg_m3 * second_moment,
+    )
+
+
+def element_parts(beam: BeamOptions) -> list[Part]:
+    """Elements of a beam as parts of a model.
+
+    Parameters
+    ----------
+    beam : BeamOptions
+        The beam.
+
+    Returns
+    -------
+    list of Part
+        Named by their numbers, from 1 at the left.
+    """
+    elements = beam_elements(beam)
+    shares = zip(stiffness_matrices(elements), mass_matrices(elements), strict=True)
+    return [
+        Part(
+            kind="element",
+            name=str(number),
+            nodes=(number, number + 1),
+            indices=np.arange(2 * number - 2, 2 * number + 2),
+            stiffness=stiffness,
+            mass=mass,
+        )
+        for number, (stiffness, mass) in enumerate(shares, start=1)
+    ]
+
+
+def _point_parts(beam: BeamOptions) -> list[Part]:
+    masses = [
+        _point_part("mass", place, mass.node, mass=(mass.mass_kg, mass.rotary_inertia_kgm2))
+        for place, mass in enumerate(beam.point_mass, start=1)
+    ]
+    springs = [
+        _point_part("spring", place, spring.node, stiffness=(spring.stiffness_N_m, spring.rotational_stiffness_Nm_rad))
+        for place, spring in enumerate(beam.point_spring, start=1)
+    ]
+    return masses + springs
+
+
+def _point_part(
+    what: str,
+    place: int,
+    node: int,
+    *,
+    mass: tuple[float, float] = (0.0, 0.0),
+    stiffness: tuple[float, float] = (0.0, 0.0),
+) -> Part:
+    return Part(
+        kind="point",
+        name=f"{what} {place} at node {node}",
+        nodes=(node,),
+        indices=_rows(node),
+        stiffness=np.diag(stiffness),
+        mass=np.diag(mass),
+    )
+
+
+def _rows(node: int) -> IntArray:
+    return np.arange(2 * node - 2, 2 * node)
+
+
+def _held(beam: BeamOptions, dofs: tuple[Dof, ...]) -> BoolArray:
+    held = {Dof(1, direction) for direction in HELD[beam.left]}
+    held |= {Dof(beam.elements + 1, direction) for direction in HELD[beam.right]}
+    return np.array([dof in held for dof in dofs])
+
+
+def _geometry(beam: BeamOptions) -> Geometry:
+    nodes = np.arange(1, beam.elements + 2)
+    coordinates = np.zeros((len(nodes), 3))
+    coordinates[:, 0] = np.linspace(0.0, beam.length_m, len(nodes))
+    ends = {1: beam.left, beam.elements + 1: beam.right}
+    return Geometry(
+        nodes=nodes,
+        coordinates_m=coordinates,
+        lines=np.stack([nodes[:-1], nodes[1:]], 1),
+        supports={node: how for node, how in ends.items() if how != "free"},
+    )
+
+
+def _check_sections(beam: BeamOptions, path: Path) -> None:
+    taken: dict[int, int] = {}
+    for place, section in enumerate(beam.section, start=1):
+        where = f"key 'beam.section.[{place}]'"
+        first, last = section.elements
+        if first > last or last > beam.elements:
+            raise FileFormatError(
+                path, f"elements {first} to {last} are not in the beam, which has 1 to {beam.elements}", where=where
+            )
+        if section.thickness_m is None and section.width_m is None:
+            raise FileFormatError(path, "changes nothing; give thickness_m or width_m", where=where)
+        shared = taken.keys() & range(first, last + 1)
+        if shared:
+            raise FileFormatError(
+                path, f"element {min(shared)} is in section {taken[min(shared)]} too; let them not overlap", where=where
+            )
+        taken |= dict.fromkeys(range(first, last + 1), place)
+
+
+def _check_points(beam: BeamOptions, path: Path) -> None:
+    places = [(f"point_mass.[{place}]", mass.node) for place, mass in enumerate(beam.point_mass, start=1)]
+    places += [(f"point_spring.[{place}]", spring.node) for place, spring in enumerate(beam.point_spring, start=1)]
+    for key, node in places:
+        if node > beam.elements + 1:
+            raise FileFormatError(
+                path,
+                f"there is no node {node}; the beam has nodes 1 to {beam.elements + 1}",
+                where=f"key 'beam.{key}.node'",
+            )
+    for place, spring in enumerate(beam.point_spring, start=1):
+        if not (spring.stiffness_N_m or spring.rotational_stiffness_Nm_rad):
+            raise FileFormatError(
+                path,
+                "has no stiffness; give stiffness_N_m or rotational_stiffness_Nm_rad",
+                where=f"key 'beam.point_spring.[{place}]'",
+            )

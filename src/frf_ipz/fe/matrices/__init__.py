@@ -1,0 +1,1 @@
+"""Matrices that other FE programs exported: read, and checked."""

@@ -1,0 +1,89 @@
+"""Matrix Market files into symmetric sparse matrices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import io, sparse
+
+from frf_ipz.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.structure import Matrix
+
+SYMMETRY_TOLERANCE = 1e-6  # of the geometric mean of the two diagonal entries: exports with six digits still pass
+
+
+def read_symmetric(path: Path, order: int, ordered_by: str) -> Matrix:
+    """Read a real symmetric matrix.
+
+    Small asymmetries, as they come from few printed digits, are averaged out.
+
+    Parameters
+    ----------
+    path : Path
+        The file, in coordinate or array form, general or symmetric.
+    order : int
+        Number of rows it must have.
+    ordered_by : str
+        What says so, for messages.
+
+    Returns
+    -------
+    (order, order) sparse array
+        In the unit of the file.
+
+    Raises
+    ------
+    FileFormatError
+        If there is no such file, it is no Matrix Market file, not real, not square, of another size, holds values that
+        are not finite, or is not symmetric to `SYMMETRY_TOLERANCE`.
+    """
+    matrix = _read(path)
+    rows, columns = matrix.shape
+    if rows != columns:
+        raise FileFormatError(path, f"is {rows} x {columns}; a square matrix is needed")
+    if rows != order:
+        raise FileFormatError(
+            path, f"is {rows} x {columns}, but {ordered_by} names {order} DOFs; one row a DOF is needed"
+        )
+    if not np.isfinite(matrix.data).all():
+        raise FileFormatError(path, "holds values that are not finite; export it again")
+    _require_symmetry(matrix, path)
+    symmetric: Any = (matrix + matrix.T) / 2
+    return sparse.csr_array(symmetric)
+
+
+def _read(path: Path) -> Matrix:
+    if not path.is_file():
+        raise FileFormatError(path, "there is no such file; paths are relative to model.toml")
+    try:
+        field = io.mminfo(str(path))[4]
+        if field not in {"real", "integer"}:
+            raise FileFormatError(path, f"holds {field} values; real ones are needed")
+        loaded: Any = io.mmread(str(path))
+    except (ValueError, OverflowError, OSError, IndexError, UnicodeDecodeError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise FileFormatError(path, f"cannot be read as a Matrix Market file: {error}") from None
+    matrix: Matrix = sparse.csr_array(loaded, dtype=np.float64)
+    return matrix
+
+
+def _require_symmetry(matrix: Matrix, path: Path) -> None:
+    difference = sparse.coo_array(matrix - matrix.T)
+    diagonal = np.abs(matrix.diagonal())
+    allowed = SYMMETRY_TOLERANCE * np.sqrt(diagonal[difference.row] * diagonal[difference.col])
+    excess = np.abs(difference.data) - allowed
+    if excess.size and excess.max() > 0:
+        worst = int(np.argmax(excess))
+        row, column = int(difference.row[worst]), int(difference.col[worst])
+        raise FileFormatError(
+            path,
+            f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g}; export the full matrix, "
+            "or mark it as symmetric in its first line",
+            where=f"rows {row + 1} and {column + 1}",
+        )

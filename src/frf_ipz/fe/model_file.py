@@ -1,0 +1,143 @@
+"""``model.toml`` into a structural model. Each kind of model is a module of `fe.kinds`, found by itself."""
+
+from __future__ import annotations
+
+import pkgutil
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.fe import kinds
+from frf_ipz.fe.model_options import ModelSection
+from frf_ipz.toml_files import read_toml
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from frf_ipz.structure import StructuralModel
+
+
+class Kind(Protocol):
+    """What a module of `fe.kinds` has to offer.
+
+    Parameters
+    ----------
+    KIND : str
+        Its name in ``[model] kind``.
+    FILE : type
+        Options dataclass of the whole file.
+    """
+
+    KIND: str
+    FILE: type
+
+    def files(self, file: Any, path: Path) -> tuple[Path, ...]:  # noqa: ANN401 - each kind has its own dataclass
+        """Files besides ``model.toml`` that the model is made of.
+
+        Parameters
+        ----------
+        file : FILE
+            What ``model.toml`` says.
+        path : Path
+            Where it is.
+
+        Returns
+        -------
+        tuple of Path
+            The files.
+        """
+
+    def read(self, file: Any, path: Path) -> StructuralModel:  # noqa: ANN401 - each kind has its own dataclass
+        """Check the options and build the model.
+
+        Parameters
+        ----------
+        file : FILE
+            What ``model.toml`` says.
+        path : Path
+            Where it is.
+
+        Returns
+        -------
+        StructuralModel
+            The model.
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Head:
+    """The part of the file that says how the rest is to be read."""
+
+    __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012 - pydantic's own attribute
+
+    model: ModelSection
+
+
+def read_model(path: Path) -> StructuralModel:
+    """Read an FE model.
+
+    Parameters
+    ----------
+    path : Path
+        Its ``model.toml``.
+
+    Returns
+    -------
+    StructuralModel
+        The model, with all its DOFs, the held ones included.
+
+    Raises
+    ------
+    FileFormatError
+        If a file is missing or something in it does not fit: says which file, where, and what to do.
+    """
+    kind, file = _read_options(path)
+    return kind.read(file, path)
+
+
+def model_files(path: Path) -> tuple[Path, ...]:
+    """Name all files that a model is made of.
+
+    Parameters
+    ----------
+    path : Path
+        Its ``model.toml``.
+
+    Returns
+    -------
+    tuple of Path
+        ``model.toml`` first; the others need not exist.
+
+    Raises
+    ------
+    FileFormatError
+        If ``model.toml`` cannot be read.
+    """
+    kind, file = _read_options(path)
+    return (path, *kind.files(file, path))
+
+
+def known_kinds() -> Mapping[str, Kind]:
+    """Find the kinds of models.
+
+    Returns
+    -------
+    mapping of str to Kind
+        Modules of `fe.kinds` by the name of their kind.
+    """
+    modules = [
+        cast("Kind", import_module(f"{kinds.__name__}.{found.name}")) for found in pkgutil.iter_modules(kinds.__path__)
+    ]
+    return {module.KIND: module for module in modules}
+
+
+def _read_options(path: Path) -> tuple[Kind, object]:
+    head = read_toml(path, _Head, required="model")
+    available = known_kinds()
+    if head.model.kind not in available:
+        advice = did_you_mean(head.model.kind, available)
+        raise FileFormatError(path, f"'{head.model.kind}' is no kind of model; {advice}", where="key 'model.kind'")
+    kind = available[head.model.kind]
+    return kind, read_toml(path, kind.FILE)

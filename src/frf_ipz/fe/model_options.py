@@ -1,0 +1,88 @@
+"""What every ``model.toml`` may say, whatever kind of model it describes; and the numbers that may stand in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+from frf_ipz.toml_files import STRICT
+
+# Numbers are strict: TOML tells numbers, texts and truth values apart, so a length of "0.5" or of true is a slip.
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]
+Count = Annotated[int, Field(ge=1, strict=True)]
+Node = Annotated[int, Field(ge=1, strict=True)]
+NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+def _as_list(value: Any) -> Any:  # noqa: ANN401 - whatever the file holds; the type behind it checks
+    return value if isinstance(value, list | tuple) else [value]
+
+
+Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_as_list), Field(min_length=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelSection:
+    """``[model]``.
+
+    Parameters
+    ----------
+    kind : str
+        Which kind of model; the module of that name in `fe.kinds` reads the rest of the file.
+    name : str
+        As the user calls it.
+    """
+
+    __pydantic_config__ = STRICT
+
+    kind: Name
+    name: Name = "model"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RayleighDamping:
+    """``rayleigh = { alpha_1_s, beta_s }``: the damping matrix is alpha M + beta K.
+
+    Parameters
+    ----------
+    alpha_1_s, beta_s : float
+        1/s and s.
+    """
+
+    __pydantic_config__ = STRICT
+
+    alpha_1_s: NotNegative = 0.0
+    beta_s: NotNegative = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DampingSection:
+    """``[damping]``: one of its two keys.
+
+    Parameters
+    ----------
+    modal_ratio : tuple of float
+        Damping ratios of the modes that are no rigid-body motion, by ascending frequency; the last one holds for all
+        further modes, so that one number is one ratio for all. Empty where it is not given.
+    rayleigh : RayleighDamping, optional
+        Damping matrix made of mass and stiffness.
+
+    Raises
+    ------
+    ValueError
+        If both are given, or none.
+    """
+
+    __pydantic_config__ = STRICT
+
+    modal_ratio: Ratios = ()
+    rayleigh: RayleighDamping | None = None
+
+    def __post_init__(self) -> None:
+        if bool(self.modal_ratio) == (self.rayleigh is not None):
+            raise ValueError("needs exactly one of modal_ratio and rayleigh; leave the section out for no damping")

@@ -1,0 +1,224 @@
+"""FRFs and poles of a model, full or reduced, at any complex frequency.
+
+A full model is taken in its modes. A small one in all of them; of a large one those up to three times the highest
+frequency, and the others as a series in s^2 whose first term is their exact static flexibility.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
+from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.structure import ReducedModel, StructuralModel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfLabel
+
+MODES_BEYOND = 3.0  # times the highest frequency: modes above follow in the series
+SERIES_TERMS = 5  # the last one is off by (1/3)^10 of the first mode left out
+COUPLED_ORDER = 100  # modes that viscous damping may couple; with more DOFs, those up to MODES_BEYOND are taken
+COUPLING = 1e-9  # of the geometric mean of the diagonal terms: damping below couples no modes
+LINES_AT_ONCE = 256  # keeps stacks of small matrices within some MB
+BESIDE_ZERO = 1e-6  # of the lowest other frequency, or rad/s: where 0 Hz is evaluated
+NO_POLE = 1e-6  # of the largest modulus: a pole within is that of a rigid-body motion, spread by rounding
+REAL_POLE = 1e-12  # of the modulus: imaginary part of a pole that is real
+
+
+def model_frfs(model: StructuralModel | ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+    """Evaluate FRFs of a model.
+
+    Parameters
+    ----------
+    model : StructuralModel or ReducedModel
+        The model.
+    labels : sequence of FrfLabel
+        Outputs, inputs, signs and quantities of the FRFs.
+    s : (n_lines,) complex array
+        Laplace variable, rad/s: i omega, or sigma + i omega. At s = 0 the FRF just beside is given, since
+        the receptance of a free structure is infinite there.
+
+    Returns
+    -------
+    (n_lines, n_frfs) complex array
+        SI, in the quantity and with the signs of each label.
+
+    Raises
+    ------
+    InputError
+        If the model lacks a DOF or holds it.
+    """
+    others = np.abs(s[s != 0])
+    s = np.where(s == 0, BESIDE_ZERO * (others.min() if others.size else 1.0), s).astype(np.complex128)
+    if isinstance(model, ReducedModel):
+        receptance = _reduced_receptances(model, labels, s)
+    else:
+        receptance = _modal_receptances(model, labels, s)
+    powers = np.array([label.quantity.power for label in labels])
+    return np.asarray(receptance * s[:, None] ** powers)
+
+
+def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None = None) -> ComplexArray:
+    """Poles of a model.
+
+    Parameters
+    ----------
+    model : StructuralModel or ReducedModel
+        The model.
+    up_to_hz : float, optional
+        Only poles up to this modulus over 2 pi, Hz; needed for a large model.
+
+    Returns
+    -------
+    (n_poles,) complex array
+        rad/s, by ascending modulus; of a conjugate pair the one with the positive imaginary part. A real pole stands
+        for itself: an undamped rigid-body mode has two of them, at 0.
+
+    Raises
+    ------
+    InputError
+        If a large model is given without `up_to_hz`.
+    """
+    if isinstance(model, ReducedModel):
+        poles = _quadratic_poles(model.mass, model.damping, model.stiffness)
+    else:
+        basis = solve_basis(model, up_to_hz=up_to_hz)
+        damping = _modal_damping(model, basis)
+        if damping.ndim == 1:
+            root = np.sqrt((damping / 2) ** 2 - basis.eigenvalues.astype(np.complex128))
+            poles = _upper_half(np.concatenate([-damping / 2 + root, -damping / 2 - root]))
+        else:
+            poles = _quadratic_poles(np.eye(len(damping)), damping, np.diag(basis.eigenvalues))
+    return poles if up_to_hz is None else poles[np.abs(poles) <= 2 * np.pi * up_to_hz]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ends:
+    """Which DOFs FRFs begin and end at, each once, and the product of the signs."""
+
+    outputs: list[Dof]
+    inputs: list[Dof]
+    output_of: list[int]
+    input_of: list[int]
+    sign: FloatArray
+
+    @classmethod
+    def of(cls, labels: Sequence[FrfLabel]) -> _Ends:
+        outputs = list(dict.fromkeys(label.output_dof.unsigned for label in labels))
+        inputs = list(dict.fromkeys(label.input_dof.unsigned for label in labels))
+        return cls(
+            outputs,
+            inputs,
+            [outputs.index(label.output_dof.unsigned) for label in labels],
+            [inputs.index(label.input_dof.unsigned) for label in labels],
+            np.array([label.sign for label in labels], dtype=float),
+        )
+
+
+def _reduced_receptances(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+    ends = _Ends.of(labels)
+    outputs = np.array([model.row(dof) for dof in ends.outputs])
+    inputs = np.array([model.row(dof) for dof in ends.inputs])
+    found = _solved(s, (model.mass, model.damping, model.stiffness), outputs, inputs)
+    return np.asarray(found[:, ends.output_of, ends.input_of] * ends.sign)
+
+
+def _modal_receptances(model: StructuralModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+    ends = _Ends.of(labels)
+    output_rows = [model.index(dof) for dof in ends.outputs]
+    input_rows = [model.index(dof) for dof in ends.inputs]
+    basis = _basis_for(model, s)
+    outputs, inputs = basis.shapes[output_rows], basis.shapes[input_rows]
+    damping = _modal_damping(model, basis)
+    if damping.ndim == 1:
+        resonance = 1 / (s[:, None] ** 2 + s[:, None] * damping + basis.eigenvalues)
+        found = resonance @ (outputs[ends.output_of] * inputs[ends.input_of]).T
+    else:
+        matrices = (np.eye(len(damping)), damping, np.diag(basis.eigenvalues))
+        found = _solved(s, matrices, outputs, inputs)[:, ends.output_of, ends.input_of]
+    if len(basis.eigenvalues) < len(basis.shapes):
+        terms = _series(basis, output_rows, input_rows)[:, ends.output_of, ends.input_of]
+        found = found + sum(term * (-(s[:, None] ** 2)) ** power for power, term in enumerate(terms))
+    return np.asarray(found * ends.sign)
+
+
+def _basis_for(model: StructuralModel, s: ComplexArray) -> ModalBasis:
+    order = int(np.count_nonzero(~model.fixed))
+    if order <= (COUPLED_ORDER if model.damping_all.count_nonzero() else DENSE_ORDER - 1):
+        return solve_basis(model)
+    highest_hz = float(np.abs(s).max()) / (2 * np.pi)
+    return solve_basis(model, up_to_hz=MODES_BEYOND * highest_hz)
+
+
+def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
+    """Damping in modal coordinates, 2 zeta omega: (n,) where it couples no modes, else (n, n)."""
+    ratios = stated_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
+    stated = 2 * ratios * np.sqrt(basis.eigenvalues)
+    if not model.damping_all.count_nonzero():
+        return stated
+    viscous = np.asarray(basis.shapes.T @ apply(model.damping, basis.shapes))
+    own = np.diag(viscous)
+    across = np.abs(viscous - np.diag(own))
+    if (across <= COUPLING * np.sqrt(np.outer(np.abs(own), np.abs(own)))).all():
+        return stated + own
+    return viscous + np.diag(stated)
+
+
+def _series(basis: ModalBasis, output_rows: list[int], input_rows: list[int]) -> FloatArray:
+    """Sum phi phi^T / omega^2, / omega^4, ... over the modes left out, (n_terms, n_outputs, n_inputs)."""
+    # flexibility is symmetric: load the side that has fewer DOFs
+    loaded, read = (input_rows, output_rows) if len(input_rows) <= len(output_rows) else (output_rows, input_rows)
+    loads = np.zeros((len(basis.shapes), len(loaded)))
+    loads[loaded, np.arange(len(loaded))] = 1.0
+    terms = []
+    for _ in range(SERIES_TERMS):
+        deflection = basis.residual_flexibility(loads)
+        terms.append(deflection[read] if loaded is input_rows else deflection[read].T)
+        loads = np.asarray(apply(basis.mass, deflection))
+    return np.array(terms)
+
+
+def _solved(
+    s: ComplexArray, matrices: tuple[FloatArray, FloatArray, FloatArray], outputs: FloatArray, inputs: FloatArray
+) -> ComplexArray:
+    """Receptances of small matrices (mass, damping, stiffness), (n_lines, n_outputs, n_inputs)."""
+    mass, damping, stiffness = matrices
+    blocks = []
+    for start in range(0, len(s), LINES_AT_ONCE):
+        part = s[start : start + LINES_AT_ONCE, None, None]
+        dynamic = part**2 * mass + part * damping + stiffness
+        blocks.append(outputs @ np.linalg.solve(dynamic, np.broadcast_to(inputs.T, (len(part), *inputs.T.shape))))
+    return np.concatenate(blocks)
+
+
+def _quadratic_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> ComplexArray:
+    """Roots of det(s^2 M + s B + K), as eigenvalues of the companion matrix in mass-normalised coordinates."""
+    order = len(mass)
+    lower = linalg.cholesky(mass, lower=True)
+
+    def normalised(matrix: FloatArray) -> FloatArray:
+        half = linalg.solve_triangular(lower, matrix, lower=True)
+        return np.asarray(linalg.solve_triangular(lower, half.T, lower=True).T)
+
+    companion = np.zeros((2 * order, 2 * order))
+    companion[:order, order:] = np.eye(order)
+    companion[order:, :order] = -normalised(stiffness)
+    companion[order:, order:] = -normalised(damping)
+    return _upper_half(np.linalg.eigvals(companion).astype(np.complex128))
+
+
+def _upper_half(poles: ComplexArray) -> ComplexArray:
+    modulus = np.abs(poles)
+    poles = np.where(modulus <= NO_POLE * modulus.max(initial=0.0), 0.0, poles)
+    poles = np.where(np.abs(poles.imag) <= REAL_POLE * modulus, poles.real + 0j, poles)
+    kept = poles[poles.imag >= 0]
+    return np.asarray(kept[np.argsort(np.abs(kept), kind="stable")], np.complex128)

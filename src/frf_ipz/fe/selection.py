@@ -1,0 +1,81 @@
+"""Which DOFs a reduced model is written in: independent ones, by pivoted QR of their mode shapes.
+
+[Kammer1991] D. C. Kammer, Sensor placement for on-orbit modal identification and correlation of large space structures,
+Journal of Guidance, Control and Dynamics 14 (2), 1991, 251-259, doi:10.2514/3.20635.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MAX_CONDITION = 1e3  # beyond, the reduced matrices keep fewer than ten of sixteen digits (they hold its square)
+INDEPENDENT = 0.02  # share of a wanted DOF's shapes that those before it do not hold: below, it is a copy of them
+
+
+def condition_number(shapes: FloatArray) -> float:
+    """Condition number of the square matrix of mode shapes at the retained DOFs, Phi_s.
+
+    Rows are scaled to the same length, since units of the DOFs do no harm.
+
+    Parameters
+    ----------
+    shapes : (r, r) array
+        Mass-normalised mode shapes and residual vectors at the retained DOFs.
+
+    Returns
+    -------
+    float
+        1 is best; infinite where a DOF does not move at all.
+    """
+    lengths = np.linalg.norm(shapes, axis=1)
+    if not lengths.all():
+        return float("inf")
+    return float(np.linalg.cond(shapes / lengths[:, None]))
+
+
+def choose_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int) -> IntArray:
+    """Choose DOFs at which modes are as independent as can be.
+
+    Those wanted come first, in their order, as long as they are independent of each other; the others follow by
+    pivoted QR, which makes the volume that their shapes span large (and so, nearly, the effective independence of
+    [Kammer1991]).
+
+    Parameters
+    ----------
+    shapes : (n, r) array
+        Mode shapes and residual vectors at all DOFs.
+    wanted : sequence of int
+        Rows to take if possible.
+    candidates : (n_candidates,) int array
+        Rows to fill up with.
+    count : int
+        How many rows to choose; at most r.
+
+    Returns
+    -------
+    (count,) int array
+        Rows; fewer where no more are independent.
+    """
+    chosen: list[int] = []
+    spanned = np.zeros((shapes.shape[1], 0))
+    for row in wanted:
+        shape = shapes[row]
+        rest = shape - spanned @ (spanned.T @ shape)
+        if len(chosen) < count and np.linalg.norm(rest) > INDEPENDENT * np.linalg.norm(shape):
+            chosen.append(row)
+            spanned = np.column_stack([spanned, rest / np.linalg.norm(rest)])
+    missing = count - len(chosen)
+    if missing:
+        others = np.setdiff1d(candidates, chosen)
+        rest = shapes[others] - (shapes[others] @ spanned) @ spanned.T
+        _, pivots = linalg.qr(rest.T, mode="r", pivoting=True)
+        chosen += [int(row) for row in others[pivots[:missing]]]
+    return np.array(chosen, dtype=np.int64)
