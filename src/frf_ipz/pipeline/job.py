@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.fe.joining import with_point_masses
+from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.test_file import Test, read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
@@ -99,6 +99,4 @@ def _model(path: Path, test: Test, points: tuple[Dof, ...]) -> StructuralModel:
             model.index(dof)
         except InputError as error:
             raise FileFormatError(path, f"{error}; it is needed for '{dof}' of the test or of [predict]") from None
-    if not len(model.modal_damping) and not model.damping_all.nnz and test.nominal_damping_ratio is not None:
-        model = replace(model, modal_damping=[test.nominal_damping_ratio])
-    return with_point_masses(model, test.sensor_masses)
+    return with_point_masses(with_default_damping(model, test.nominal_damping_ratio), test.sensor_masses)
