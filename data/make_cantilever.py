@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipelines"))
 
-from simulator.beams import BeamReality, build_beam
-from simulator.case_files import read_beam, write_recording
-from simulator.channels import AntiAlias, Noise, quantise
-from simulator.hammer import Blow
-from simulator.receptance import ModalReceptance, modal_receptance, solve_modes
-from simulator.response import LaplaceGrid
-from simulator.structures import Point
+from simulator.cases.files import read_beam, write_recording
+from simulator.signals.channels import AntiAlias, Noise, quantise
+from simulator.signals.hammer import Blow
+from simulator.signals.laplace import LaplaceGrid
+from simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
+from simulator.structures.beams import build_beam
+from simulator.structures.points import Point
+from simulator.structures.reality import Reality
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ BLOWS: dict[str, tuple[float, float, float, tuple[float, ...]]] = {
 def receptance() -> tuple[ModalReceptance, dict[int, int]]:
     """Return the real beam between all points, and the rows of the struck nodes (0: sensor, 1: POI)."""
     drawing = read_beam(DATA / "raw" / "cantilever" / "model.toml")
-    reality = BeamReality(released={"left": (CLAMP_NM_RAD, CLAMP_N_M)}, stations=(POI, *STRUCK_OFF_M))
+    reality = Reality(released={"left": (CLAMP_NM_RAD, CLAMP_N_M)}, stations=(POI, *STRUCK_OFF_M))
     beam = build_beam(drawing, reality).with_mass(Point(SENSOR), ACCELEROMETER_KG)
     points = [Point(SENSOR), Point(POI), *(Point(node, "z", (x, 0)) for node, x in STRUCK_OFF_M.items())]
     rows = np.array([beam.row(point) for point in points])

@@ -18,8 +18,6 @@ from make_cantilever import (
 )
 from numpy.testing import assert_allclose
 
-from conftest import ROOT
-
 CAMPAIGN = DATA / "raw" / "cantilever"
 
 
@@ -54,7 +52,7 @@ def test_recorded_blows_give_the_accelerance_of_the_beam():
 
 
 def test_the_readme_states_the_checksums_of_all_files():
-    text = (ROOT / "data" / "README.md").read_text(encoding="utf-8")
+    text = (DATA / "README.md").read_text(encoding="utf-8")
     lines = re.findall(r"^([0-9a-f]{64})  (\S+)$", text, flags=re.MULTILINE)
     stated = {path: digest for digest, path in lines}
     files = {f"raw/cantilever/hits/{name}.csv" for name in BLOWS} | {"reference/cantilever_poi_frf.csv"}

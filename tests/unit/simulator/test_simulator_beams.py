@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from simulator.beams import BeamDrawing, BeamReality, PointPart, Section, build_beam
-from simulator.receptance import solve_modes
-from simulator.structures import Point
+from simulator.signals.receptance import solve_modes
+from simulator.structures.beams import BeamDrawing, PointPart, Section, build_beam
+from simulator.structures.points import Point
+from simulator.structures.reality import Reality
 
 CLOSED_FORM = 1e-7  # roots of the characteristic equations are given to 1e-9
 MESH = 2e-6  # what doubling the number of splines still moves in the first six frequencies
@@ -65,16 +66,16 @@ def test_tension_raises_a_pinned_beam_as_the_formula_says():
     pinned = replace(DRAWING, left="pinned", right="pinned")
     beta = np.pi * np.arange(1, 4) / 0.5
     expected = np.sqrt((BENDING * beta**4 + 300.0 * beta**2) / LINE_MASS)
-    assert_allclose(frequencies(pinned, BeamReality(axial_load_n=300.0)), expected, rtol=CLOSED_FORM)
+    assert_allclose(frequencies(pinned, Reality(axial_load_n=300.0)), expected, rtol=CLOSED_FORM)
 
 
 def test_stiff_springs_hold_an_end_as_a_clamp_does():
-    released = BeamReality(released={"left": (1e9, 1e13)})
+    released = Reality(released={"left": (1e9, 1e13)})
     assert_allclose(frequencies(DRAWING, released), frequencies(DRAWING), rtol=1e-6)  # compliance of the springs
 
 
 def test_a_sprung_end_has_the_frequencies_of_its_characteristic_equation():
-    soft = BeamReality(released={"left": (BENDING / 0.5, None)})  # k L / EI = 1
+    soft = Reality(released={"left": (BENDING / 0.5, None)})  # k L / EI = 1
 
     def equation(x):  # k L / EI (1 + cos x cosh x) = x (sin x cosh x - cos x sinh x)
         return 1 + np.cos(x) * np.cosh(x) - x * (np.sin(x) * np.cosh(x) - np.cos(x) * np.sinh(x))
@@ -95,7 +96,7 @@ def test_static_compliance_of_the_tip_is_that_of_the_textbook():
 def test_softened_elements_and_sections_agree():
     thinner = Section(first=11, last=20, width_m=0.025 * 0.8, thickness_m=0.005)
     drawn = build_beam(replace(DRAWING, sections=(thinner,)))
-    real = build_beam(DRAWING, BeamReality(softened=((11, 20, 0.8),)))
+    real = build_beam(DRAWING, Reality(softened=(((11, 20), 0.8),)))
     load = np.array([drawn.row(Point(51)), real.row(Point(51))], dtype=object)
     compliance = [
         r.astype(float) @ np.linalg.solve(b.stiffness, r.astype(float))
@@ -108,7 +109,7 @@ def test_softened_elements_and_sections_agree():
 def test_a_mass_in_the_drawing_is_the_same_as_one_that_is_added():
     parts = (PointPart(node=20, mass_kg=0.02, rotary_inertia_kgm2=1e-5),)
     known = build_beam(replace(DRAWING, parts=parts))
-    added = build_beam(DRAWING, BeamReality(stations=(20,)))
+    added = build_beam(DRAWING, Reality(stations=(20,)))
     added = added.with_mass(Point(20), 0.02).with_mass(Point(20, "ry"), 1e-5)
     assert_allclose(solve_modes(known).omega_rad_s[:5], solve_modes(added).omega_rad_s[:5], rtol=1e-9)  # eigensolver
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from simulator.channels import AntiAlias, Noise, quantise
-from simulator.hammer import Blow, draw_blows
-from simulator.receptance import Attachment, ModalReceptance
-from simulator.response import LaplaceGrid
+from simulator.signals.channels import AntiAlias, Noise, quantise
+from simulator.signals.hammer import Blow, draw_blows
+from simulator.signals.laplace import LaplaceGrid
+from simulator.signals.receptance import Attachment, ModalReceptance
 
 EXACT = 1e-4  # what comes round after twice the length of the record
 
@@ -14,7 +14,7 @@ EXACT = 1e-4  # what comes round after twice the length of the record
 def oscillator(frequency_hz, ratio, attachments=()):
     return ModalReceptance(
         omega_rad_s=2 * np.pi * np.array([frequency_hz]), damping_ratio=np.array([ratio]), shapes=np.ones((1, 1)),
-        static=np.zeros((1, 1)), second_order=np.zeros((1, 1)), attachments=attachments,
+        static=np.zeros((1, 1)), attachments=attachments,
     )  # fmt: skip
 
 

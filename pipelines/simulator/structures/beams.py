@@ -6,25 +6,19 @@ Positive rotation of a node is ``ry = -slope``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from simulator.splines import SplineBasis, spline_basis
-from simulator.structures import Point, Structure
+from simulator.structures.points import Point, Structure
+from simulator.structures.reality import Reality, hang
+from simulator.structures.splines import SplineBasis, spline_basis
 
 FloatArray = NDArray[np.float64]
-Field = Callable[[FloatArray], FloatArray]
 
 INTERVALS = 26  # converged to 1e-6 in the first ten frequencies
-
-
-def uniform(x: FloatArray) -> FloatArray:
-    """Return the field of a beam that is as the drawing says."""
-    return np.ones_like(x)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +65,21 @@ class BeamDrawing:
         nu = self.poisson_ratio
         return 10 * (1 + nu) / (12 + 11 * nu)
 
+    @property
+    def mass_kg(self) -> float:
+        """Of the beam and its point masses."""
+        middles = np.array([self.position(k) for k in range(1, self.elements + 1)]) + self.length_m / self.elements / 2
+        width, thickness = self.rectangle(middles)
+        beam = self.density_kg_m3 * float(np.sum(width * thickness)) * self.length_m / self.elements
+        return beam + sum(part.mass_kg for part in self.parts)
+
+    @property
+    def n_rigid(self) -> int:
+        """Motions without strain."""
+        held = {"clamped": 2, "pinned": 1, "sliding": 1, "free": 0}
+        both_sliding = self.left == self.right == "sliding"
+        return max(2 - held[self.left] - held[self.right], int(both_sliding))
+
     def position(self, node: int) -> float:
         """Position of a node, m from the left end."""
         return (node - 1) * self.length_m / self.elements
@@ -85,43 +94,14 @@ class BeamDrawing:
         return width, thickness
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BeamReality:
-    """What is different from the drawing, and where corners are needed.
-
-    Parameters
-    ----------
-    formulation : str, optional
-        The real one, where it is not that of the drawing.
-    stiffness, density : callable
-        Factors along the beam, 1 where it is as drawn.
-    softened : tuple of (first, last, ratio)
-        Stretches of elements, and real over drawn stiffness.
-    axial_load_n : float
-        Tension positive.
-    released : dict of str to (rotational, translational)
-        Stiffnesses of an end whose held motions are held by springs, N m/rad and N/m; None where it stays held.
-    stations : tuple of int
-        Nodes where forces act: the shear force may jump there.
-    """
-
-    formulation: str | None = None
-    stiffness: Field = uniform
-    density: Field = uniform
-    softened: tuple[tuple[int, int, float], ...] = ()
-    axial_load_n: float = 0.0
-    released: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    stations: tuple[int, ...] = ()
-
-
-def build_beam(drawing: BeamDrawing, reality: BeamReality | None = None, *, intervals: int = INTERVALS) -> Structure:
+def build_beam(drawing: BeamDrawing, reality: Reality | None = None, *, intervals: int = INTERVALS) -> Structure:
     """Rayleigh-Ritz model of a beam.
 
     Parameters
     ----------
     drawing : BeamDrawing
         The nominal beam.
-    reality : BeamReality, optional
+    reality : Reality, optional
         How the real one differs.
     intervals : int
         Uniform knot intervals.
@@ -131,7 +111,7 @@ def build_beam(drawing: BeamDrawing, reality: BeamReality | None = None, *, inte
     Structure
         Its rows know the directions ``z`` and ``ry`` at every node, with offsets along x.
     """
-    reality = reality or BeamReality()
+    reality = reality or Reality()
     builder = _Builder(drawing, reality, intervals)
     mass, stiffness = builder.matrices()
     basis = null_space(builder.held_rows()) if builder.held_rows().size else np.eye(builder.size)
@@ -141,18 +121,25 @@ def build_beam(drawing: BeamDrawing, reality: BeamReality | None = None, *, inte
         return builder.row(x, point.direction) @ basis
 
     nodes = {node: (drawing.position(node), 0.0, 0.0) for node in range(1, drawing.elements + 2)}
-    return Structure(mass=basis.T @ mass @ basis, stiffness=basis.T @ stiffness @ basis, row=row, nodes=nodes)
+    beam = Structure(
+        mass=basis.T @ mass @ basis,
+        stiffness=basis.T @ stiffness @ basis,
+        row=row,
+        nodes=nodes,
+        n_rigid=drawing.n_rigid,
+    )
+    return hang(reality.finish(beam), reality.cords_hz)
 
 
 class _Builder:
     """Bases, quadrature and matrices before the supports are put in."""
 
-    def __init__(self, drawing: BeamDrawing, reality: BeamReality, intervals: int) -> None:
+    def __init__(self, drawing: BeamDrawing, reality: Reality, intervals: int) -> None:
         self.drawing, self.reality = drawing, reality
         self.timoshenko = (reality.formulation or drawing.formulation) == "timoshenko"
         steps = {drawing.position(n) for s in drawing.sections for n in (s.first, s.last + 1)}
-        steps |= {drawing.position(n) for a, b, _ in reality.softened for n in (a, b + 1)}
-        nodes = {*reality.stations, *(part.node for part in drawing.parts)}
+        steps |= {drawing.position(n) for (a, b), _ in reality.softened for n in (a, b + 1)}
+        nodes = {*reality.all_stations, *(part.node for part in drawing.parts)}
         loads = {drawing.position(node) for node in nodes}
         # a step makes the curvature jump, a force the shear force; with shear flexibility both make corners of w
         kinks = dict.fromkeys(loads, 0 if self.timoshenko else 2) | dict.fromkeys(steps, 0 if self.timoshenko else 1)
@@ -211,12 +198,13 @@ class _Builder:
         x, weights = self._quadrature()
         width, thickness = self.drawing.rectangle(x)
         area, second_moment = width * thickness, width * thickness**3 / 12
-        softness = self.reality.stiffness(x)
-        for first, last, ratio in self.reality.softened:
+        xi = x / self.drawing.length_m
+        softness = self.reality.stiffness_ratio * self.reality.stiffness(xi)
+        for (first, last), ratio in self.reality.softened:
             inside = (x > self.drawing.position(first)) & (x < self.drawing.position(last + 1))
             softness = np.where(inside, ratio * softness, softness)
         bending = weights * self.drawing.youngs_modulus_pa * second_moment * softness
-        line_mass = weights * self.drawing.density_kg_m3 * area * self.reality.density(x)
+        line_mass = weights * self.drawing.density_kg_m3 * area * self.reality.density(xi)
         value, slope = self._fields(x, 0), self._fields(x, 1)
         mass = _gram(value, line_mass)
         stiffness = _gram(slope, self.reality.axial_load_n * weights)

@@ -42,12 +42,18 @@ class Structure:
         Gives for a `Point` the (n,) row that turns generalised coordinates into its motion.
     nodes : dict of int to tuple
         Node number to its position, m.
+    direction : str
+        Of the translations.
+    n_rigid : int
+        Motions without strain.
     """
 
     mass: FloatArray
     stiffness: FloatArray
     row: Callable[[Point], FloatArray]
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    direction: str = "z"
+    n_rigid: int = 0
 
     def with_mass(self, point: Point, mass: float) -> Structure:
         """Add a point mass, kg (or a rotary inertia, kg m^2, where the point is a rotation)."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from simulator.response import LaplaceGrid
+from simulator.signals.laplace import LaplaceGrid
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

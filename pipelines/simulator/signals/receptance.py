@@ -1,7 +1,7 @@
 """Receptances of a structure between named rows, exact in s up to any frequency of interest.
 
-Modes up to far above the band are summed one by one; what is above them enters by its static and its second-order
-term, so that nothing is truncated. Attachments with any dynamic stiffness D(s) are put in by the matrix inversion
+Modes up to far above the band are summed one by one; what is above them enters by its static compliance, so that
+nothing is truncated. Attachments with any dynamic stiffness D(s) are put in by the matrix inversion
 lemma.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from simulator.structures import Structure
+from simulator.structures.points import Structure
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -85,8 +85,8 @@ class ModalReceptance:
         Modes that are summed.
     shapes : (n_rows, m) array
         Mass-normalised, at the rows.
-    static, second_order : (n_rows, n_rows) array
-        Sum of shapes shapes^T / omega^2 and / omega^4 over all higher modes.
+    static : (n_rows, n_rows) array
+        Sum of shapes shapes^T / omega^2 over all higher modes.
     loss_factor : float
         Of the whole stiffness matrix.
     attachments : tuple of Attachment
@@ -97,7 +97,6 @@ class ModalReceptance:
     damping_ratio: FloatArray
     shapes: FloatArray
     static: FloatArray
-    second_order: FloatArray
     loss_factor: float = 0.0
     attachments: tuple[Attachment, ...] = ()
 
@@ -134,8 +133,7 @@ class ModalReceptance:
         at_left, at_right = left @ self.shapes, right @ self.shapes
         pairs = (at_left[:, None, :] * at_right[None, :, :]).reshape(-1, square.size)
         total = (gains @ pairs.T).reshape(s.size, len(left), len(right))
-        static, second = left @ self.static @ right.T, left @ self.second_order @ right.T
-        return total + (static / hysteresis[:, None, None]) - (s * s)[:, None, None] * second
+        return total + left @ self.static @ right.T / hysteresis[:, None, None]
 
 
 def modal_receptance(
@@ -152,7 +150,7 @@ def modal_receptance(
     damping_ratio : (k,) array
         Ratios of the first modes; the last one holds for all further modes.
     highest_hz : float
-        Modes above are replaced by their static and second-order terms.
+        Modes above are replaced by their static compliance: many times the highest frequency of interest.
     loss_factor : float
         Of the whole stiffness matrix.
 
@@ -172,6 +170,5 @@ def modal_receptance(
         damping_ratio=ratio,
         shapes=shapes[:, :n_modes],
         static=(high / omega**2) @ high.T,
-        second_order=(high / omega**4) @ high.T,
         loss_factor=loss_factor,
     )

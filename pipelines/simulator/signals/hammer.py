@@ -112,8 +112,9 @@ def random_force(
     """
     n, step = time_s.size, float(time_s[1] - time_s[0])
     frequencies = np.fft.rfftfreq(n, step)
-    lines = rng.standard_normal(frequencies.size) + 1j * rng.standard_normal(frequencies.size)
-    lines[(frequencies < band_hz[0]) | (frequencies > band_hz[1])] = 0
+    driven = np.flatnonzero((frequencies >= band_hz[0]) & (frequencies <= band_hz[1]))
+    lines = np.zeros(frequencies.size, dtype=complex)  # the same force at any oversampling
+    lines[driven] = rng.standard_normal(driven.size) + 1j * rng.standard_normal(driven.size)
     force = np.fft.irfft(lines, n)
     end = burst * time_s[-1]
     rise = np.clip(np.minimum(time_s, end - time_s) / taper_s, 0, 1)

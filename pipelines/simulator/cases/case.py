@@ -1,0 +1,270 @@
+"""One blind case: what a user hands in, and the sealed truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.cases.campaign import Drive, draw_drives, draw_noise, store, swing, true_records
+from simulator.cases.detectability import Lines, change, four, level_change, make_lines
+from simulator.cases.files import write_model, write_recording, write_test
+from simulator.cases.scatter import Scatter, draw_scatter, no_scatter
+from simulator.cases.set_up import MARGIN, SetUp, draw_set_up, moving_nodes
+from simulator.cases.specimens import KINDS, Specimen, draw_specimen
+from simulator.cases.truth import GENERATOR, average_frf, describe, point_frfs, visibility
+from simulator.cases.world import World, make_world
+from simulator.effects.catalogue import draw_effects, kinds_for, needs_levels
+from simulator.effects.effect import Bench, Effect
+from simulator.signals.channels import Noise
+from simulator.signals.receptance import solve_modes
+from simulator.structures.nominal import NominalModel
+
+FloatArray = NDArray[np.float64]
+
+ATTEMPTS = 60
+MOST_COARSE = 1.5e-4  # error of a nominal frequency in band: a model that a user would trust
+LEAST_RATIO = 3.0  # of the change of the FRFs over their noise, RMS: below, nobody could see the effect
+LEAST_LEVEL_CHANGE = 0.01  # of responses to blows of different levels: less is hidden by the noise of a weak blow
+MOST_LEFT = 0.5  # of the motion at the end of a record: more, and it is a structure that feeds itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A complete case in memory.
+
+    Parameters
+    ----------
+    seed, attempt : int
+        What it was drawn from.
+    asked : str
+        What was asked for: ``null``, the name of an effect, ``unknown:KIND``, ``pair``.
+    world, base, ideal : World
+        With the effects; without them; without them and without scatter.
+    nominal : NominalModel
+        What the owner of the specimen has.
+    drives : tuple of Drive
+        Blows or records.
+    stored : (n_drives, n_channels, n_samples) array
+        Recordings in the channels' units.
+    noise : tuple of Noise
+        Of the channels.
+    truth : dict
+        What ``diagnosis.json`` is judged by.
+    points : dict of str to array
+        True FRFs at the points of interest, long form.
+    """
+
+    seed: int
+    attempt: int
+    asked: str
+    world: World
+    base: World
+    ideal: World
+    nominal: NominalModel
+    drives: tuple[Drive, ...]
+    stored: FloatArray
+    noise: tuple[Noise, ...]
+    truth: dict[str, Any]
+    points: dict[str, NDArray[np.generic]]
+
+    def write(self, folder: Path, truth: Path) -> None:
+        """Write what a user hands in to `folder`, and the answers to `truth` (JSON) and beside it (CSV)."""
+        set_up, specimen = self.world.set_up, self.world.specimen
+        write_model(folder, specimen, self.nominal, set_up.damping_ratio)
+        write_test(folder, specimen, set_up)
+        columns = ("force", *(sensor.column for sensor in set_up.sensors))
+        for drive, signals in zip(self.drives, self.stored, strict=True):
+            node = set_up.struck[drive.struck][0]
+            name = (
+                f"hits/p{node}_{drive.order + 1:02d}" if set_up.kind == "hammer" else f"records/r_{drive.order + 1:02d}"
+            )
+            write_recording(folder / f"{name}.csv", dict(zip(columns, signals, strict=True)), set_up.rate_hz)
+        truth.parent.mkdir(parents=True, exist_ok=True)
+        truth.write_text(json.dumps(self.truth, indent=1) + "\n", encoding="utf-8")
+        if self.points:
+            names = list(self.points)
+            rows = zip(*(self.points[name].tolist() for name in names), strict=True)
+            lines = [",".join(f"{v:.7g}" if isinstance(v, float) else str(v) for v in row) for row in rows]
+            text = "\n".join([",".join(names), *lines]) + "\n"
+            truth.with_name(f"{truth.stem}_points.csv").write_text(text, encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Ready:
+    """A specimen on its bench, before something is concealed."""
+
+    specimen: Specimen
+    set_up: SetUp
+    nominal: NominalModel
+    scatter: Scatter
+    base: World
+    ideal: World
+    drives: tuple[Drive, ...]
+    noise: tuple[Noise, ...]
+    lines: Lines
+    bench: Bench
+
+
+def make_case(seed: int, effect: str = "null", *, structure: str | None = None) -> Case:
+    """Make a blind case.
+
+    Parameters
+    ----------
+    seed : int
+        The same case comes out for the same seed, effect and structure.
+    effect : str
+        ``null``, the name of an effect of the contract, ``unknown`` or ``unknown:KIND``, ``pair`` or ``pair:A+B``.
+    structure : str, optional
+        One of the kinds of specimens; drawn among those that can have the effect.
+
+    Returns
+    -------
+    Case
+        Whose effects can be seen in the data.
+
+    Raises
+    ------
+    RuntimeError
+        If no specimen was found on which the effect can be seen.
+    """
+    for attempt in range(ATTEMPTS):
+        rng = np.random.default_rng([seed, attempt])
+        wanted, kinds = kinds_for(rng, effect, KINDS)
+        ready = _prepare(rng, structure or str(rng.choice(kinds)), wanted)
+        if ready is None:
+            continue
+        effects = draw_effects(rng, wanted, ready.bench)
+        if effects is None:
+            continue
+        case = _finish(rng, seed, attempt, effect, ready, effects)
+        if case is not None:
+            return case
+    raise RuntimeError(f"no specimen was found for the effect '{effect}' with seed {seed} in {ATTEMPTS} attempts")
+
+
+def _prepare(rng: np.random.Generator, kind: str, wanted: tuple[str, ...]) -> _Ready | None:
+    """Draw a specimen and its test; None where its nominal model is too coarse for the band."""
+    thick = "shear_rotary_inertia" in wanted
+    specimen = draw_specimen(rng, kind, thick_euler=thick)
+    drawn = specimen.build()
+    modes = solve_modes(drawn)
+    set_up = draw_set_up(rng, specimen, drawn, modes, levels=needs_levels(wanted))
+    nominal = specimen.nominal()
+    coarse = solve_modes(nominal.structure()).frequencies_hz
+    inside = np.flatnonzero((modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1]))
+    if np.abs(coarse[inside] / modes.frequencies_hz[inside] - 1).max() > MOST_COARSE:
+        return None
+    first = float(modes.frequencies_hz[drawn.n_rigid])
+    scatter = draw_scatter(rng, specimen, set_up, first)
+    base = make_world(specimen, set_up, scatter, ())
+    ideal = make_world(specimen, set_up, no_scatter(specimen, set_up, first), ())
+    drives = draw_drives(rng, set_up, double_hit=rng.random() < 0.12)
+    loudest = max(drives, key=lambda drive: drive.rms_n or (drive.blow.peak_n if drive.blow else 0.0))
+    signals, _ = true_records(base, (loudest,))
+    noise = draw_noise(rng, signals)
+    bench = Bench(
+        specimen=specimen,
+        set_up=set_up,
+        structure=drawn,
+        modes=modes,
+        nodes=tuple(moving_nodes(drawn, modes, set_up.band_hz, MARGIN)),
+        mass_kg=specimen.mass_kg,
+        swing=lambda motion: swing(ideal, drives, motion),
+    )
+    return _Ready(
+        specimen=specimen,
+        set_up=set_up,
+        nominal=nominal,
+        scatter=scatter,
+        base=base,
+        ideal=ideal,
+        drives=drives,
+        noise=noise,
+        lines=make_lines(base, drives, noise),
+        bench=bench,
+    )
+
+
+def _finish(
+    rng: np.random.Generator, seed: int, attempt: int, asked: str, ready: _Ready, effects: tuple[Effect, ...]
+) -> Case | None:
+    """Simulate the test with the effects; None where nobody could see them, or where the structure is not stable."""
+    world = make_world(ready.specimen, ready.set_up, ready.scatter, effects)
+    visible = visibility(ready.lines, ready.ideal, world)
+    if not _is_visible(visible, effects):
+        return None
+    try:
+        signals, points = true_records(world, ready.drives)
+    except FloatingPointError:
+        return None
+    left = _left_at_end(signals, world)
+    if left > MOST_LEFT:
+        return None
+    if _depends_on_blow(effects):
+        visible |= _by_level(ready, world, signals)
+        if visible["level_ratio_rms"] < LEAST_RATIO or visible["level_change"] < LEAST_LEVEL_CHANGE:
+            return None
+    stored, full_scale = store(rng, signals, ready.noise, ready.set_up.bits)
+    truth = {"generator": GENERATOR, "seed": seed, "attempt": attempt, "effect_asked": asked}
+    truth |= describe(ready.ideal, world, ready.nominal, ready.drives, ready.noise)
+    truth["noise"]["full_scale"] = [four(value) for value in full_scale]
+    truth["detectability"] = visible | {"left_at_end": four(left)}
+    return Case(
+        seed=seed,
+        attempt=attempt,
+        asked=asked,
+        world=world,
+        base=ready.base,
+        ideal=ready.ideal,
+        nominal=ready.nominal,
+        drives=ready.drives,
+        stored=stored,
+        noise=ready.noise,
+        truth=truth,
+        points=point_frfs(world, ready.drives, signals, points),
+    )
+
+
+def _by_level(ready: _Ready, world: World, signals: FloatArray) -> dict[str, Any]:
+    """Compare with what the structure would do without laws, saturation and drift."""
+    linear_effects = [effect for effect in world.effects if not _depends_on_blow((effect,))]
+    linear = make_world(ready.specimen, ready.set_up, ready.scatter, linear_effects)
+    without, _ = true_records(linear, ready.drives)
+    units = np.array([sensor.unit_si for sensor in ready.set_up.sensors])
+    frfs = [
+        np.stack([average_frf(one[mine, 1:], one[mine, :1], ready.set_up) for mine in _by_point(ready)], axis=2)
+        * units[:, None]
+        for one in (signals, without)
+    ]
+    return change(ready.lines, *frfs) | level_change(signals, without, ready.noise, ready.drives, world)
+
+
+def _by_point(ready: _Ready) -> list[list[int]]:
+    """Return indices of the blows of each struck point."""
+    points = range(len(ready.set_up.struck))
+    return [[i for i, drive in enumerate(ready.drives) if drive.struck == point] for point in points]
+
+
+def _depends_on_blow(effects: tuple[Effect, ...]) -> bool:
+    """Whether the FRFs of single blows differ."""
+    return any(not effect.is_linear or effect.drift for effect in effects)
+
+
+def _is_visible(visible: dict[str, Any], effects: tuple[Effect, ...]) -> bool:
+    """Whether each effect that changes the linear FRFs does so beyond the noise."""
+    linear = [effect.is_linear and not effect.drift for effect in effects]
+    changes = visible.get("each", [visible])
+    return all(one["ratio_rms"] >= LEAST_RATIO for one, counts in zip(changes, linear, strict=False) if counts)
+
+
+def _left_at_end(signals: FloatArray, world: World) -> float:
+    """Largest motion in the last part of a record over the largest one; of a shaker, what is left of a burst."""
+    if world.set_up.kind == "random" and world.set_up.burst == 1.0:
+        return 0.0
+    tail = np.abs(signals[:, 1:, -signals.shape[2] // 50 :]).max(axis=2)
+    return float((tail / np.abs(signals[:, 1:]).max(axis=2)).max())

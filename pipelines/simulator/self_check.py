@@ -1,0 +1,189 @@
+"""Check the simulator against closed formulas and against nominal models, before its cases judge anything.
+
+``python pipelines/simulator/self_check.py`` prints a table: for random specimens of every kind, without scatter, noise
+and effects, how far the truth is from the nominal model in frequency and in the FRFs, and how far FRFs that are
+estimated from the simulated records are from the nominal model and from the truth. Then the convergence of the
+nonlinear laws with the time step.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+if not __package__:  # run as a file
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from simulator.cases.campaign import draw_drives, make_grid, true_records
+from simulator.cases.case import make_case
+from simulator.cases.scatter import no_scatter
+from simulator.cases.set_up import draw_set_up
+from simulator.cases.specimens import KINDS, draw_specimen
+from simulator.cases.world import World, make_world
+from simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
+from simulator.structures.points import Point
+from simulator.structures.reality import hang
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SIGMA = 6.0  # decay of the exponential window over a record, for estimates from records
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """How far the truth without scatter is from the nominal model.
+
+    Parameters
+    ----------
+    kind, seed
+        Of the specimen.
+    frequency : float
+        Largest relative difference of the natural frequencies in band.
+    frf : float
+        Norm of the difference of all FRFs in band over their norm, at the decay of the estimates.
+    recorded : float
+        The same between FRFs estimated from simulated records and the nominal model.
+    exact : float
+        The same between FRFs estimated from simulated records and the truth: the simulation itself.
+    median : float
+        Median over all lines and FRFs of the relative difference: without the peaks, where a small shift weighs much.
+    """
+
+    kind: str
+    seed: int
+    frequency: float
+    frf: float
+    recorded: float
+    exact: float
+    median: float
+
+
+def check_nominal(kind: str, seed: int) -> Check:
+    """Compare truth, records and nominal model of one specimen.
+
+    Parameters
+    ----------
+    kind : str
+        Of the specimen.
+    seed : int
+        Of the draw.
+
+    Returns
+    -------
+    Check
+        Of a hammer test.
+    """
+    rng = np.random.default_rng([seed, 99])
+    specimen = draw_specimen(rng, kind)
+    drawn = specimen.build()
+    modes = solve_modes(drawn)
+    set_up = replace(draw_set_up(rng, specimen, drawn, modes), kind="hammer", running=False)
+    ideal = make_world(specimen, set_up, no_scatter(specimen, set_up, float(modes.frequencies_hz[drawn.n_rigid])), ())
+    nominal_frequencies, nominal = _nominal_motion(ideal)
+    low, high = set_up.band_hz
+    truth_frequencies = ideal.modes.frequencies_hz
+    inside = np.flatnonzero((truth_frequencies >= low) & (truth_frequencies <= high))
+    ratio = nominal_frequencies[inside] / truth_frequencies[inside]
+    s, estimate = _from_records(ideal, rng)
+    truth, model = ideal.motion(s), ideal.motion(s, nominal)
+    return Check(
+        kind=kind,
+        seed=seed,
+        frequency=float(np.abs(ratio - 1).max()),
+        frf=_norm(model, truth),
+        recorded=_norm(estimate, model),
+        exact=_norm(estimate, truth),
+        median=float(np.median(np.abs(model / truth - 1))),
+    )
+
+
+def _norm(a: ComplexArray, b: ComplexArray) -> float:
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+def _nominal_motion(ideal: World) -> tuple[FloatArray, ModalReceptance]:
+    """Natural frequencies and receptance of the nominal model, with the truth's damping and cords."""
+    structure = hang(ideal.specimen.nominal().structure(), ideal.scatter.cords_hz)
+    modes = solve_modes(structure)
+    set_up, direction = ideal.set_up, ideal.specimen.direction
+    nodes = [sensor.node for sensor in set_up.sensors] + [node for node, _ in set_up.struck]
+    rows = np.array([structure.row(Point(node, direction)) for node in nodes])
+    ratio = np.concatenate([np.full(structure.n_rigid, ideal.scatter.cords_damping), [set_up.damping_ratio]])
+    return modes.frequencies_hz, modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[-1]))
+
+
+def _from_records(world: World, rng: np.random.Generator) -> tuple[ComplexArray, ComplexArray]:
+    """Lines s and FRFs (n_s, n_sensors, n_struck) estimated from the strongest noise-free blow of each point."""
+    set_up = world.set_up
+    drives = draw_drives(rng, replace(set_up, blows_each=1))
+    signals, _ = true_records(world, drives)
+    n = set_up.n_samples
+    index = np.round(set_up.lines_hz * n / set_up.rate_hz).astype(int)
+    sigma = SIGMA * set_up.rate_hz / n
+    spectra = np.fft.rfft(signals * np.exp(-SIGMA * np.arange(n) / n), axis=-1)[:, :, index]
+    units = np.array([sensor.unit_si for sensor in set_up.sensors])
+    frf = spectra[:, 1:] * units[:, None] / spectra[:, :1]
+    return sigma + 2j * np.pi * set_up.lines_hz, frf.transpose(2, 1, 0)
+
+
+def check_step(effect: str, seed: int) -> tuple[float, float]:
+    """Halve the time step of a nonlinear case.
+
+    Parameters
+    ----------
+    effect : str
+        A nonlinear effect.
+    seed : int
+        Of the case.
+
+    Returns
+    -------
+    response, frf : float
+        Change of all responses, and of their FRFs in band, norm over norm.
+    """
+    case = make_case(seed, effect)
+    world, drives = case.world, case.drives
+    coarse, _ = true_records(world, drives)
+    fine, _ = true_records(world, drives, grid=make_grid(world, refine=2))
+    response = np.linalg.norm(fine[:, 1:] - coarse[:, 1:]) / np.linalg.norm(fine[:, 1:])
+    set_up = world.set_up
+    index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
+    window = np.exp(-2.0 * np.arange(set_up.n_samples) / set_up.n_samples)
+    a, b = (np.fft.rfft(signals * window, axis=-1)[:, :, index] for signals in (coarse, fine))
+    frf = np.linalg.norm(a[:, 1:] / a[:, :1] - b[:, 1:] / b[:, :1]) / np.linalg.norm(b[:, 1:] / b[:, :1])
+    return float(response), float(frf)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description="Check the simulator against nominal models and its own step.")
+    parser.add_argument("--each", type=int, default=3, help="specimens of each kind")
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), help="kinds of specimens")
+    parser.add_argument("--no-laws", action="store_true", help="skip the nonlinear laws")
+    options = parser.parse_args(arguments)
+    print(f"{'specimen':17}{'seed':>5}{'frequency':>12}{'FRF':>10}{'median':>10}{'records':>10}{'simulation':>12}")
+    for kind in options.kinds:
+        for seed in range(options.each):
+            c = check_nominal(kind, seed)
+            print(
+                f"{kind:17}{seed:5}{c.frequency:12.1e}{c.frf:10.1e}{c.median:10.1e}{c.recorded:10.1e}{c.exact:12.1e}",
+                flush=True,
+            )
+    if options.no_laws:
+        return
+    print(f"\n{'law':25}{'seed':>5}{'response':>12}{'FRF':>10}   (change when the step is halved)")
+    laws = ("cubic_stiffness", "gap_contact", "dry_friction", "unknown:bouc_wen", "unknown:square_drag")
+    for effect in laws:
+        for seed in range(options.each):
+            response, frf = check_step(effect, seed)
+            print(f"{effect:25}{seed:5}{response:12.1e}{frf:10.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Forces, exact responses and the measuring chain."""

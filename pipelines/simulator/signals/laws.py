@@ -1,0 +1,142 @@
+"""Force laws of nonlinear springs, gaps, friction and hysteresis.
+
+A law is asked once a step for its force at the end of the step. Motion and velocity at the place, without the law's own
+force of this step, are ``w`` and ``v``; its force f moves the place by ``-beta f`` and changes the velocity by
+``-gamma f``. So every law solves its own small equation, and stiff contact and sticking need no iteration over the
+structure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+NEWTON_STEPS = 3  # from a guess that is exact to first order in a small beta
+
+
+class Law(Protocol):
+    """A force law between a place and the ground, or across a spring."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """(n_blows,) restoring force at the end of a step, N; called once a step, in order."""
+        ...
+
+    def restart(self, n_blows: int) -> None:
+        """Forget the past."""
+        ...
+
+
+@dataclass(kw_only=True)
+class PowerSpring:
+    """Force ``stiffness w^power``; odd powers keep the sign, an even one pushes one way."""
+
+    stiffness: float
+    power: int
+
+    def restart(self, n_blows: int) -> None:
+        """Nothing to forget."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Newton's method for u + beta k u^p = w."""
+        del v, gamma
+        u = w
+        for _ in range(NEWTON_STEPS):
+            power = self.stiffness * u ** (self.power - 1)
+            u = u - (u + beta * power * u - w) / (1 + beta * self.power * power)
+        return self.stiffness * u**self.power
+
+
+@dataclass(kw_only=True)
+class Gap:
+    """One-sided contact: ``stiffness (w - gap)`` for w > gap."""
+
+    stiffness: float
+    gap: float
+
+    def restart(self, n_blows: int) -> None:
+        """Nothing to forget."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Solve in closed form."""
+        del v, gamma
+        return np.maximum(w - self.gap, 0.0) * (self.stiffness / (1 + beta * self.stiffness))
+
+
+@dataclass(kw_only=True)
+class TwoSided:
+    """Extra stiffness (or, if negative, less) beyond a distance on both sides."""
+
+    stiffness: float
+    gap: float
+
+    def restart(self, n_blows: int) -> None:
+        """Nothing to forget."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Solve in closed form."""
+        del v, gamma
+        beyond = w - np.clip(w, -self.gap, self.gap)
+        return beyond * (self.stiffness / (1 + beta * self.stiffness))
+
+
+@dataclass(kw_only=True)
+class Coulomb:
+    """Dry friction with sticking."""
+
+    friction: float
+
+    def restart(self, n_blows: int) -> None:
+        """Nothing to forget."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Force that stops the motion, or the friction force where that is not enough."""
+        del w, beta
+        return np.clip(v / gamma, -self.friction, self.friction)
+
+
+@dataclass(kw_only=True)
+class SquareDrag:
+    """Force ``drag v |v|``."""
+
+    drag: float
+
+    def restart(self, n_blows: int) -> None:
+        """Nothing to forget."""
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Solve in closed form."""
+        del w, beta
+        strength = gamma * self.drag
+        speed = (np.sqrt(1 + 4 * strength * np.abs(v)) - 1) / (2 * strength)
+        return self.drag * np.sign(v) * speed**2
+
+
+@dataclass(kw_only=True)
+class BoucWen:
+    """Hysteretic force ``stiffness z`` with dz = dw (1 - |z| / z_max (1 + sign(dw z)) / 2)."""
+
+    stiffness: float
+    yield_m: float
+
+    def restart(self, n_blows: int) -> None:
+        """Start without history."""
+        self._z = np.zeros(n_blows)
+        self._w = np.zeros(n_blows)
+
+    def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
+        """Explicit in the slope of the hysteresis, implicit in the force."""
+        del v, gamma
+        guess = w - beta * self.stiffness * self._z
+        loading = np.sign(guess - self._w) * np.sign(self._z) > 0
+        slope = np.where(loading, 1 - np.minimum(np.abs(self._z) / self.yield_m, 1), 1.0)
+        stiff = self.stiffness * slope
+        # u - w_old = (w - beta k z) - w_old with z = z_old + slope (u - w_old)
+        moved = (w - beta * self.stiffness * self._z - self._w) / (1 + beta * stiff)
+        self._z = self._z + slope * moved
+        self._w = self._w + moved
+        return self.stiffness * self._z

@@ -1,0 +1,1 @@
+"""Structures as they really are, each by another discretisation than the nominal one."""
