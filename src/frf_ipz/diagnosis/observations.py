@@ -1,0 +1,155 @@
+"""What was measured, blow by blow, calibrated and in the signs of the test: the raw material of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, read_only, require_shape
+from frf_ipz.dofs import Dof
+from frf_ipz.quantities import FrfQuantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensor:
+    """An output channel as it was used in one blow or record.
+
+    Parameters
+    ----------
+    channel : str
+        Column of the recordings.
+    dof : Dof
+        Where it sat, with its sign.
+    quantity : FrfQuantity
+        What it measures, as the FRF over a force.
+    """
+
+    channel: str
+    dof: Dof
+    quantity: FrfQuantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Blow:
+    """One blow of a hammer, or one record of a shaker.
+
+    Parameters
+    ----------
+    name : str
+        As in the table of blows.
+    input_channel : str
+        Column of the force.
+    input_dof : Dof
+        Where it was struck, with its sign: the force on the model's DOF is this sign times `force`.
+    sensors : tuple of Sensor
+        Rows of `responses`.
+    step_s : float
+        Time from sample to sample, s; the first sample is at time 0.
+    force : (n_samples,) array
+        N.
+    responses : (n_sensors, n_samples) array
+        SI units of the sensors' quantities, as recorded: a sensor of negative sign shows minus the model's motion.
+    rested : bool
+        The structure was at rest at the first sample.
+    """
+
+    name: str
+    input_channel: str
+    input_dof: Dof
+    sensors: tuple[Sensor, ...]
+    step_s: float
+    force: FloatArray
+    responses: FloatArray
+    rested: bool = True
+
+    def __post_init__(self) -> None:
+        require_shape(f"the force of {self.name}", self.force, (None,))
+        require_shape(f"the responses of {self.name}", self.responses, (len(self.sensors), len(self.force)))
+        for name in ("force", "responses"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return len(self.force)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record, s."""
+        return self.n_samples * self.step_s
+
+    @property
+    def level(self) -> float:
+        """Largest force, N: what tells weak from strong blows."""
+        return float(np.abs(self.force).max())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Observations:
+    """All blows or records of a test that are used.
+
+    Parameters
+    ----------
+    kind : str
+        ``hammer``, ``random`` or ``frf``; with the last there are no blows.
+    blows : tuple of Blow
+        In the order of the test.
+    band_hz : pair of float
+        Band that is looked at, Hz.
+    """
+
+    kind: str
+    blows: tuple[Blow, ...]
+    band_hz: tuple[float, float]
+
+    @property
+    def input_dofs(self) -> tuple[Dof, ...]:
+        """Struck DOFs, each once."""
+        return tuple(dict.fromkeys(blow.input_dof for blow in self.blows))
+
+    def at(self, input_dof: Dof) -> tuple[Blow, ...]:
+        """Give the blows at one DOF, the strongest first.
+
+        Parameters
+        ----------
+        input_dof : Dof
+            One of `input_dofs`.
+
+        Returns
+        -------
+        tuple of Blow
+            Its blows.
+        """
+        mine = [blow for blow in self.blows if blow.input_dof == input_dof]
+        return tuple(sorted(mine, key=lambda blow: -blow.level))
+
+
+def spectra(blows: Sequence[Blow], s: ComplexArray) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
+    """Transform force and responses of blows at any complex frequency, ``sum x(t) exp(-s t) dt``.
+
+    For a structure at rest before the blow the ratio of the two is exactly its transfer function at s, but for what is
+    left of the motion at the end of the record times ``exp(-Re s T)``.
+
+    Parameters
+    ----------
+    blows : sequence of Blow
+        Of any length and step.
+    s : (n_lines,) complex array
+        rad/s, with a real part that is not negative.
+
+    Returns
+    -------
+    tuple of pairs
+        Of each blow the force, (n_lines,) complex array, N s, and the responses, (n_lines, n_sensors).
+    """
+    kernels: dict[tuple[int, float], ComplexArray] = {}
+    found = []
+    for blow in blows:
+        key = blow.n_samples, blow.step_s
+        if key not in kernels:
+            kernels[key] = np.exp(-np.outer(s, np.arange(blow.n_samples) * blow.step_s)) * blow.step_s
+        kernel = kernels[key]
+        found.append((kernel @ blow.force, kernel @ blow.responses.T))
+    return tuple(found)
