@@ -239,7 +239,8 @@ def _law_spectra(world: World, drives: tuple[Drive, ...], grid: LaplaceGrid) -> 
     place = np.eye(len(world.receptance.shapes))[world.law_row]
     step = 1 / (grid.rate_hz * grid.oversampling)
     forces = law_force(world.receptance, place, effect.law, np.array(motion), np.array(velocity), step)
-    return grid.spectrum(forces)
+    late = step / 2 if effect.law.held else 0.0
+    return grid.spectrum(forces) * np.exp(grid.s * late)
 
 
 def _saturate(world: World, signals: FloatArray) -> FloatArray:

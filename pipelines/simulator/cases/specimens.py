@@ -229,7 +229,7 @@ def _grid(rng: np.random.Generator, material: str) -> GridDrawing:
 
 def _plate(rng: np.random.Generator, material: str) -> PlateDrawing:
     long = _log(rng, 0.3, 0.9)
-    nodes_x, nodes_y = int(rng.integers(10, 13)), int(rng.integers(8, 10))
+    nodes_x, nodes_y = int(rng.integers(9, 11)), 8
     edges = [{}, {"left": "clamped"}, {"left": "clamped", "right": "clamped"}, {"left": "pinned", "right": "pinned"}]
     return PlateDrawing(
         size_m=(long, _four(long * rng.uniform(0.55, 0.9))),

@@ -9,7 +9,7 @@ structure.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,15 @@ NEWTON_STEPS = 3  # from a guess that is exact to first order in a small beta
 
 
 class Law(Protocol):
-    """A force law between a place and the ground, or across a spring."""
+    """A force law between a place and the ground, or across a spring.
+
+    A law that can hold the place still keeps its force constant within a step: with a linear one it would ring.
+    """
+
+    @property
+    def held(self) -> bool:
+        """Whether the force is constant within a step."""
+        ...
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
         """(n_blows,) restoring force at the end of a step, N; called once a step, in order."""
@@ -37,6 +45,7 @@ class PowerSpring:
 
     stiffness: float
     power: int
+    held: ClassVar[bool] = False
 
     def restart(self, n_blows: int) -> None:
         """Nothing to forget."""
@@ -57,6 +66,7 @@ class Gap:
 
     stiffness: float
     gap: float
+    held: ClassVar[bool] = False
 
     def restart(self, n_blows: int) -> None:
         """Nothing to forget."""
@@ -73,6 +83,7 @@ class TwoSided:
 
     stiffness: float
     gap: float
+    held: ClassVar[bool] = False
 
     def restart(self, n_blows: int) -> None:
         """Nothing to forget."""
@@ -89,6 +100,7 @@ class Coulomb:
     """Dry friction with sticking."""
 
     friction: float
+    held: ClassVar[bool] = True
 
     def restart(self, n_blows: int) -> None:
         """Nothing to forget."""
@@ -104,6 +116,7 @@ class SquareDrag:
     """Force ``drag v |v|``."""
 
     drag: float
+    held: ClassVar[bool] = False
 
     def restart(self, n_blows: int) -> None:
         """Nothing to forget."""
@@ -122,6 +135,7 @@ class BoucWen:
 
     stiffness: float
     yield_m: float
+    held: ClassVar[bool] = False
 
     def restart(self, n_blows: int) -> None:
         """Start without history."""

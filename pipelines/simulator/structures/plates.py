@@ -31,8 +31,6 @@ class PlateDrawing:
         Elements along x and y that belong to the first panel; four panels in all.
     edges : dict of str to str
         ``left``, ``right`` (along x), ``bottom``, ``top`` (along y) that are ``clamped`` or ``pinned``.
-    rotations : bool
-        The nominal matrices have rotations too.
     """
 
     size_m: tuple[float, float]
@@ -44,7 +42,6 @@ class PlateDrawing:
     density_kg_m3: float
     poisson_ratio: float
     edges: dict[str, str]
-    rotations: bool = False
 
     @property
     def rigidity(self) -> float:

@@ -1,0 +1,234 @@
+"""Whole cases: what is written is complete, deterministic, and does what the contract defines."""
+
+import ast
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy.io import mmread
+
+import simulator
+from simulator.cases.case import make_case
+from simulator.cases.specimens import KINDS
+from simulator.cases.world import make_world
+from simulator.effects.catalogue import CONTRACT, NONLINEAR, OUTSIDE, kinds_for
+from simulator.make_case import main
+from simulator.self_check import check_nominal, check_step
+
+ROOT = Path(simulator.__file__).parent
+ALGEBRA = 1e-9  # two ways to the same receptance, in double precision
+SIMULATION = 1e-4  # FRFs estimated from noise-free records against the truth they were made from
+CHANGED = 1e-3  # an effect that changes less than this would be no effect
+LINEAR = [name for name in CONTRACT if name not in NONLINEAR]
+
+
+def test_the_simulator_shares_no_code_with_the_package():
+    imported = {
+        name.split(".")[0]
+        for path in ROOT.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or ""]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    assert "frf_ipz" not in imported
+    assert imported <= {"__future__", "argparse", "collections", "dataclasses", "functools", "itertools", "json",
+                        "numpy", "pathlib", "scipy", "simulator", "sys", "tomllib", "typing"}  # fmt: skip
+
+
+def test_modules_are_small():
+    assert not [path.name for path in ROOT.rglob("*.py") if len(path.read_text(encoding="utf-8").splitlines()) > 400]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "plate"])
+def test_truth_without_scatter_is_the_nominal_model(kind):
+    check = check_nominal(kind, 1)
+    assert check.frequency < 1e-3  # the tolerance of a nominal model
+    assert check.median < 2e-3  # of the FRFs
+    assert check.exact < SIMULATION
+
+
+def test_a_plate_without_scatter_is_the_nominal_model():
+    check = check_nominal("plate", 1)
+    assert check.frequency < 1e-4
+    assert check.median < 2e-3
+    assert check.exact < SIMULATION
+
+
+@pytest.mark.parametrize("effect", LINEAR)
+def test_each_linear_effect_changes_what_is_measured(effect):
+    case = make_case(31, effect)
+    truth = case.truth
+    assert truth["effect"] == effect
+    assert truth["detectability"]["frf_change"] > CHANGED
+    assert truth["detectability"]["ratio_rms"] >= 3
+    lines = case.world.set_up.lines_hz
+    with_effect, without = case.world.measured_frf(lines), case.base.measured_frf(lines)
+    assert np.linalg.norm(with_effect - without) / np.linalg.norm(without) > CHANGED
+
+
+def test_a_resonator_is_two_masses_and_a_spring():
+    case = make_case(4, "attached_resonator", structure="frame")
+    world = case.world
+    node, values = case.truth["location"]["nodes"][0], case.truth["parameters"]
+    n = len(world.structure.mass)
+    omega = 2 * np.pi * values["frequency_hz"]
+    link = np.zeros(n + 1)
+    link[node - 1], link[n] = -1, 1
+    M = np.zeros((n + 1, n + 1))
+    M[:n, :n] = world.structure.mass
+    M[n, n] = values["mass_kg"]
+    # modal damping and scattered frequencies of the frame, as matrices
+    omegas = world.receptance.omega_rad_s
+    inverse = world.structure.mass @ world.modes.shapes
+    K, C = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
+    K[:n, :n] = inverse @ np.diag(omegas**2) @ inverse.T
+    C[:n, :n] = inverse @ np.diag(2 * world.receptance.damping_ratio * omegas) @ inverse.T
+    K += values["mass_kg"] * omega**2 * np.outer(link, link)
+    C += values["mass_kg"] * 2 * values["damping_ratio"] * omega * np.outer(link, link)
+    s = 2j * np.pi * np.linspace(*world.set_up.band_hz, 50)
+    direct = np.array([np.linalg.inv(one**2 * M + one * C + K)[:n, :n] for one in s])
+    rows = [sensor.node - 1 for sensor in world.set_up.sensors]
+    columns = [struck - 1 for struck, _ in world.set_up.struck]
+    got = world.receptance(s, world.sensor_rows, world.struck_rows)
+    assert_allclose(got, direct[:, rows][:, :, columns], rtol=1e-7)  # the inverse of the direct matrix
+
+
+def test_channels_are_late_filtered_and_scaled_as_defined():
+    for effect, factor in (
+        ("time_delay", lambda p, s: np.exp(-s * p["delay_s"])),
+        ("sensor_gain", lambda p, s: np.full(s.shape, p["gain_ratio"])),
+        (
+            "sensor_dynamics",
+            lambda p, s: (
+                (s if p["kind"] == "highpass" else 2 * np.pi * p["corner_hz"]) / (s + 2 * np.pi * p["corner_hz"])
+            ),
+        ),
+    ):
+        case = make_case(12, effect, structure="frame")
+        lines = case.world.set_up.lines_hz
+        ratio = case.world.measured_frf(lines) / case.base.measured_frf(lines)
+        channel = case.truth["location"]["channels"][0]
+        expected = factor(case.truth["parameters"], 2j * np.pi * lines)
+        columns = [sensor.column for sensor in case.world.set_up.sensors]
+        if channel == "force":
+            assert_allclose(ratio, np.broadcast_to((1 / expected)[:, None, None], ratio.shape), rtol=ALGEBRA)
+            continue
+        for i, column in enumerate(columns):
+            want = expected if column == channel else np.ones_like(expected)
+            assert_allclose(ratio[:, i], np.broadcast_to(want[:, None], ratio[:, i].shape), rtol=ALGEBRA)
+
+
+def test_a_moved_sensor_sees_what_its_new_node_does():
+    case = make_case(3, "sensor_misplaced", structure="frame")
+    set_up = case.world.set_up
+    channel, node = case.truth["location"]["channels"][0], case.truth["location"]["nodes"][0]
+    i = [sensor.column for sensor in set_up.sensors].index(channel)
+    there = replace(set_up, sensors=tuple(replace(s, node=node) if s.column == channel else s for s in set_up.sensors))
+    moved = make_world(case.world.specimen, there, case.world.scatter, ())
+    lines = set_up.lines_hz
+    assert_allclose(case.world.measured_frf(lines), moved.measured_frf(lines), rtol=ALGEBRA)
+    assert set_up.sensors[i].node != node
+
+
+def test_scatter_stays_within_the_tolerances_of_the_contract():
+    for seed, kind in enumerate(("cantilever", "free-free", "frame", "grid")):
+        case = make_case(seed, "null", structure=kind)
+        low, high = case.world.set_up.band_hz
+        ideal, real = case.ideal.modes.frequencies_hz, case.base.modes.frequencies_hz
+        inside = (ideal >= low) & (ideal <= high)
+        assert (
+            1e-6 < np.abs(real[inside] / ideal[inside] - 1).max() < 1.2e-3
+        )  # three sources of up to 0.05, 0.02, 0.04 %
+        ratios = np.array(case.truth["test"]["true_damping"]) / case.world.set_up.damping_ratio
+        assert ratios.min() > 0.69
+        assert ratios.max() < 1.31
+        assert all(abs(gain - 1) <= 0.005 for gain in case.world.scatter.gains.values())
+
+
+def test_the_same_seed_gives_the_same_case():
+    first, second = (make_case(5, "local_damper") for _ in range(2))
+    assert first.truth == second.truth
+    np.testing.assert_array_equal(first.stored, second.stored)
+    assert make_case(6, "local_damper").truth["structure"] != first.truth["structure"]
+
+
+def test_two_effects_are_both_there():
+    case = make_case(8, "pair:added_mass+time_delay")
+    assert [effect["effect"] for effect in case.truth["effects"]] == ["added_mass", "time_delay"]
+    assert all(one["ratio_rms"] >= 3 for one in case.truth["detectability"]["each"])
+
+
+def test_a_law_shows_in_blows_of_different_levels():
+    case = make_case(3, "cubic_stiffness", structure="frame")
+    assert case.truth["nonlinear"]
+    assert case.truth["detectability"]["level_change"] > 0.01
+    assert {"cubic_N_m3"} == set(case.truth["parameters"])
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(ValueError, match="no effect 'ghost'"):
+        kinds_for(np.random.default_rng(0), "ghost", KINDS)
+
+
+def test_what_is_written_is_what_a_user_hands_in(tmp_path, capsys):
+    main(["--seed", "3", "--effect", "grounded_spring", "--structure", "grid", "--out", str(tmp_path / "c")])
+    assert "recordings" in capsys.readouterr().out
+    folder = tmp_path / "c"
+    test, model, run = (tomllib.loads((folder / f"{n}.toml").read_text()) for n in ("test", "model", "pipeline"))
+    truth = json.loads((tmp_path / "truth" / "c.json").read_text())
+    assert model["model"]["kind"] == "matrices"
+    K, M = (mmread(folder / model["matrices"][name]).toarray() for name in ("stiffness", "mass"))
+    groups = [mmread(folder / group["stiffness"]).toarray() for group in model["matrices"]["group"]]
+    assert_allclose(sum(groups), K, rtol=0, atol=1e-12 * np.abs(K).max())
+    dofs = pd.read_csv(folder / "dofs.csv")
+    assert len(dofs) == len(K) == len(M) == truth["structure"]["dofs"]
+    columns = [channel["column"] for channel in test["channel"]]
+    key = "hit" if test["test"]["kind"] == "hammer" else "record"
+    nodes = set(dofs["node"])
+    for hit in test[key]:
+        assert int(hit["dof"].split(":")[0]) in nodes
+        for path in (path for pattern in hit["files"] for path in folder.glob(pattern)):
+            table = pd.read_csv(path)
+            assert list(table.columns) == ["time", *columns]
+            assert table.to_numpy().shape == (truth["test"]["samples"], 1 + len(columns))
+            assert_allclose(np.diff(table["time"]), 1 / truth["test"]["rate_hz"], rtol=1e-3)  # nine digits of time
+    points = pd.read_csv(tmp_path / "truth" / "c_points.csv") if run["predict"]["points"] else None
+    assert points is None or set(points["output_dof"]) == set(run["predict"]["points"])
+    assert not [path for path in folder.rglob("*") if "truth" in path.name or "points" in path.name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OUTSIDE)
+def test_each_effect_outside_the_contract_can_be_drawn(kind):
+    case = make_case(17, f"unknown:{kind}")
+    assert case.truth["unknown_kind"] == kind
+    assert case.truth["detectability"]["frf_change"] > CHANGED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "limit"), [("cubic_stiffness", 2e-3), ("gap_contact", 1e-2), ("dry_friction", 2e-2)]
+)
+def test_halving_the_step_changes_responses_little(effect, limit):
+    _, in_band = check_step(effect, 5)
+    assert in_band < limit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_truths_without_scatter_are_their_nominal_models(kind):
+    for seed in range(2, 5):
+        check = check_nominal(kind, seed)
+        assert check.frequency < 1e-3
+        assert check.median < 4e-3
+        assert check.exact < SIMULATION
