@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
 
+FIRST_TO_SAY = ("unexpected_keyword_argument", "missing")
+
 Options = TypeVar("Options")
 
 
@@ -111,9 +113,14 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     try:
         return TypeAdapter(options_type).validate_python(dict(table))
     except ValidationError as error:
-        first = min(error.errors(), key=lambda item: item["type"] not in {"unexpected_keyword_argument", "missing"})
+        first = min(error.errors(), key=_rank)
         where = ".".join(_key_text(part) for part in first["loc"] if not _is_type_tag(part))
         raise FileFormatError(path, _explain(first, options_type), where=where and f"key '{where}'") from None
+
+
+def _rank(error: Any) -> int:
+    """Name an unknown key first: the key that is missing is most often the one that was meant."""
+    return FIRST_TO_SAY.index(error["type"]) if error["type"] in FIRST_TO_SAY else len(FIRST_TO_SAY)
 
 
 def _key_text(part: int | str) -> str:

@@ -18,7 +18,7 @@ from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
 from frf_ipz.fe.assembly import apply
 from frf_ipz.fe.factorization import DENSE_ORDER, Factorization, factorize
-from frf_ipz.fe.global_motions import quadratic_motions, rigid_body_motions
+from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are
 NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below cannot be told from none
 MAX_ROUNDING = 1e-9  # what a stiffness matrix printed with few digits may lack
 MOST_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
-NO_FREQUENCY = 1e-9  # of the highest Ritz value: below, a motion of the whole is one of a rigid body
+DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is none of its own
 FIRST_MODES = 24  # ARPACK's first guess at how many modes lie below a frequency
 FLEXIBILITY_STEPS = 60
 FLEXIBILITY_TOLERANCE = 1e-12  # change of a step, relative: the limit of double precision
@@ -253,6 +253,8 @@ def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -
         n_modes = min(n_modes, 1 + int(np.searchsorted(rough, (2 * np.pi * up_to_hz) ** 2)))
     elastic = rough[rough > order * EPS * abs(rough[-1])]
     shift = SHIFT**2 * float(elastic[0]) if elastic.size else 1.0
+    if rough[0] <= -shift:
+        raise _indefinite(model, float(rough[0]))
     places = [order - min(n_modes, order), order - 1]
     inverses, shapes = linalg.eigh(full_mass, full_stiffness + shift * full_mass, subset_by_index=places)
     shapes = shapes[:, ::-1] / np.sqrt(inverses[::-1])
@@ -307,23 +309,30 @@ def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: floa
 
 
 def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_to_hz: float | None) -> float:
-    """Guess a good shift before anything is factored, from motions that are polynomials in the coordinates."""
+    """Guess a good shift before anything is factored, from slow bending of the whole structure."""
     dofs = model.dofs
-    motions = quadratic_motions(dofs, model.geometry)
-    energies = _ritz(stiffness, mass, motions)
-    rigid = _ritz(stiffness, mass, rigid_body_motions(dofs, model.geometry))
-    is_free = bool(rigid.size and rigid[0] <= NO_FREQUENCY * energies[-1])
-    elastic = energies[energies > NO_FREQUENCY * energies[-1]]
+    rigid, energies = _ritz(stiffness, mass, rigid_body_motions(dofs, model.geometry))
+    n_rigid = int(np.count_nonzero(energies <= _unknown_energy(model, stiffness, rigid)))
+    _, energies = _ritz(stiffness, mass, bending_motions(dofs, model.geometry))
+    elastic = np.sort(np.abs(energies))[n_rigid:]
     estimate = float(np.sqrt(elastic[0])) / (2 * np.pi) if elastic.size else np.inf
     estimate = min(estimate, up_to_hz or np.inf)
-    return (SHIFT if is_free else HELD_SHIFT) * (estimate if np.isfinite(estimate) else 1.0)
+    return (SHIFT if n_rigid else HELD_SHIFT) * (estimate if np.isfinite(estimate) else 1.0)
 
 
-def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> FloatArray:
-    """Rayleigh-Ritz values, ascending, without the combinations of motions that vanish."""
+def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal, and their omega^2."""
     weights, axes = linalg.eigh(motions.T @ apply(mass, motions))
-    kept = axes[:, weights > 1e-10 * weights[-1]] / np.sqrt(weights[weights > 1e-10 * weights[-1]])
-    return np.asarray(linalg.eigvalsh(kept.T @ (motions.T @ apply(stiffness, motions)) @ kept))
+    kept = weights > DEPENDENT * weights[-1]
+    motions = motions @ (axes[:, kept] / np.sqrt(weights[kept]))
+    _, axes = linalg.eigh(motions.T @ apply(stiffness, motions))
+    motions = motions @ axes
+    return motions, np.sum(motions * apply(stiffness, motions), 0)
+
+
+def _unknown_energy(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
+    """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or make up."""
+    return NO_ENERGY * _rounding(model, stiffness) * np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
 
 
 def _cleaned(
@@ -339,13 +348,9 @@ def _cleaned(
         lower = linalg.cholesky(shapes.T @ apply(mass, shapes), lower=True)
         shapes = linalg.solve_triangular(lower, shapes.T, lower=True).T
     eigenvalues = np.sum(shapes * apply(stiffness, shapes), 0)
-    largest = np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
-    unknown = NO_ENERGY * _rounding(model, stiffness) * largest
+    unknown = _unknown_energy(model, stiffness, shapes)
     if (eigenvalues < -unknown).any():
-        raise IllConditionedError(
-            f"the stiffness matrix of the model '{model.name}' is indefinite: "
-            f"a mode has omega^2 = {eigenvalues.min():.4g}"
-        )
+        raise _indefinite(model, float(eigenvalues.min()))
     rigid = eigenvalues <= unknown
     eigenvalues = np.where(rigid, 0.0, eigenvalues)
     ascending = np.argsort(eigenvalues, kind="stable")
@@ -374,6 +379,13 @@ def _rounding(model: StructuralModel, stiffness: Matrix) -> float:
             left = np.abs(apply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
             found.append(float(np.quantile(left, MOST_ROWS)))
     return max(rounding for rounding in found if rounding <= MAX_ROUNDING)
+
+
+def _indefinite(model: StructuralModel, eigenvalue: float) -> IllConditionedError:
+    return IllConditionedError(
+        f"the stiffness matrix of the model '{model.name}' is indefinite: a mode has omega^2 = {eigenvalue:.4g}; "
+        "check its springs, loads and units"
+    )
 
 
 def _nodes(model: StructuralModel) -> IntArray:

@@ -1,7 +1,8 @@
-"""Motions of the whole structure that follow from where its nodes lie: rigid-body motion, and low polynomials."""
+"""Motions of the whole structure that follow from where its nodes lie: rigid-body motion, and slow bending."""
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 ROTATIONS = ("rx", "ry", "rz")
+MONOMIALS = tuple(powers for powers in product(range(3), repeat=3) if sum(powers) <= 2)
 
 
 def rigid_body_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
@@ -45,10 +47,12 @@ def rigid_body_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
     return motions
 
 
-def quadratic_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
-    """Every field of displacements (and of rotations) that is a polynomial of degree two in the coordinates.
+def bending_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
+    """Bend the whole structure along each axis by polynomials of degree two, cross-sections staying plane and normal.
 
-    They hold the lowest modes of most free structures well enough to tell their frequencies to a factor of two.
+    A deflection p(x, y, z) along the axis d turns what lies beside by ``grad p x e_d``, and moves it sideways by
+    ``-x_d dp/dx_c``. These motions hold the lowest modes of most free structures well enough to tell their frequencies
+    to a factor of two; extension, twist and rigid-body motion are among them.
 
     Parameters
     ----------
@@ -59,16 +63,31 @@ def quadratic_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
 
     Returns
     -------
-    (n_dofs, n_motions) array
-        At most 60 motions; those that are 0 everywhere are left out.
+    (n_dofs, 30) array
+        One column an axis and monomial; some may vanish or be alike.
     """
     places, directions = _places(dofs, geometry), _directions(dofs)
-    x, y, z = (places / max(float(np.abs(places).max(initial=0.0)), np.finfo(float).tiny)).T
-    monomials = np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x], 1)
-    present = np.unique(directions)
-    blocks = [monomials * (directions == direction)[:, None] for direction in present]
-    motions = np.concatenate(blocks, axis=1)
-    return motions[:, np.abs(motions).max(0) > 0]
+    size = float(np.abs(places).max(initial=0.0)) or 1.0
+    at = places / size
+    columns = []
+    for along in range(3):
+        for powers in MONOMIALS:
+            value, gradient = _monomial(at, powers)
+            moved = -at[:, [along]] * gradient
+            moved[:, along] = value
+            turned = np.cross(gradient, np.eye(3)[along]) / size
+            columns.append(np.take_along_axis(np.hstack([moved, turned]), directions[:, None], axis=1)[:, 0])
+    return np.stack(columns, 1)
+
+
+def _monomial(at: FloatArray, powers: tuple[int, int, int]) -> tuple[FloatArray, FloatArray]:
+    """Value and gradient of x^a y^b z^c."""
+    gradient = np.zeros_like(at)
+    for axis, power in enumerate(powers):
+        if power:
+            lowered = [other - (place == axis) for place, other in enumerate(powers)]
+            gradient[:, axis] = power * np.prod(at ** np.array(lowered), axis=1)
+    return np.prod(at ** np.array(powers), axis=1), gradient
 
 
 def _places(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.fe.assembly import apply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
 from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
         If a large model is given without `up_to_hz`.
     """
     if isinstance(model, ReducedModel):
-        poles = _quadratic_poles(model.mass, model.damping, model.stiffness)
+        poles = _upper_half(damped_poles(model.mass, model.damping, model.stiffness).values)
     else:
         basis = solve_basis(model, up_to_hz=up_to_hz)
         damping = _modal_damping(model, basis)
@@ -97,7 +97,7 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
             root = np.sqrt((damping / 2) ** 2 - basis.eigenvalues.astype(np.complex128))
             poles = _upper_half(np.concatenate([-damping / 2 + root, -damping / 2 - root]))
         else:
-            poles = _quadratic_poles(np.eye(len(damping)), damping, np.diag(basis.eigenvalues))
+            poles = _upper_half(damped_poles(np.eye(len(damping)), damping, np.diag(basis.eigenvalues)).values)
     return poles if up_to_hz is None else poles[np.abs(poles) <= 2 * np.pi * up_to_hz]
 
 
@@ -198,22 +198,6 @@ def _solved(
         dynamic = part**2 * mass + part * damping + stiffness
         blocks.append(outputs @ np.linalg.solve(dynamic, np.broadcast_to(inputs.T, (len(part), *inputs.T.shape))))
     return np.concatenate(blocks)
-
-
-def _quadratic_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> ComplexArray:
-    """Roots of det(s^2 M + s B + K), as eigenvalues of the companion matrix in mass-normalised coordinates."""
-    order = len(mass)
-    lower = linalg.cholesky(mass, lower=True)
-
-    def normalised(matrix: FloatArray) -> FloatArray:
-        half = linalg.solve_triangular(lower, matrix, lower=True)
-        return np.asarray(linalg.solve_triangular(lower, half.T, lower=True).T)
-
-    companion = np.zeros((2 * order, 2 * order))
-    companion[:order, order:] = np.eye(order)
-    companion[order:, :order] = -normalised(stiffness)
-    companion[order:, order:] = -normalised(damping)
-    return _upper_half(np.linalg.eigvals(companion).astype(np.complex128))
 
 
 def _upper_half(poles: ComplexArray) -> ComplexArray:

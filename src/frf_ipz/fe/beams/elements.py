@@ -179,4 +179,5 @@ def _integral(polynomials: FloatArray) -> FloatArray:
     """Integral over xi from 0 to 1 of all products of two DOFs' polynomials."""
     power = np.arange(polynomials.shape[-1])
     moments = 1.0 / (power[:, None] + power[None, :] + 1.0)
-    return np.asarray(np.einsum("nap,pq,nbq->nab", polynomials, moments, polynomials))
+    product = polynomials @ moments @ np.swapaxes(polynomials, -1, -2)
+    return np.asarray((product + np.swapaxes(product, -1, -2)) / 2)  # symmetric to the last bit
