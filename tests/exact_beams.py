@@ -1,8 +1,8 @@
 """Natural frequencies of straight beams by transfer matrices: exact, without elements.
 
-Along a uniform stretch the state (deflection, rotation, moment, shear force) obeys a linear differential equation, so it
-is carried on by a matrix exponential; masses and springs at a point add a jump. Both theories are the same equation,
-Euler-Bernoulli with no shear flexibility and no rotary inertia.
+Along a uniform stretch the state (deflection w, rotation psi, moment, force across) obeys a linear differential
+equation, so it is carried on by a matrix exponential; masses and springs at a point add a jump. Both
+theories are the same equation, Euler-Bernoulli with no shear flexibility and no rotary inertia.
 """
 
 from dataclasses import dataclass
@@ -31,12 +31,15 @@ class Stretch:
     end_rotational_spring: float = 0.0
 
     def transfer(self, omega):
-        slope_from_shear = 1 / self.shear_stiffness
+        # the force across is kappa G A (w' - psi) + N w', so that w' = (force + kappa G A psi) / (kappa G A + N)
+        by_force = 1 / (self.shear_stiffness + self.tension)
+        by_rotation = 1 / (1 + self.tension / self.shear_stiffness)
+        rotary = self.rotary_inertia_per_length * omega**2
         field = np.array(
             [
-                [0, 1, 0, slope_from_shear],
+                [0, by_rotation, 0, by_force],
                 [0, 0, 1 / self.bending_stiffness, 0],
-                [0, self.tension - self.rotary_inertia_per_length * omega**2, 0, -1],
+                [0, self.tension * by_rotation - rotary, 0, self.tension * by_force - 1],
                 [-self.mass_per_length * omega**2, 0, 0, 0],
             ]
         )

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fe_models import beam
 from numpy.testing import assert_allclose
 
+from fe_models import beam
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.structure import ReducedModel

@@ -332,7 +332,8 @@ def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> tuple[FloatAr
 
 def _unknown_energy(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
     """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or make up."""
-    return NO_ENERGY * _rounding(model, stiffness) * np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
+    sizes = np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
+    return np.asarray(NO_ENERGY * _rounding(model, stiffness) * sizes)
 
 
 def _cleaned(

@@ -80,7 +80,7 @@ def bending_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
     return np.stack(columns, 1)
 
 
-def _monomial(at: FloatArray, powers: tuple[int, int, int]) -> tuple[FloatArray, FloatArray]:
+def _monomial(at: FloatArray, powers: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     """Value and gradient of x^a y^b z^c."""
     gradient = np.zeros_like(at)
     for axis, power in enumerate(powers):

@@ -189,6 +189,11 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
         _require_condition(model, ritz, rows, plan)
     else:
         rows = _chosen_rows(model, ritz, plan)
+        if condition_number(ritz.shapes[rows]) > MAX_CONDITION:
+            raise IllConditionedError(
+                f"{count} modes and residual vectors cannot be told apart at any DOFs of the model '{model.name}'; keep "
+                "fewer ([reduce] modes)"
+            )
         notes.append("dofs: " + ", ".join(model.dofs[row].name for row in rows.tolist()))
     retained = {model.dofs[row] for row in rows.tolist()}
     reached = [dof.name for dof in plan.wanted if dof not in retained]
@@ -198,11 +203,15 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
 
 
 def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> IntArray:
+    """Choose actuators, sensors, points and translations; rotations only where translations cannot tell modes apart."""
     dofs = model.dofs
+    wanted, count = [model.index(dof) for dof in plan.wanted], ritz.shapes.shape[1]
     translations = np.array([row for row, dof in enumerate(dofs) if not dof.direction.startswith("r")], dtype=np.int64)
-    count = ritz.shapes.shape[1]
-    candidates = translations if translations.size >= count else np.arange(len(dofs))
-    return choose_rows(ritz.shapes, [model.index(dof) for dof in plan.wanted], candidates, count)
+    if translations.size >= count:
+        rows = choose_rows(ritz.shapes, wanted, translations, count)
+        if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
+            return rows
+    return choose_rows(ritz.shapes, wanted, np.arange(len(dofs)), count)
 
 
 def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 MAX_CONDITION = 1e3  # beyond, the reduced matrices keep fewer than ten of sixteen digits (they hold its square)
-INDEPENDENT = 0.02  # share of a wanted DOF's shapes that those before it do not hold: below, it is a copy of them
+INDEPENDENT = (0.02, 0.1, 0.5, 1.0)  # share of a wanted DOF's shapes that those before must not hold, tried in turn
 
 
 def condition_number(shapes: FloatArray) -> float:
@@ -46,7 +46,7 @@ def choose_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray,
 
     Those wanted come first, in their order, as long as they are independent of each other; the others follow by
     pivoted QR, which makes the volume that their shapes span large (and so, nearly, the effective independence of
-    [Kammer1991]).
+    [Kammer1991]). If the whole is badly conditioned all the same, fewer of those wanted are taken.
 
     Parameters
     ----------
@@ -62,14 +62,23 @@ def choose_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray,
     Returns
     -------
     (count,) int array
-        Rows; fewer where no more are independent.
+        Rows.
     """
+    rows = np.zeros(0, np.int64)
+    for independent in INDEPENDENT:
+        rows = _rows(shapes, wanted, candidates, count, independent)
+        if condition_number(shapes[rows]) <= MAX_CONDITION:
+            break
+    return rows
+
+
+def _rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int, independent: float) -> IntArray:
     chosen: list[int] = []
     spanned = np.zeros((shapes.shape[1], 0))
     for row in wanted:
         shape = shapes[row]
         rest = shape - spanned @ (spanned.T @ shape)
-        if len(chosen) < count and np.linalg.norm(rest) > INDEPENDENT * np.linalg.norm(shape):
+        if len(chosen) < count and np.linalg.norm(rest) > independent * np.linalg.norm(shape):
             chosen.append(row)
             spanned = np.column_stack([spanned, rest / np.linalg.norm(rest)])
     missing = count - len(chosen)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from exact_beams import exact_frequencies_hz, rectangle
-from fe_models import beam
 from numpy.testing import assert_allclose
 
+from exact_beams import exact_frequencies_hz, rectangle
+from fe_models import beam
 from frf_ipz.fe.beams.beam_options import BeamPointMass, BeamPointSpring, BeamSection
 from frf_ipz.fe.eigen import solve_modes
 

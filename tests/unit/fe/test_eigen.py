@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fe_models import beam, structural_model
 from numpy.testing import assert_allclose
 from scipy import linalg, sparse
 
+from fe_models import beam, structural_model
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe import eigen

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from fe_models import structural_model
 from numpy.testing import assert_allclose
 from scipy import linalg, sparse
 from scipy.sparse import linalg as linalg_sparse
 
+from fe_models import structural_model
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import IllConditionedError
 from frf_ipz.fe import factorization

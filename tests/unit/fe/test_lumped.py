@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from fe_models import LUMPED_TEXT, read_text_model
 from numpy.testing import assert_allclose
 
+from fe_models import LUMPED_TEXT, read_text_model
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.eigen import solve_modes

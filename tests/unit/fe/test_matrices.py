@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from fe_models import beam, export
 from numpy.testing import assert_allclose
 from scipy import io, sparse
 
+from fe_models import beam, export
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.eigen import solve_modes
@@ -68,7 +68,7 @@ def test_columns_and_rows_stand_in_the_order_of_the_table(tmp_path):
     path = export(tmp_path, beam(left="clamped"))
     table = (tmp_path / "dofs.csv").read_text(encoding="utf-8").splitlines()
     swapped = ["z_m, direction ,x_m,y_m,node"] + [
-        ",".join((cells := line.split(","))[place] for place in (4, 1, 2, 3, 0)) for line in table[1:]
+        ",".join(line.split(",")[place] for place in (4, 1, 2, 3, 0)) for line in table[1:]
     ]
     (tmp_path / "dofs.csv").write_text("\ufeff" + "\r\n".join([*swapped, "", ""]), encoding="utf-8")
     assert read_model(path).dofs == beam(left="clamped").dofs

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from fe_models import BEAM_TEXT, LUMPED_TEXT, beam, export
 from scipy import io, sparse
 
+from fe_models import BEAM_TEXT, LUMPED_TEXT, beam, export
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.model_file import read_model
 

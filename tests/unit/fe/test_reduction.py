@@ -1,0 +1,277 @@
+"""Reduction to physical DOFs: exact modes, exact statics, good choices, and what is refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import linalg
+
+from fe_models import LUMPED_TEXT, beam, read_text_model, structural_model
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.errors import IllConditionedError, InputError
+from frf_ipz.fe import reduction
+from frf_ipz.fe.eigen import solve_basis
+from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.response import model_frfs, model_poles
+from frf_ipz.fe.selection import MAX_CONDITION, choose_rows, condition_number
+from frf_ipz.frf import FrfLabel
+from frf_ipz.quantities import FrfQuantity
+
+BAND = (10.0, 700.0)
+EXACT = 1e-8  # relative: what a condition number of a few hundred leaves of double precision
+STATIC = 1e-6  # relative, of FRFs at 1 % of the first frequency
+
+
+def dofs(*labels):
+    return [parse_dof(label) for label in labels]
+
+
+def reduce(model, options=None, *, actuators=("9:z",), sensors=("21:z",), points=("13:z",), band_hz=BAND, **more):
+    return reduce_model(
+        model,
+        options or ReduceOptions(),
+        actuators=dofs(*actuators),
+        sensors=dofs(*sensors),
+        points=dofs(*points),
+        band_hz=band_hz,
+        **more,
+    )
+
+
+def frfs(model, pairs, s):
+    labels = [FrfLabel(parse_dof(out), parse_dof(blow), FrfQuantity.RECEPTANCE) for out, blow in pairs]
+    return model_frfs(model, labels, s)
+
+
+@pytest.fixture(scope="module", params=["clamped", "free"])
+def model(request):
+    return beam(left=request.param, elements=20, modal_ratio=0.005)
+
+
+def test_matrices_are_symmetric_and_not_negative(model):
+    found = reduce(model)
+    for name in ("mass", "damping", "stiffness"):
+        matrix = getattr(found, name)
+        assert (matrix == matrix.T).all()
+        assert np.linalg.eigvalsh(matrix)[0] > -1e-12 * np.linalg.norm(matrix)
+    assert np.linalg.eigvalsh(found.mass)[0] > 0
+
+
+def test_modes_kept_are_modes_of_the_model(model):
+    found = reduce(model, ReduceOptions(modes=6))
+    values, shapes = linalg.eigh(found.stiffness, found.mass)
+    basis = solve_basis(model, n_modes=6)
+    first = basis.n_rigid
+    assert_allclose(values[first:6], basis.eigenvalues[first:], rtol=EXACT)
+    assert np.abs(values[:first]).max(initial=0) < 1e-9 * values[first]
+    expanded = found.expansion @ shapes[:, first:6]
+    signs = np.sign(np.sum(expanded * basis.shapes[:, first:], 0))
+    assert_allclose(expanded * signs, basis.shapes[:, first:], rtol=0, atol=1e-6 * np.abs(basis.shapes).max())
+
+
+def test_poles_have_the_damping_of_the_model(model):
+    found, whole = model_poles(reduce(model)), model_poles(model)
+    assert_allclose(found[:6], whole[:6], rtol=1e-7, atol=1e-6)
+
+
+def test_static_part_is_exact_from_and_to_a_residual_vector():
+    held = beam(left="clamped", elements=20, modal_ratio=0.005)
+    found = reduce(held, ReduceOptions(modes=2, residual_flexibility=("9:z",)))
+    s = np.array([2j * np.pi * 0.167])
+    pairs = [("9:z", "9:z"), ("21:z", "9:z"), ("13:z", "9:z"), ("9:z", "21:z")]
+    assert_allclose(frfs(found, pairs, s), frfs(held, pairs, s), rtol=STATIC)
+    without = reduce(held, ReduceOptions(modes=3, residual_flexibility=()))
+    assert np.abs(frfs(without, pairs, s) / frfs(held, pairs, s) - 1).max() > 10 * STATIC
+
+
+def test_frfs_of_the_band_agree(model):
+    s = 2j * np.pi * np.linspace(*BAND, 400)
+    pairs = [("21:z", "9:z"), ("13:z", "9:z")]
+    found, whole = frfs(reduce(model), pairs, s), frfs(model, pairs, s)
+    assert (np.linalg.norm(found - whole, axis=0) < 2e-3 * np.linalg.norm(whole, axis=0)).all()
+
+
+def test_retained_dofs_are_their_own_rows_of_the_expansion(model):
+    found = reduce(model)
+    for place, dof in enumerate(found.dofs):
+        expected = np.zeros(len(found.dofs))
+        expected[place] = 1.0
+        assert_allclose(found.row(dof), expected, rtol=0, atol=1e-9)
+    assert found.expanded_dofs == model.dofs
+
+
+def test_actuators_sensors_and_points_are_retained(model):
+    found = reduce(model, actuators=("9:z", "3:-z"), sensors=("21:z",), points=("13:+z", "17:z"))
+    assert found.dofs[:5] == tuple(dofs("9:z", "3:z", "21:z", "13:z", "17:z"))
+    assert len(found.dofs) == found.n_modes + len(found.residual_dofs)
+    assert found.residual_dofs == tuple(dofs("9:z", "3:z"))
+
+
+def test_residual_vectors_stand_at_the_side_with_fewer_dofs(model):
+    hammer = reduce(model, actuators=("3:z", "7:z", "9:z", "19:z"), sensors=("21:z",), points=("13:z",))
+    assert hammer.residual_dofs == tuple(dofs("21:z", "13:z"))
+    s = np.array([2j * np.pi * 0.167])
+    pairs = [("21:z", "3:z"), ("21:z", "19:z"), ("13:z", "7:z")]
+    assert_allclose(frfs(hammer, pairs, s), frfs(model, pairs, s), rtol=STATIC)
+    assert any("residual flexibility: 21:z, 13:z" in note for note in hammer.choices)
+
+
+def test_more_modes_make_room_for_many_sensors():
+    model = beam(left="clamped", elements=20, modal_ratio=0.005)
+    few = reduce(model, band_hz=(5.0, 60.0))
+    sensors = tuple(f"{node}:z" for node in range(4, 22, 2))
+    many = reduce(model, sensors=sensors, band_hz=(5.0, 60.0))
+    assert many.n_modes > few.n_modes
+    assert set(dofs(*sensors)) <= set(many.dofs)
+    assert any("more, so that" in note for note in many.choices)
+
+
+def test_a_copy_of_a_dof_is_reached_through_the_others():
+    model = beam(left="clamped", elements=200, modal_ratio=0.005)
+    found = reduce(model, actuators=("100:z",), sensors=("101:z",), points=("150:z",), band_hz=(5.0, 60.0))
+    assert Dof(100, "z") in found.dofs
+    assert Dof(101, "z") not in found.dofs
+    assert any("101:z are no rows of their own" in note for note in found.choices)
+    s = 2j * np.pi * np.linspace(5.0, 60.0, 200)
+    whole, few = (frfs(one, [("101:z", "100:z")], s) for one in (model, found))
+    assert np.linalg.norm(whole - few) < 1e-3 * np.linalg.norm(whole)
+
+
+def test_the_choice_is_well_conditioned(model):
+    found = reduce(model)
+    assert np.linalg.cond(found.mass) < 1e3  # square of that of the mode matrix
+
+
+def test_numbers_of_modes_follow_the_band():
+    model = beam(left="clamped", elements=60, modal_ratio=0.005)
+    frequency = solve_basis(model, n_modes=12).natural_frequency_hz
+    found = reduce(model, band_hz=(10.0, 700.0))
+    assert found.n_modes == np.count_nonzero(frequency <= reduction.BAND_MARGIN * 700.0)
+
+
+def test_a_model_of_few_dofs_is_kept_whole(tmp_path):
+    model = read_text_model(tmp_path, LUMPED_TEXT)
+    found = reduce(model, actuators=("1:x",), sensors=("2:x",), points=(), band_hz=(1.0, 500.0))
+    assert found.n_modes == 2
+    assert found.residual_dofs == ()
+    assert any("none, as the modes hold all flexibility" in note for note in found.choices)
+    assert_allclose(found.mass, model.mass.toarray(), rtol=1e-10, atol=1e-10)
+    assert_allclose(found.stiffness, model.stiffness.toarray(), rtol=1e-10)
+    assert_allclose(found.damping, model.damping.toarray(), rtol=1e-9, atol=1e-9)
+
+
+def test_viscous_damping_goes_through_the_same_basis(tmp_path):
+    text = LUMPED_TEXT.replace("[lumped]", "[damping]\nrayleigh = { beta_s = 2e-5 }\n[lumped]", 1)
+    model = read_text_model(tmp_path, text)
+    options = ReduceOptions(modes=1, residual_flexibility=("1:x",))
+    found = reduce(model, options, actuators=("1:x",), sensors=("2:x",), points=())
+    assert_allclose(found.damping, model.damping.toarray(), rtol=1e-9, atol=1e-9)
+
+
+def test_default_damping_is_said():
+    plain = beam(left="clamped")
+    for given, expected, words in ((None, 0.005, "nothing else"), (0.02, 0.02, "the test says")):
+        found = reduce(plain, default_damping_ratio=given)
+        poles = model_poles(found)[:3]
+        assert_allclose(-poles.real / np.abs(poles), expected, rtol=1e-6)
+        assert words in found.choices[0]
+    assert not any("damping" in note for note in reduce(beam(modal_ratio=0.01)).choices)
+
+
+def test_options_are_obeyed():
+    model = beam(left="clamped", modal_ratio=0.005)
+    options = ReduceOptions(modes=4, dofs=("21:z", "9:z", "13:z", "17:z", "5:z"), residual_flexibility=("21:z",))
+    found = reduce(model, options)
+    assert found.dofs == tuple(dofs("21:z", "9:z", "13:z", "17:z", "5:z"))
+    assert (found.n_modes, found.residual_dofs) == (4, (Dof(21, "z"),))
+    assert found.choices == ()
+    by_dofs = reduce(model, ReduceOptions(dofs=("21:z", "9:z", "13:z", "17:z", "5:z")))
+    assert by_dofs.n_modes == 4
+
+
+def test_close_dofs_are_refused_and_better_ones_proposed():
+    model = beam(left="clamped", elements=100, modal_ratio=0.005)
+    close = ReduceOptions(modes=4, dofs=tuple(f"{node}:z" for node in (9, 10, 11, 12, 13)))
+    ends = {"actuators": ("9:z",), "sensors": ("11:z",), "points": ("60:z",)}
+    with pytest.raises(IllConditionedError) as caught:
+        reduce(model, close, **ends)
+    message = str(caught.value)
+    assert "condition number" in message
+    proposed = message[message.index("dofs = [") + 8 : message.index("]", message.index("dofs = ["))]
+    better = tuple(name.strip().strip('"') for name in proposed.split(","))
+    assert {"9:z", "60:z"} <= set(better)
+    found = reduce(model, ReduceOptions(modes=4, dofs=better), **ends)
+    assert found.dofs == tuple(dofs(*better))
+
+
+def test_rounding_in_the_matrices_is_noticed(monkeypatch):
+    monkeypatch.setattr(reduction, "MAX_CONDITION", 1e30)
+    model = beam(left="clamped", elements=100, modal_ratio=0.005)
+    with pytest.raises(IllConditionedError, match="farther apart"):
+        reduce(model, ReduceOptions(modes=4, dofs=tuple(f"{node}:z" for node in (2, 5, 8, 11, 14))))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (ReduceOptions(modes=41), "modes is 41; the model 'beam' has 40 free DOFs"),
+        (ReduceOptions(modes=0), "modes is 0"),
+        (ReduceOptions(modes=4, dofs=("3:z", "4:z"), residual_flexibility=("9:z",)), "names 2 DOFs, but 4 modes and 1"),
+        (ReduceOptions(modes=4, dofs=("3:z", "9:z", "15:z")), "names 3 DOFs, but there are 4 modes and 1"),
+        (ReduceOptions(dofs=("9:z",), residual_flexibility=("9:z",)), "leaves no mode"),
+        (ReduceOptions(dofs=("3:z", "9:z", "3:-z")), "dofs names the DOF 3:z twice"),
+        (ReduceOptions(residual_flexibility=("3:z", "3:z")), "residual_flexibility names the DOF 3:z twice"),
+        (ReduceOptions(dofs=("3:z", "99:z")), "no node 99"),
+        (ReduceOptions(residual_flexibility=("1:z",)), "1:z is held"),
+        (ReduceOptions(dofs=("3:z", "nine")), "'nine' is no DOF label"),
+        (ReduceOptions(modes=40, residual_flexibility=("9:z",)), "hold all the flexibility already"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(options, message):
+    with pytest.raises(InputError, match=message):
+        reduce(beam(left="clamped", modal_ratio=0.005), options)
+
+
+@pytest.mark.parametrize(
+    ("place", "label", "message"),
+    [("actuators", "99:z", "no node 99"), ("sensors", "3:x", "no DOF 'x'"), ("points", "1:z", "1:z is held")],
+)
+def test_dofs_that_the_model_lacks_are_said(place, label, message):
+    with pytest.raises(InputError, match=message):
+        reduce(beam(left="clamped"), **{place: (label,)})
+
+
+def test_without_test_or_points_the_modes_alone_are_reduced():
+    found = reduce(beam(left="clamped", modal_ratio=0.01), actuators=(), sensors=(), points=())
+    assert found.residual_dofs == ()
+    assert len(found.dofs) == found.n_modes
+
+
+def test_only_what_is_asked_for_is_expanded_in_a_huge_model(monkeypatch):
+    monkeypatch.setattr(reduction, "MAX_EXPANDED", 10)
+    found = reduce(beam(left="clamped", modal_ratio=0.01))
+    assert set(found.dofs) | {Dof(13, "z")} <= set(found.expanded_dofs)
+    assert len(found.expanded_dofs) < 15
+
+
+def test_a_structure_that_only_turns_is_reduced_in_rotations():
+    pair = np.array([[2.0, -1.0, 0], [-1.0, 2.0, -1.0], [0, -1.0, 1.0]])
+    shaft = structural_model(np.eye(3), 1e4 * pair, [Dof(n, "rx") for n in (1, 2, 3)], modal_damping=[0.01])
+    found = reduce(shaft, actuators=("1:rx",), sensors=("3:rx",), points=(), band_hz=(1.0, 5.0))
+    assert all(dof.direction == "rx" for dof in found.dofs)
+
+
+def test_chosen_rows_are_as_independent_as_can_be():
+    rng = np.random.default_rng(2)
+    shapes = rng.standard_normal((40, 5))
+    shapes[7] = 1.001 * shapes[3]
+    rows = choose_rows(shapes, [3, 7, 11], np.arange(40), 5)
+    assert rows[:2].tolist() == [3, 11]
+    assert len(set(rows.tolist())) == 5
+    assert condition_number(shapes[rows]) < 20 < MAX_CONDITION
+
+
+def test_condition_number_knows_no_units():
+    shapes = np.random.default_rng(3).standard_normal((4, 4))
+    assert_allclose(condition_number(np.diag([1e6, 1.0, 1e-6, 3.0]) @ shapes), condition_number(shapes), rtol=10)
+    assert condition_number(np.diag([1.0, 0.0])) == np.inf
