@@ -23,6 +23,10 @@ class UpdateOptions:
         Regularisation, step and stop of ``ipz``, eqs. (15), (19) and (20) of the paper.
     cross_sensitivities : bool
         Use the off-diagonal blocks of eq. (14) (``ipz``).
+    ensemble : int
+        Models to draw from what targets and prior leave open (minimal-change); bands of predictions come from them.
+    seed : int
+        Of the draws.
     """
 
     __pydantic_config__ = STRICT
@@ -34,3 +38,5 @@ class UpdateOptions:
     beta: float = 0.3
     delta: float = 1e-3
     cross_sensitivities: bool = True
+    ensemble: int = 200
+    seed: int = 0

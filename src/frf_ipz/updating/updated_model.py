@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -57,3 +58,33 @@ class UpdatedModel:
     ensemble: FloatArray
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+
+def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:
+    """Give the result of an update without targets.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The nominal model.
+    method : str
+        Which method was asked for.
+
+    Returns
+    -------
+    UpdatedModel
+        The model as it was.
+    """
+    order = len(model.dofs)
+    nothing = np.zeros(0, complex)
+    return UpdatedModel(
+        model=model,
+        nominal=model,
+        method=method,
+        status=UpdateStatus.NOTHING_TO_DO,
+        history=pd.DataFrame({"phase": [], "iteration": [], "misfit": [], "step": []}),
+        before=nothing,
+        after=nothing,
+        ensemble=np.zeros((0, 3, order, order)),
+        warnings=(UpdateStatus.NOTHING_TO_DO.value,),
+    )

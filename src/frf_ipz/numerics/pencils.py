@@ -1,0 +1,298 @@
+"""Poles and zeros of (M, B, K) as roots of matrix pencils, and how they move with the matrices.
+
+Poles are the roots of ``det(s^2 M + s B + K)``. The zeros of the FRF from an input row b to an output row c are the
+roots of the bordered determinant ``det [[s^2 M + s B + K, b], [c, 0]]``; on the complements of b (from the left) and c
+(from the right) that is a smaller pencil of the same kind, eq. (5) of [Dorosti2018]
+(doi:10.1016/j.conengprac.2017.11.002) for general rows.
+
+A root that is simple moves by ``-(y^T dP x) / (y^T P'(s) x)``, with x and y the right and left vectors of ``P(s)``.
+Eqs. (21) and (23) of the paper lack the minus sign, and have x in the place of y: sensor and actuator differ, so the
+pencil of the zeros is not symmetric.
+
+LAPACK's generalised solver is called directly: it keeps zeros at infinity apart, and SciPy's front end would take
+longer than the computation itself for matrices of this size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.errors import NumericalError
+
+INFINITE = 1e-13  # beta over alpha of a root that QZ cannot tell from infinity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Roots:
+    """Roots of a pencil with their vectors.
+
+    Parameters
+    ----------
+    values : (n,) complex array
+        rad/s, or (rad/s)^2 for an undamped pencil.
+    right, left : (r, n) complex array
+        ``P(s) x = 0`` and ``y^T P(s) = 0`` on the complements, in the coordinates of the matrices.
+    slope : (n,) complex array
+        ``y^T P'(s) x``.
+    """
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    slope: ComplexArray
+
+    def take(self, chosen: object) -> Roots:
+        """Keep some roots.
+
+        Parameters
+        ----------
+        chosen : index array
+            Which, in the order wanted.
+
+        Returns
+        -------
+        Roots
+            Those.
+        """
+        index = np.asarray(chosen)
+        return Roots(
+            values=self.values[index], right=self.right[:, index], left=self.left[:, index], slope=self.slope[index]
+        )
+
+
+def complement(row: FloatArray) -> FloatArray:
+    """Orthonormal basis of all vectors that a row maps to zero, by one Householder reflection.
+
+    Parameters
+    ----------
+    row : (r,) array
+        Not zero.
+
+    Returns
+    -------
+    (r, r - 1) array
+        Columns orthogonal to the row and to one another.
+
+    Examples
+    --------
+    >>> complement(np.array([0.0, 2.0]))
+    array([[1.],
+           [0.]])
+    """
+    place = int(np.argmax(np.abs(row)))
+    unit = row / np.linalg.norm(row)
+    reflected = unit.copy()
+    reflected[place] += np.copysign(1.0, unit[place])
+    basis = np.eye(len(row)) - np.outer(reflected, reflected) / (1.0 + abs(unit[place]))
+    return np.asarray(np.delete(basis, place, axis=1))
+
+
+def damped_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> Roots:
+    """Roots of det(s^2 M + s B + K).
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (r, r) array
+        They need not be symmetric.
+
+    Returns
+    -------
+    Roots
+        All 2 r of them, conjugates included, rad/s.
+    """
+    return _quadratic(mass, damping, stiffness, None, None)
+
+
+def damped_zeros(
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, output_row: FloatArray, input_row: FloatArray
+) -> Roots:
+    """Zeros of the FRF from one input to one output.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (r, r) array
+        They need not be symmetric.
+    output_row, input_row : (r,) array
+        Motion of the sensor's and of the struck DOF for unit motions of the coordinates.
+
+    Returns
+    -------
+    Roots
+        At most 2 r - 2, conjugates included, rad/s; those at infinity are left out.
+    """
+    return _quadratic(mass, damping, stiffness, complement(input_row), complement(output_row))
+
+
+def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
+    """Squared natural frequencies of a symmetric pair.
+
+    Parameters
+    ----------
+    mass, stiffness : (r, r) array
+        Symmetric; the mass positive definite.
+
+    Returns
+    -------
+    Roots
+        Roots of K x = mu M x, ascending, (rad/s)^2; right and left vectors are the same.
+
+    Raises
+    ------
+    NumericalError
+        If the mass is not positive definite.
+    """
+    values, vectors, info = lapack.dsygvd(stiffness, mass)
+    if info:
+        raise NumericalError("the mass matrix of the reduced model is not positive definite: check masses and units")
+    shapes = vectors.astype(complex)
+    return Roots(values=values.astype(complex), right=shapes, left=shapes, slope=np.ones(len(values), complex))
+
+
+def undamped_zeros(mass: FloatArray, stiffness: FloatArray, output_row: FloatArray, input_row: FloatArray) -> Roots:
+    """Squared zeros of the undamped FRF from one input to one output.
+
+    Parameters
+    ----------
+    mass, stiffness : (r, r) array
+        Mass and stiffness.
+    output_row, input_row : (r,) array
+        As for `damped_zeros`.
+
+    Returns
+    -------
+    Roots
+        ``-s^2`` of each zero, (rad/s)^2: positive on the imaginary axis of s, negative for real zeros, complex for
+        quadruples.
+    """
+    rows, columns = complement(input_row), complement(output_row)
+    small_mass = rows.T @ mass @ columns
+    values, left, right = _generalised(rows.T @ stiffness @ columns, small_mass)
+    slope = np.einsum("ik,ij,jk->k", left, small_mass, right)
+    return Roots(values=values, right=columns @ right, left=rows @ left, slope=slope)
+
+
+def damped_sensitivity(
+    roots: Roots,
+    *,
+    mass: FloatArray | None = None,
+    damping: FloatArray | None = None,
+    stiffness: FloatArray | None = None,
+) -> ComplexArray:
+    """How roots of a quadratic pencil move with parameters.
+
+    Parameters
+    ----------
+    roots : Roots
+        Of `damped_poles` or `damped_zeros`.
+    mass, damping, stiffness : (p, r, r) array, optional
+        Derivatives of the matrices by the parameters; those that do not depend on any are left out.
+
+    Returns
+    -------
+    (n, p) complex array
+        Derivatives of the roots, rad/s per unit of the parameter.
+    """
+    powers = ((2, mass), (1, damping), (0, stiffness))
+    moved = sum(roots.values[:, None] ** power * _forms(roots, given) for power, given in powers if given is not None)
+    return np.asarray(-moved / roots.slope[:, None])
+
+
+def undamped_sensitivity(roots: Roots, stiffness: FloatArray, mass: FloatArray | None = None) -> ComplexArray:
+    """How roots of an undamped pencil move with parameters.
+
+    Parameters
+    ----------
+    roots : Roots
+        Of `undamped_poles` or `undamped_zeros`.
+    stiffness : (p, r, r) array
+        Derivatives of the stiffness by the parameters.
+    mass : (p, r, r) array, optional
+        Derivatives of the mass, where it depends on any.
+
+    Returns
+    -------
+    (n, p) complex array
+        Derivatives of the squared roots, (rad/s)^2 per unit of the parameter.
+    """
+    moved = _forms(roots, stiffness)
+    if mass is not None:
+        moved = moved - roots.values[:, None] * _forms(roots, mass)
+    return np.asarray(moved / roots.slope[:, None])
+
+
+def unpack_vectors(imaginary: FloatArray, packed: FloatArray) -> ComplexArray:
+    """Turn LAPACK's real storage of vectors of a real pencil into complex vectors.
+
+    Parameters
+    ----------
+    imaginary : (n,) array
+        Imaginary parts of the roots; a positive one is followed by its conjugate.
+    packed : (r, n) array
+        Real part, then imaginary part, of each conjugate pair.
+
+    Returns
+    -------
+    (r, n) complex array
+        One vector a root.
+    """
+    vectors = packed.astype(complex)
+    first = np.flatnonzero(imaginary > 0)
+    vectors[:, first] += 1j * packed[:, first + 1]
+    vectors[:, first + 1] = vectors[:, first].conj()
+    return vectors
+
+
+def _forms(roots: Roots, matrices: FloatArray) -> ComplexArray:
+    """y^T A x of every root and matrix."""
+    size = roots.right.shape[0] ** 2
+    products = (roots.left.T[:, :, None] * roots.right.T[:, None, :]).reshape(-1, size)
+    flat = matrices.reshape(-1, size).T
+    # real and imaginary parts apart: a product with a complex factor would first make the matrices complex
+    result = np.zeros((len(products), flat.shape[1]), complex)
+    result.real = np.ascontiguousarray(products.real) @ flat
+    if np.any(products.imag):
+        result.imag = np.ascontiguousarray(products.imag) @ flat
+    return result
+
+
+def _quadratic(
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, rows: FloatArray | None, columns: FloatArray | None
+) -> Roots:
+    if rows is not None and columns is not None:
+        mass, damping, stiffness = (rows.T @ matrix @ columns for matrix in (mass, damping, stiffness))
+    order = len(mass)
+    # time is scaled so that mass and stiffness are of one size: QZ is accurate relative to the norm of the whole pencil
+    scale = np.sqrt(np.linalg.norm(stiffness) / np.linalg.norm(mass))
+    first, second = np.zeros((2, 2 * order, 2 * order))
+    first[:order, order:] = second[:order, :order] = np.eye(order)
+    norm = np.linalg.norm(stiffness)
+    first[order:, :order] = stiffness / -norm
+    first[order:, order:] = damping * (-scale / norm)
+    second[order:, order:] = mass * (scale**2 / norm)
+    values, left, right = _generalised(first, second)
+    values, left, right = values * scale, left[order:], right[:order]
+    slope = 2 * values * np.einsum("ik,ij,jk->k", left, mass, right) + np.einsum("ik,ij,jk->k", left, damping, right)
+    if rows is not None and columns is not None:
+        left, right = rows @ left, columns @ right
+    return Roots(values=values, right=right, left=left, slope=slope)
+
+
+def _generalised(first: FloatArray, second: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Finite roots of first x = s second x with left vectors (of y^T, not y^H) and right ones."""
+    real, imaginary, beta, left, right, _, info = lapack.dggev(first, second)
+    if info:
+        raise NumericalError(
+            "the reduced model's eigenvalues cannot be computed: its matrices hold values far too large or not finite"
+        )
+    finite = np.abs(beta) > INFINITE * np.hypot(real, imaginary)
+    alpha = real + 1j * imaginary
+    values = alpha[finite] / beta[finite]
+    return (
+        values,
+        unpack_vectors(imaginary, left)[:, finite].conj(),
+        unpack_vectors(imaginary, right)[:, finite],
+    )

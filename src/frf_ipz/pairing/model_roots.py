@@ -1,0 +1,143 @@
+"""Poles and zeros of a reduced model, in the order that pairs refer to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
+
+if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.structure import ReducedModel
+
+REAL = 1e-6  # imaginary part over modulus below which a root is real: rounding of a double root
+UNSTABLE = 1e-4  # real part over modulus above which a zero lies in the right half plane
+MIRRORED = 0.5  # distance of a mirrored zero from its image, over the real part, up to which the two are a quadruple
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelPoles:
+    """Poles of a model and what each FRF sees of them.
+
+    Parameters
+    ----------
+    values : (n,) complex array
+        By ascending modulus, one a conjugate pair, rad/s.
+    amplitudes : (n, n_frfs) complex array
+        Mass-normalised product of the shape at sensor and blow: the receptance's residue times ``2 i |p|``, 1/kg.
+    """
+
+    values: ComplexArray
+    amplitudes: ComplexArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelZeros:
+    """Zeros of one FRF of a model.
+
+    Parameters
+    ----------
+    values : (n,) complex array
+        By ascending modulus, one a conjugate pair or quadruple, rad/s.
+    kind : tuple of str
+        ``complex``, ``real`` or ``quadruple``.
+    slope_sign : (n,) array
+        Sign of the receptance's slope along the frequency axis at the zero.
+    """
+
+    values: ComplexArray
+    kind: tuple[str, ...]
+    slope_sign: FloatArray
+
+
+def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles:
+    """Compute the poles of a model.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    labels : tuple of FrfLabel
+        The measured FRFs.
+
+    Returns
+    -------
+    ModelPoles
+        Signs of sensors and blows are in the amplitudes.
+    """
+    roots = damped_poles(model.mass, model.damping, model.stiffness)
+    chosen = _one_of_each_pair(roots.values)
+    roots = roots.take(chosen)
+    outputs = np.array([model.row(label.output_dof) for label in labels])
+    inputs = np.array([model.row(label.input_dof) for label in labels])
+    residues = (outputs @ roots.right) * (inputs @ roots.left) / roots.slope
+    return ModelPoles(values=roots.values, amplitudes=(residues * 2j * np.abs(roots.values)).T)
+
+
+def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:
+    """Compute the zeros of one FRF of a model.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    label : FrfLabel
+        Which FRF.
+
+    Returns
+    -------
+    ModelZeros
+        The finite ones.
+    """
+    output, force = model.row(label.output_dof), model.row(label.input_dof)
+    roots = damped_zeros(model.mass, model.damping, model.stiffness, output, force)
+    upper = roots.take(np.flatnonzero(roots.values.imag >= -REAL * np.abs(roots.values)))
+    order = np.argsort(np.abs(upper.values), kind="stable")
+    upper = upper.take(order)
+    kinds, keep = _kinds(upper.values)
+    upper = upper.take(np.flatnonzero(keep))
+    return ModelZeros(
+        values=upper.values,
+        kind=tuple(kind for kind, kept in zip(kinds, keep, strict=True) if kept),
+        slope_sign=_slope_sign(model, upper, output, force),
+    )
+
+
+def _one_of_each_pair(values: ComplexArray) -> np.ndarray:
+    """Places of one root a conjugate pair; real ones (rigid-body, overdamped) come in twos as well."""
+    is_real = np.abs(values.imag) <= REAL * np.abs(values)
+    real = np.flatnonzero(is_real)
+    real = real[np.argsort(np.abs(values[real]))][::2]
+    chosen = np.concatenate([np.flatnonzero((values.imag > 0) & ~is_real), real])
+    return np.asarray(chosen[np.argsort(np.abs(values[chosen]), kind="stable")])
+
+
+def _kinds(values: ComplexArray) -> tuple[list[str], BoolArray]:
+    """Kind of every zero of the upper half plane; of a quadruple only the one in the left half plane is kept."""
+    modulus = np.abs(values)
+    kinds = [
+        "real" if abs(value.imag) <= REAL * size else "complex" for value, size in zip(values, modulus, strict=True)
+    ]
+    keep = np.ones(len(values), bool)
+    for place in np.flatnonzero((values.real > UNSTABLE * modulus) & (np.array(kinds) == "complex")):
+        image = -values[place].conj()
+        distance = np.where(keep & (values.real < 0), np.abs(values - image), np.inf)
+        twin = int(np.argmin(distance))
+        if distance[twin] <= MIRRORED * values[place].real:
+            kinds[twin] = "quadruple"
+            keep[place] = False
+    return kinds, keep
+
+
+def _slope_sign(model: ReducedModel, zeros: Roots, output: FloatArray, force: FloatArray) -> FloatArray:
+    """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b: as the zero is simple, H changes sign there."""
+    poles = damped_poles(model.mass, model.damping, model.stiffness)
+    residues = (output @ poles.right) * (force @ poles.left) / poles.slope
+    gap = zeros.values[:, None] - poles.values
+    gap = np.where(gap == 0, np.finfo(float).tiny, gap)
+    slope = -(residues / gap**2).sum(axis=1)
+    return np.asarray(np.sign((1j * slope).real))

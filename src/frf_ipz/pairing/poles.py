@@ -1,0 +1,141 @@
+"""Measured poles against those of the model: by frequency and by what every FRF sees of the mode.
+
+The cost of a pair is a squared distance in standard deviations: of the frequency, after a factor common to all modes
+(a wrong modulus moves them alike), and of the mass-normalised amplitudes in every FRF, after one gain an FRF (its scale
+may not be known). Neither alone is enough: frequencies cannot tell two close modes apart, and shapes at few points
+cannot tell distant ones apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.pairing.matching import Matching, match
+from frf_ipz.pairing.model_roots import ModelPoles
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.modal_fit import ModalFit
+
+FREQUENCY_STD = 0.05  # of the logarithm of a frequency, after the common factor
+COMMON_STD = 0.08  # of the logarithm of the common factor
+COMMON_STEPS = 17  # of the search for it, over three standard deviations to each side
+FREQUENCY_GATE = 0.3  # logarithm beyond which two poles are not the same whatever the shapes say
+AMPLITUDE_STD = 0.4  # of an amplitude, over the mean amplitude in its FRF: shapes change with the stiffness
+ALONE = 9.0  # a pole stays alone rather than three standard deviations off
+MAX_SHAPE = 12.0  # many FRFs must not outvote any frequency
+ROUNDS = 3  # of assigning and working out the gains in turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PolePairing:
+    """Poles and who belongs to whom.
+
+    Parameters
+    ----------
+    matching : Matching
+        Rows are measured poles, columns the model's.
+    costs : (n_measured, n_model) array
+        Of every pair.
+    gains : (n_frfs,) array
+        Measured over computed amplitude of each FRF; the sign is a polarity.
+    """
+
+    matching: Matching
+    costs: FloatArray
+    gains: FloatArray
+
+
+def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
+    """Assign measured poles to those of the model.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+    model : ModelPoles
+        The model's poles.
+
+    Returns
+    -------
+    PolePairing
+        The cheapest assignment over all common factors.
+    """
+    measured = np.log(np.abs(fit.model.poles[: fit.n_modes]))
+    computed = np.log(np.abs(model.values) + np.finfo(float).tiny)
+    amplitudes, noise = measured_amplitudes(fit)
+    shapes = np.zeros((len(measured), len(computed)))
+    band = np.log(2 * np.pi * np.array(fit.band_hz))
+    gains = np.ones(len(fit.labels))
+    for _ in range(ROUNDS):
+        matching, costs = _over_common_factors(measured, computed, shapes, band)
+        gains = _gains(amplitudes, model.amplitudes, noise, matching.partner)
+        shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains)
+    matching, costs = _over_common_factors(measured, computed, shapes, band, margins=True)
+    return PolePairing(matching=matching, costs=costs, gains=gains)
+
+
+def measured_amplitudes(fit: ModalFit) -> tuple[ComplexArray, FloatArray]:
+    """Residues of the fit as mass-normalised amplitudes of the receptance, with their standard deviations.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    amplitudes : (n_modes, n_frfs) complex array
+        1/kg; complex where the modes are.
+    std : (n_modes, n_frfs) array
+        Of the modulus, 1/kg.
+    """
+    poles = fit.model.poles[: fit.n_modes]
+    powers = np.array([label.quantity.power for label in fit.labels])
+    to_amplitude = 2j * np.abs(poles)[:, None] / poles[:, None] ** powers
+    std = np.sqrt(np.trace(fit.residue_covariance, axis1=2, axis2=3))
+    return fit.model.residues[: fit.n_modes] * to_amplitude, std * np.abs(to_amplitude)
+
+
+def _over_common_factors(
+    measured: FloatArray, computed: FloatArray, shapes: FloatArray, band: FloatArray, *, margins: bool = False
+) -> tuple[Matching, FloatArray]:
+    best: tuple[float, Matching, FloatArray] | None = None
+    for offset in COMMON_STD * np.linspace(-3, 3, COMMON_STEPS):
+        gap = measured[:, None] - computed - offset
+        costs = (gap / FREQUENCY_STD) ** 2 + shapes
+        costs[np.abs(measured[:, None] - computed) > FREQUENCY_GATE] = np.inf
+        in_band = (computed + offset > band[0]) & (computed + offset < band[1])
+        found = match(costs, np.full(len(measured), ALONE), np.where(in_band, ALONE, 0.0), margins=margins)
+        total = found.cost + (offset / COMMON_STD) ** 2
+        if best is None or total < best[0]:
+            best = total, found, costs
+    if best is None:  # the search above is never empty
+        raise AssertionError
+    return best[1], best[2]
+
+
+def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:
+    """Least-squares gain of each FRF over the modes paired so far; its sign where that is all that is clear."""
+    rows = np.flatnonzero(partner >= 0)
+    if not len(rows):
+        return np.ones(measured.shape[1])
+    theirs = computed[partner[rows]]
+    weights = 1 / (noise[rows] ** 2 + np.mean(np.abs(measured[rows]) ** 2, axis=0) * AMPLITUDE_STD**2)
+    inner = np.sum(weights * (measured[rows] * theirs.conj()).real, axis=0)
+    sizes = np.sum(weights * np.abs(theirs) ** 2, axis=0)
+    ratio = np.sqrt(np.mean(np.abs(measured[rows]) ** 2, 0) / np.maximum(np.mean(np.abs(theirs) ** 2, 0), 1e-300))
+    gain = inner / np.maximum(sizes, 1e-300)
+    return np.asarray(np.where(np.abs(gain) > ratio / 3, gain, np.copysign(ratio, gain)))
+
+
+def _shape_costs(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, gains: FloatArray) -> FloatArray:
+    """Squared distance of amplitudes, averaged over FRFs of the same information and capped."""
+    scaled = measured / gains
+    size = np.sqrt(np.mean(np.abs(scaled) ** 2, axis=0))
+    spread = (AMPLITUDE_STD * size) ** 2 + (noise / gains) ** 2
+    distance = np.abs(scaled[:, None, :] - computed[None]) ** 2 / spread[:, None, :]
+    return np.asarray(np.minimum(distance.mean(axis=2) * np.sqrt(measured.shape[1]), MAX_SHAPE))

@@ -1,0 +1,155 @@
+"""Measured zeros of one FRF against those of the model, on a frequency axis on which the paired poles agree.
+
+A stiffness that is off moves poles and zeros alike, so frequencies are first mapped by the poles; what is left tells
+zeros apart. The slope of the FRF at a zero must have the same sign: two zeros without a pole between them differ in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.pairing.matching import Matching, match
+from frf_ipz.rational import PoleResidueModel
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.model_roots import ModelZeros
+
+ZERO_STD = 0.04  # of the logarithm of a zero's frequency, after the mapping by poles
+ZERO_GATE = 0.25  # logarithm beyond which two zeros are not the same
+WRONG_SLOPE = 6.0  # cost of a slope of the other sign
+ALONE = 9.0  # a zero stays alone rather than three standard deviations off
+LONELY = 3.0  # a zero of the model in the band need not show: damping may hide it
+PAIRABLE = ("complex", "quadruple")  # a real zero is never a target: no measured line shows where it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ZeroPairing:
+    """Zeros of one FRF and who belongs to whom.
+
+    Parameters
+    ----------
+    measured : (n,) int array
+        Places of the FRF's zeros among all that were measured.
+    matching : Matching
+        Rows are those, columns the model's zeros.
+    costs : (n, m) array
+        Of every pair.
+    """
+
+    measured: IntArray
+    matching: Matching
+    costs: FloatArray
+
+
+def pair_zeros(
+    fit: ModalFit, frf: int, model: ModelZeros, poles: tuple[FloatArray, FloatArray], polarity: float
+) -> ZeroPairing:
+    """Assign the measured zeros of one FRF to those of the model.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+    frf : int
+        Which FRF.
+    model : ModelZeros
+        The model's zeros of that FRF.
+    poles : pair of (k,) arrays
+        Logarithms of the moduli of the paired poles, measured and computed.
+    polarity : float
+        Sign of the measured FRF against the model's.
+
+    Returns
+    -------
+    ZeroPairing
+        Kinds are kept apart.
+    """
+    measured = np.flatnonzero(fit.zeros.frf == frf)
+    values = fit.zeros.values[measured]
+    gap = map_frequency(np.log(np.abs(values)), *poles)[:, None] - np.log(np.abs(model.values))
+    costs = (gap / ZERO_STD) ** 2
+    slopes = measured_slope_sign(fit.model, frf, fit.labels[frf].quantity.power, values) * np.sign(polarity)
+    costs += WRONG_SLOPE * (slopes[:, None] * model.slope_sign < 0)
+    kinds = np.array([fit.zeros.kind[place] for place in measured], dtype=object)
+    may = np.isin(kinds.astype(str), PAIRABLE) & fit.zeros.identifiable[measured]
+    same = kinds[:, None] == np.array(model.kind, dtype=object)
+    costs = np.where(may[:, None] & same & (np.abs(gap) < ZERO_GATE), costs, np.inf)
+    lonely = np.where(in_band(model.values, fit.band_hz, poles), LONELY, 0.0)
+    return ZeroPairing(measured=measured, matching=match(costs, np.full(len(values), ALONE), lonely), costs=costs)
+
+
+def map_frequency(logs: FloatArray, measured: FloatArray, computed: FloatArray) -> FloatArray:
+    """Move frequencies as the paired poles between them moved.
+
+    Parameters
+    ----------
+    logs : (n,) array
+        Logarithms of measured frequencies.
+    measured, computed : (k,) array
+        Logarithms of the paired poles.
+
+    Returns
+    -------
+    (n,) array
+        Logarithms on the model's axis; beyond the outermost poles the shift is theirs.
+    """
+    if not len(measured):
+        return logs
+    order = np.argsort(measured)
+    return np.asarray(logs + np.interp(logs, measured[order], (computed - measured)[order]))
+
+
+def in_band(values: ComplexArray, band_hz: tuple[float, float], poles: tuple[FloatArray, FloatArray]) -> np.ndarray:
+    """Tell which of the model's roots a measurement in the band would show.
+
+    Parameters
+    ----------
+    values : (n,) complex array
+        The model's roots, rad/s.
+    band_hz : pair of float
+        The band that was fitted, Hz.
+    poles : pair of (k,) arrays
+        Logarithms of the paired poles, measured and computed.
+
+    Returns
+    -------
+    (n,) bool array
+        True inside.
+    """
+    edges = map_frequency(np.log(2 * np.pi * np.array(band_hz)), *poles)
+    logs = np.log(np.abs(values) + np.finfo(float).tiny)
+    return np.asarray((logs > edges[0]) & (logs < edges[1]))
+
+
+def measured_slope_sign(model: PoleResidueModel, frf: int, power: int, zeros: ComplexArray) -> FloatArray:
+    """Sign of the slope of the fitted receptance along the frequency axis at its zeros.
+
+    Parameters
+    ----------
+    model : PoleResidueModel
+        The fitted model.
+    frf : int
+        Which FRF.
+    power : int
+        Power of s that its quantity has over a receptance.
+    zeros : (n,) complex array
+        rad/s.
+
+    Returns
+    -------
+    (n,) array
+        -1, 0 or 1.
+    """
+    residues = model.residues[:, frf]
+    poles = np.concatenate([model.poles, model.conjugates])
+    residues = np.concatenate([residues, residues[model.poles.imag > 0].conj()])
+    slope = -(residues / (zeros[:, None] - poles) ** 2).sum(axis=1)
+    scaled = zeros / model.scale_rad_s
+    for exponent, coefficient in zip(model.powers, model.coefficients[:, frf], strict=True):
+        slope += coefficient * exponent * scaled ** (exponent - 1) / model.scale_rad_s
+    return np.asarray(np.sign((1j * slope / zeros**power).real))

@@ -1,0 +1,180 @@
+"""The linear Gaussian step of an update: the smallest change that meets the targets as far as they deserve.
+
+With the whitened parameters xi (prior: unit normal), data ``d = G xi + noise`` and the noise covariance R, the mean is
+``G^T (G G^T + R)^-1 d``: the change of least norm for weights that follow from R. How large changes have to be expected
+is not known beforehand; the standard deviations of the prior terms are those of the largest evidence ([MacKay1992],
+doi:10.1162/neco.1992.4.3.415), each with a log-normal prior of its own.
+
+The discrepancy principle decides how closely targets are met: the weighted misfit must not exceed their number, and
+where even that cannot be reached the targets contradict one another (or the model), and their covariance is enlarged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
+
+from frf_ipz.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.updating.parameters import PriorTerm
+
+MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GaussianStep:
+    """Mean and what is needed to draw from the posterior.
+
+    Parameters
+    ----------
+    mean : (k,) array
+        Whitened parameters.
+    gain : (k, n) array
+        ``G^T (G G^T + R)^-1``.
+    misfit : float
+        ``(d - G mean)^T R^-1 (d - G mean)``, to be compared with the number of data.
+    freedom : float
+        Data that the prior leaves free to be met: the trace of ``G gain``.
+    """
+
+    mean: FloatArray
+    gain: FloatArray
+    misfit: float
+    freedom: float
+
+
+def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> GaussianStep:
+    """Mean of the whitened parameters, given linear data.
+
+    Parameters
+    ----------
+    sensitivity : (n, k) array
+        G, by whitened parameters.
+    data : (n,) array
+        d.
+    noise : (n, n) array
+        R, positive definite.
+
+    Returns
+    -------
+    GaussianStep
+        The posterior.
+    """
+    total = sensitivity @ sensitivity.T + noise
+    gain = cho_solve(cho_factor(total), sensitivity).T
+    mean = gain @ data
+    left = data - sensitivity @ mean
+    return GaussianStep(
+        mean=mean,
+        gain=gain,
+        misfit=float(left @ cho_solve(cho_factor(noise), left)),
+        freedom=float(np.einsum("nk,kn->", sensitivity, gain)),
+    )
+
+
+def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float) -> int:
+    """Find the datum that all others and the prior contradict most.
+
+    Parameters
+    ----------
+    sensitivity : (n, k) array
+        G.
+    data : (n,) array
+        d.
+    noise : (n, n) array
+        R.
+    limit : float
+        Standard deviations from what the others predict beyond which a datum is contradicted.
+
+    Returns
+    -------
+    int
+        Its place; -1 where none is beyond the limit.
+    """
+    inverse = np.linalg.inv(sensitivity @ sensitivity.T + noise)
+    distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
+    worst = int(np.argmax(distance))
+    return worst if distance[worst] > limit else -1
+
+
+def draw(
+    step: GaussianStep, sensitivity: FloatArray, noise: FloatArray, rng: np.random.Generator, count: int
+) -> FloatArray:
+    """Draw whitened parameters from the posterior: a draw of the prior, corrected by what its data would have shown.
+
+    Parameters
+    ----------
+    step : GaussianStep
+        The posterior.
+    sensitivity : (n, k) array
+        G.
+    noise : (n, n) array
+        R.
+    rng : Generator
+        Source of randomness.
+    count : int
+        How many.
+
+    Returns
+    -------
+    (count, k) array
+        Draws.
+    """
+    prior = rng.standard_normal((count, sensitivity.shape[1]))
+    errors = rng.standard_normal((count, len(noise))) @ np.linalg.cholesky(noise).T
+    return np.asarray(step.mean + prior - (prior @ sensitivity.T + errors) @ step.gain.T)
+
+
+def likely_scales(
+    parts: Sequence[FloatArray], terms: Sequence[PriorTerm], data: FloatArray, noise: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Find the standard deviations of the prior terms under which the data are most likely.
+
+    Parameters
+    ----------
+    parts : sequence of (n, k_i) arrays
+        Sensitivity of the data to each term's unit normal numbers, for a standard deviation of 1.
+    terms : sequence of PriorTerm
+        The terms, with what is believed of their standard deviations beforehand.
+    data : (n,) array
+        d.
+    noise : (n, n) array
+        R.
+    start : (t,) array
+        Standard deviations to start from.
+
+    Returns
+    -------
+    (t,) array
+        Standard deviations; those without doubt as they were.
+    """
+    free = np.array([term.doubt > 0 for term in terms])
+    if not free.any() or not len(data):
+        return start
+    covariances = np.array([part @ part.T for part in parts])
+    believed = np.log([term.std for term in terms])
+    doubt = np.array([term.doubt for term in terms])
+
+    def cost(logs: FloatArray) -> tuple[float, FloatArray]:
+        everything = np.log(start)
+        everything[free] = logs
+        weights = np.exp(2 * everything)
+        factor, _ = cho_factor(np.tensordot(weights, covariances, 1) + noise, lower=True)
+        solved = cho_solve((factor, True), data)
+        inverse = cho_solve((factor, True), np.eye(len(data)))
+        pull = (logs - believed[free]) / doubt[free]
+        value = 0.5 * data @ solved + np.log(np.diagonal(factor)).sum() + 0.5 * pull @ pull
+        traces = np.einsum("tnm,nm->t", covariances, inverse - np.outer(solved, solved))
+        return float(value), (weights * traces)[free] + pull / doubt[free]
+
+    found = minimize(cost, np.log(start)[free], jac=True, method="L-BFGS-B", options={"maxiter": MAX_SCALE_STEPS})
+    scales = start.copy()
+    scales[free] = np.exp(found.x)
+    return scales

@@ -1,0 +1,162 @@
+"""``minimal-change``: the smallest change of the model, in a stated metric, that explains poles and zeros of all FRFs.
+
+The metric is that of a prior over what may be wrong in a model (`updating.parameters`): the change is the most likely
+one. First the stiffness (and, when asked, the mass) brings the moduli of poles and zeros to their targets, then the
+damping their real parts. Targets are weighted by the inverse of their covariance, so that noisy ones are met only as
+far as they deserve; targets that all others contradict are left out, and said. Matrices stay symmetric and positive
+semi-definite, rigid-body modes stay. What targets and prior leave open is drawn from: the ensemble.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.updating.ensemble import Posterior, draw_ensemble
+from frf_ipz.updating.gauss_newton import PhaseResult, iterate
+from frf_ipz.updating.minimal_damping import DampingPhase, damping_phase
+from frf_ipz.updating.minimal_stiffness import StiffnessPhase, log_moduli
+from frf_ipz.updating.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
+from frf_ipz.updating.parameters import generic_basis
+from frf_ipz.updating.suspects import contradicted, unmet_targets
+from frf_ipz.updating.tracking import WantedRoots
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
+
+if TYPE_CHECKING:
+    from frf_ipz.progress import Progress
+    from frf_ipz.updating.options import UpdateOptions
+    from frf_ipz.updating.problem import UpdateProblem
+
+MODULUS_FLOOR = 1e-6  # relative; below it a reduced model says nothing about a real structure
+LEFT_OUT = 1.0  # relative standard deviation given to a target that is left out
+SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness makes up for what damping does to it
+
+
+def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -> UpdatedModel:
+    """Update a model by the smallest change.
+
+    Parameters
+    ----------
+    problem : UpdateProblem
+        Model, targets, parameters.
+    options : UpdateOptions
+        What the user has chosen.
+    progress : Progress
+        Told how far the work is.
+
+    Returns
+    -------
+    UpdatedModel
+        With an ensemble of what remains open.
+    """
+    if not len(problem.values):
+        return nothing_to_do(problem.model, "minimal-change")
+    frame = frame_of(problem.model)
+    phase = _stiffness_phase(problem, frame)
+    start = phase.nominal_roots(problem.computed)
+    left_out = contradicted(phase, start)
+    phase = replace(
+        phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.wanted.frf)), left_out) * LEFT_OUT**2)
+    )
+    result = iterate(phase, np.zeros(len(phase.basis.names)), start, max_iterations=options.max_iterations)
+    progress(0.5, "damping")
+    inner = modal_frame(*phase.matrices(result.theta))
+    damping = _damping(problem, frame, inner, phase, result)
+    damped = iterate(damping, damping.start(), damping.first_roots(), max_iterations=None)
+    history = [("stiffness", result), ("damping", damped)]
+    shift = np.log(np.abs(damped.tracked.values(len(phase.wanted.frf)))) - log_moduli(
+        result.tracked, len(phase.wanted.frf)
+    )
+    if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(phase.noise))):
+        phase = replace(phase, targets=phase.targets - shift, noise=phase.noise + np.diag((shift / 2) ** 2))
+        result = iterate(phase, result.theta, result.tracked, max_iterations=options.max_iterations)
+        history.append(("stiffness with damping", result))
+    posterior = Posterior(
+        frame=frame,
+        stiffness=phase,
+        stiffness_result=result,
+        inner=inner,
+        damping=damping,
+        damping_result=damped,
+    )
+    progress(0.8, "ensemble")
+    return _updated(problem, options, posterior, history, left_out)
+
+
+def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhase:
+    basis = generic_basis(problem.model) if problem.basis is None else problem.basis
+    size = np.abs(problem.values)
+    # d ln|s| = (Re s d Re s + Im s d Im s) / |s|^2
+    gradient = np.stack([problem.values.real, problem.values.imag], axis=1) / size[:, None] ** 2
+    return StiffnessPhase(
+        eigenvalues=frame.eigenvalues,
+        basis=basis_inside(frame, basis),
+        wanted=WantedRoots(frf=problem.frf, rows=_rows(problem, frame)),
+        targets=np.log(size),
+        noise=_projected(problem.covariance, gradient) + MODULUS_FLOOR**2 * np.eye(len(size)),
+        changes_mass=bool(np.any(basis.mass)),
+    )
+
+
+def _damping(
+    problem: UpdateProblem, frame: ModalFrame, inner: ModalFrame, phase: StiffnessPhase, result: PhaseResult
+) -> DampingPhase:
+    rows = phase.wanted.rows.items()
+    real_part = np.tile([-1.0, 0.0], (len(problem.values), 1))
+    return damping_phase(
+        phase.basis,
+        inner,
+        WantedRoots(
+            frf=problem.frf, rows={number: (out @ inner.shapes, force @ inner.shapes) for number, (out, force) in rows}
+        ),
+        inner.inside(frame.inside(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
+        problem.values,
+        _projected(problem.covariance, real_part),
+        np.exp(log_moduli(result.tracked, len(problem.values))),
+    )
+
+
+def _damping_by_stiffness(phase: StiffnessPhase, theta: FloatArray) -> FloatArray:
+    """Damping of parameters that the stiffness has fixed: a joint that is both a spring and a damper."""
+    fixed = np.any(phase.basis.stiffness != 0, axis=(1, 2)) | np.any(phase.basis.mass != 0, axis=(1, 2))
+    return np.asarray(np.tensordot(phase.basis.amounts(theta) * fixed, phase.basis.damping, 1))
+
+
+def _rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[FloatArray, FloatArray]]:
+    pairs = {number: problem.rows(number) for number in problem.frfs}
+    return {number: (output @ frame.shapes, force @ frame.shapes) for number, (output, force) in pairs.items()}
+
+
+def _projected(covariance: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Covariance of one number a target, each with a gradient by its real and imaginary part."""
+    count = len(gradient)
+    blocks = covariance.reshape(count, 2, count, 2)
+    return np.asarray(np.einsum("ia,iajb,jb->ij", gradient, blocks, gradient))
+
+
+def _updated(
+    problem: UpdateProblem,
+    options: UpdateOptions,
+    posterior: Posterior,
+    history: list[tuple[str, PhaseResult]],
+    left_out: IntArray,
+) -> UpdatedModel:
+    mass, damping, stiffness = posterior.model()
+    model = replace(problem.model, mass=mass, damping=damping, stiffness=stiffness)
+    converged = posterior.stiffness_result.converged and posterior.damping_result.converged
+    tracked = posterior.damping_result.tracked.values(len(problem.values))
+    return UpdatedModel(
+        model=model,
+        nominal=problem.model,
+        method="minimal-change",
+        status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
+        history=pd.DataFrame([{"phase": name, **row} for name, result in history for row in result.rows]),
+        before=problem.computed,
+        after=tracked,
+        ensemble=draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble),
+        unmet=unmet_targets(posterior.stiffness, posterior.stiffness_result, problem.names, left_out),
+    )

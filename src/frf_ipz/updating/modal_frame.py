@@ -1,0 +1,122 @@
+"""Mass-normalised modal coordinates of the nominal model: where changes of any model are of one size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.numerics.pencils import undamped_poles
+
+if TYPE_CHECKING:
+    from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.parameters import ParameterBasis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalFrame:
+    """Modes of a model as coordinates.
+
+    Parameters
+    ----------
+    eigenvalues : (r,) array
+        Squared natural frequencies, (rad/s)^2.
+    shapes : (r, r) array
+        Mass-normalised modes at the model's own coordinates.
+    inverse : (r, r) array
+        Its inverse.
+    """
+
+    eigenvalues: FloatArray
+    shapes: FloatArray
+    inverse: FloatArray
+
+    def inside(self, matrix: FloatArray) -> FloatArray:
+        """Turn matrices of the model into modal ones.
+
+        Parameters
+        ----------
+        matrix : (..., r, r) array
+            In the model's coordinates.
+
+        Returns
+        -------
+        (..., r, r) array
+            In modal ones.
+        """
+        return np.asarray(self.shapes.T @ matrix @ self.shapes)
+
+    def outside(self, matrix: FloatArray) -> FloatArray:
+        """Turn symmetric modal matrices into those of the model.
+
+        Parameters
+        ----------
+        matrix : (..., r, r) array
+            In modal coordinates.
+
+        Returns
+        -------
+        (..., r, r) array
+            In the model's, symmetric to the last bit.
+        """
+        result = self.inverse.T @ matrix @ self.inverse
+        return np.asarray((result + np.swapaxes(result, -1, -2)) / 2)
+
+
+def modal_frame(mass: FloatArray, stiffness: FloatArray) -> ModalFrame:
+    """Compute the frame of a symmetric model.
+
+    Parameters
+    ----------
+    mass, stiffness : (r, r) array
+        Its matrices.
+
+    Returns
+    -------
+    ModalFrame
+        Modes by ascending frequency.
+    """
+    poles = undamped_poles(mass, stiffness)
+    shapes = poles.right.real
+    return ModalFrame(eigenvalues=np.maximum(poles.values.real, 0.0), shapes=shapes, inverse=shapes.T @ mass)
+
+
+def frame_of(model: ReducedModel) -> ModalFrame:
+    """Compute the frame of a reduced model.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+
+    Returns
+    -------
+    ModalFrame
+        Its modes.
+    """
+    return modal_frame(model.mass, model.stiffness)
+
+
+def basis_inside(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
+    """Express parameters in modal coordinates.
+
+    Parameters
+    ----------
+    frame : ModalFrame
+        The coordinates.
+    basis : ParameterBasis
+        Parameters of the model.
+
+    Returns
+    -------
+    ParameterBasis
+        The same parameters.
+    """
+    return replace(
+        basis,
+        mass=frame.inside(basis.mass),
+        damping=frame.inside(basis.damping),
+        stiffness=frame.inside(basis.stiffness),
+    )

@@ -1,0 +1,253 @@
+"""What an update may change, and how likely each change is: matrices with a Gaussian prior.
+
+The metric of a minimal change is the prior's: a change is small where it is likely. Three kinds of parameters are
+built here, and a diagnosis may bring its own.
+
+- Parts of the FE model (elements, springs, groups): the logarithm of a factor on each part's stiffness. A prior term
+  for all parts alike stands for a wrong modulus or thickness, terms whose correlation falls off with the distance for
+  stretches that are softer or stiffer than modelled.
+- Every symmetric change of the reduced stiffness, relative to ``omega_i omega_j`` in mass-normalised modal
+  coordinates: what the parts cannot express, and all there is where a model has no parts.
+- Factors on the masses of the parts, where the user lets the mass change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from frf_ipz.arrays import BoolArray, FloatArray, require_shape
+from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.updating.regions import Region, reduced_regions
+
+if TYPE_CHECKING:
+    from frf_ipz.structure import ReducedModel, StructuralModel
+
+GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a modulus or a thickness that is off
+STRETCH_STD = 0.05  # of each term with a correlation length
+STRETCH_LENGTHS = (0.05, 0.2)  # correlation lengths, as parts of the structure's extent
+REST_STD = 0.005  # of a relative change that no part expresses, beside parts
+FREE_STD = 0.05  # of the same where the model has no parts
+MASS_STD = 0.02  # masses are known better than stiffness
+DOUBT = 1.0  # standard deviation of the logarithm of each of these: the data may ask for larger or smaller ones
+SAME_PLACE = 1e-9  # two parts at one place differ by this much of their variance, so that it has a root
+MAX_FREE_MODES = 24  # a change among higher modes hardly moves what was measured
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PriorTerm:
+    """One independent contribution to the parameters: `std` times `root` times a vector of unit normal numbers.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    root : (p, k) array
+        Its covariance is ``std**2 root root^T``.
+    std : float
+        Standard deviation before the data are seen.
+    doubt : float
+        Standard deviation of the logarithm of `std`; 0 fixes it.
+    """
+
+    name: str
+    root: FloatArray
+    std: float
+    doubt: float = DOUBT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParameterBasis:
+    """Parameters of an update with their prior.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One a parameter.
+    mass, damping, stiffness : (p, r, r) array
+        Change of the reduced matrices for one unit of each parameter.
+    logarithmic : (p,) bool array
+        True where the parameter is the logarithm of a factor: its contribution is then ``exp(theta) - 1`` times the
+        matrices, else theta times.
+    terms : tuple of PriorTerm
+        Their sum is the prior; its mean is 0.
+    regions : tuple of Region
+        Where parameters that belong to a place sit: those of the first `len(regions)` parameters.
+
+    Raises
+    ------
+    ShapeError
+        If shapes disagree.
+    """
+
+    names: tuple[str, ...]
+    mass: FloatArray
+    damping: FloatArray
+    stiffness: FloatArray
+    logarithmic: BoolArray
+    terms: tuple[PriorTerm, ...]
+    regions: tuple[Region, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        for name in ("mass", "damping", "stiffness"):
+            require_shape(f"the parameters' {name}", getattr(self, name), (count, None, None))
+        require_shape("the marks of logarithmic parameters", self.logarithmic, (count,))
+        for term in self.terms:
+            require_shape(f"the prior term '{term.name}'", term.root, (count, None))
+
+    def amounts(self, theta: FloatArray) -> FloatArray:
+        """How much of each matrix is added.
+
+        Parameters
+        ----------
+        theta : (..., p) array
+            Parameters.
+
+        Returns
+        -------
+        (..., p) array
+            Factors on the matrices.
+        """
+        return np.where(self.logarithmic, np.expm1(np.where(self.logarithmic, theta, 0.0)), theta)
+
+    def slopes(self, theta: FloatArray) -> FloatArray:
+        """Give the derivative of `amounts`.
+
+        Parameters
+        ----------
+        theta : (p,) array
+            Parameters.
+
+        Returns
+        -------
+        (p,) array
+            Derivatives.
+        """
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, theta, 0.0)), 1.0)
+
+
+def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = True) -> ParameterBasis:
+    """All symmetric changes of the reduced stiffness, relative in mass-normalised modal coordinates.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The nominal model.
+    std : float
+        Of an entry of the change relative to ``omega_i omega_j``; of one on the diagonal it is larger by sqrt 2, so
+        that the prior is the same in all rotated coordinates.
+    common : bool
+        With a term for a factor on the whole stiffness.
+
+    Returns
+    -------
+    ParameterBasis
+        One parameter an entry; rigid-body modes stay, since a change relative to nothing is nothing.
+    """
+    poles = undamped_poles(model.mass, model.stiffness)
+    omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:MAX_FREE_MODES]
+    shares = omega * (model.mass @ poles.right.real)[:, :MAX_FREE_MODES]
+    first, second = np.triu_indices(len(omega))
+    products = np.einsum("ak,bk->kab", shares[:, first], shares[:, second])
+    diagonal = first == second
+    stiffness = np.where(diagonal[:, None, None], products, products + products.transpose(0, 2, 1))
+    roots = [
+        PriorTerm(name="any change of the stiffness", root=np.diag(np.where(diagonal, np.sqrt(2.0), 1.0)), std=std)
+    ]
+    if common:
+        roots.insert(
+            0, PriorTerm(name="a factor on the stiffness", root=np.asarray(diagonal[:, None], float), std=GLOBAL_STD)
+        )
+    return ParameterBasis(
+        names=tuple(f"stiffness {i + 1}-{j + 1}" for i, j in zip(first, second, strict=True)),
+        mass=np.zeros_like(stiffness),
+        damping=np.zeros_like(stiffness),
+        stiffness=stiffness,
+        logarithmic=np.zeros(len(first), bool),
+        terms=tuple(roots),
+    )
+
+
+def structural_basis(full: StructuralModel, model: ReducedModel, *, mass: bool = False) -> ParameterBasis:
+    """Factors on the parts of the FE model, and what they cannot express.
+
+    Parameters
+    ----------
+    full : StructuralModel
+        The FE model.
+    model : ReducedModel
+        What it was reduced to.
+    mass : bool
+        Let the masses change too.
+
+    Returns
+    -------
+    ParameterBasis
+        The generic one where the model has no parts, or only one.
+    """
+    regions = reduced_regions(full, model)
+    if len(regions) < 2:
+        return generic_basis(model)
+    parts = _part_basis(regions, stiffness=True)
+    if mass:
+        parts = join(parts, _part_basis(regions, stiffness=False))
+    return join(parts, generic_basis(model, std=REST_STD, common=False))
+
+
+def join(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
+    """Put two sets of parameters together; their priors are independent.
+
+    Parameters
+    ----------
+    first, second : ParameterBasis
+        Parameters of the same reduced model.
+
+    Returns
+    -------
+    ParameterBasis
+        The parameters of the first, then those of the second.
+    """
+    above, below = len(first.names), len(second.names)
+    terms = [replace(term, root=np.pad(term.root, ((0, below), (0, 0)))) for term in first.terms]
+    terms += [replace(term, root=np.pad(term.root, ((above, 0), (0, 0)))) for term in second.terms]
+    return ParameterBasis(
+        names=first.names + second.names,
+        mass=np.concatenate([first.mass, second.mass]),
+        damping=np.concatenate([first.damping, second.damping]),
+        stiffness=np.concatenate([first.stiffness, second.stiffness]),
+        logarithmic=np.concatenate([first.logarithmic, second.logarithmic]),
+        terms=tuple(terms),
+        regions=first.regions,
+    )
+
+
+def _part_basis(regions: tuple[Region, ...], *, stiffness: bool) -> ParameterBasis:
+    matrices = np.array([region.stiffness if stiffness else region.mass for region in regions])
+    nothing = np.zeros_like(matrices)
+    scale = 1.0 if stiffness else MASS_STD / GLOBAL_STD
+    return ParameterBasis(
+        names=tuple(f"{'stiffness' if stiffness else 'mass'} of {region.name}" for region in regions),
+        mass=nothing if stiffness else matrices,
+        damping=nothing,
+        stiffness=matrices if stiffness else nothing,
+        logarithmic=np.ones(len(regions), bool),
+        terms=_distance_terms(regions, scale, "stiffness" if stiffness else "mass"),
+        regions=regions if stiffness else (),
+    )
+
+
+def _distance_terms(regions: tuple[Region, ...], scale: float, what: str) -> tuple[PriorTerm, ...]:
+    """One factor for all, and fields whose correlation falls off as exp(-distance / length): they may jump."""
+    places = np.array([region.coordinates_m for region in regions])
+    extent = max(float(np.ptp(places, axis=0).max()), np.finfo(float).tiny)
+    distance = cdist(places, places) / extent
+    terms = [PriorTerm(name=f"a factor on the {what}", root=np.ones((len(regions), 1)), std=GLOBAL_STD * scale)]
+    for length in STRETCH_LENGTHS:
+        near = np.exp(-distance / length) + SAME_PLACE * np.eye(len(regions))
+        root = np.asarray(np.linalg.cholesky(near), np.float64)
+        terms.append(PriorTerm(name=f"{what} along {length:.0%} of the structure", root=root, std=STRETCH_STD * scale))
+    return tuple(terms)

@@ -1,0 +1,109 @@
+"""What every updating method is given: matrices, targets with their covariance, and parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.updating.parameters import ParameterBasis
+
+if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.structure import ReducedModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UpdateProblem:
+    """A reduced model, and the poles and zeros that it is to be brought to.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The nominal model.
+    labels : tuple of FrfLabel
+        The measured FRFs.
+    values, computed : (n,) complex array
+        Measured and nominal poles and zeros, imaginary part >= 0, rad/s; poles first.
+    covariance : (2 n, 2 n) array
+        Of the real and the imaginary part of each measured one in turn, (rad/s)^2.
+    frf : (n,) int array
+        Which FRF a zero belongs to; -1 for poles.
+    names : tuple of str
+        Each target in words.
+    basis : ParameterBasis, optional
+        Parameters chosen by a diagnosis, or those of the FE model's parts; None for the method's own generic ones.
+    """
+
+    model: ReducedModel
+    labels: tuple[FrfLabel, ...]
+    values: ComplexArray
+    computed: ComplexArray
+    covariance: FloatArray
+    frf: IntArray
+    names: tuple[str, ...]
+    basis: ParameterBasis | None = None
+
+    @property
+    def frfs(self) -> tuple[int, ...]:
+        """The FRFs that have zeros among the targets."""
+        return tuple(int(number) for number in np.unique(self.frf[self.frf >= 0]))
+
+    def rows(self, frf: int) -> tuple[FloatArray, FloatArray]:
+        """Output and input row of an FRF, each (r,).
+
+        Parameters
+        ----------
+        frf : int
+            Its number.
+
+        Returns
+        -------
+        tuple of (r,) arrays
+            Motion of the sensor's and of the struck DOF for unit motions of the retained ones.
+        """
+        label = self.labels[frf]
+        return self.model.row(label.output_dof), self.model.row(label.input_dof)
+
+
+def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: ParameterBasis | None) -> UpdateProblem:
+    """Collect the targets of an update.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The nominal model.
+    fit : ModalFit
+        Poles and zeros as measured, with their covariance.
+    pairs : Pairs
+        Who belongs to whom.
+    basis : ParameterBasis, optional
+        Parameters to use.
+
+    Returns
+    -------
+    UpdateProblem
+        The paired poles and zeros, in the order of `Pairs.targets`.
+    """
+    targets = pairs.targets
+    place = np.array([pair.measured + (fit.n_modes if pair.kind == "zero" else 0) for pair in targets], int)
+    parts = (2 * place[:, None] + np.arange(2)).ravel()
+    return UpdateProblem(
+        model=model,
+        labels=fit.labels,
+        values=np.array([pair.measured_value for pair in targets], complex),
+        computed=np.array([pair.computed_value for pair in targets], complex),
+        covariance=fit.covariance[np.ix_(parts, parts)],
+        frf=np.array([pair.frf for pair in targets], int),
+        names=tuple(_name(pair.kind, pair.frf, pair.measured_value, fit) for pair in targets),
+        basis=basis,
+    )
+
+
+def _name(kind: str, frf: int, value: complex, fit: ModalFit) -> str:
+    where = f" of {fit.labels[frf]}" if kind == "zero" else ""
+    return f"{kind} at {abs(value) / (2 * np.pi):.6g} Hz{where}"

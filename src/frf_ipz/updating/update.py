@@ -1,0 +1,105 @@
+"""Updating: the reduced model brought to the measured poles and zeros, by one of the methods in `updating.methods`.
+
+Sits between pairing and prediction. A method is a module that offers
+``update(problem, options, progress) -> UpdatedModel``; it is found by its name.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from importlib import import_module
+from typing import TYPE_CHECKING, Protocol, cast
+
+from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.progress import silent
+from frf_ipz.updating import methods
+from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.problem import UpdateProblem, make_problem
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.progress import Progress
+    from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.parameters import ParameterBasis
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+
+class Method(Protocol):
+    """What a module in `updating.methods` offers."""
+
+    def update(self, problem: UpdateProblem, options: UpdateOptions, progress: Progress) -> UpdatedModel:
+        """Update a model.
+
+        Parameters
+        ----------
+        problem : UpdateProblem
+            Model, targets, parameters.
+        options : UpdateOptions
+            What the user has chosen.
+        progress : Progress
+            Told how far the work is.
+
+        Returns
+        -------
+        UpdatedModel
+            The result.
+        """
+
+
+def update_model(
+    model: ReducedModel,
+    fit: ModalFit,
+    pairs: Pairs,
+    options: UpdateOptions | None = None,
+    *,
+    basis: ParameterBasis | None = None,
+    progress: Progress = silent,
+) -> UpdatedModel:
+    """Bring a reduced model to the measured poles and zeros.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The nominal model.
+    fit : ModalFit
+        Poles and zeros as measured, with their covariance.
+    pairs : Pairs
+        Who belongs to whom; only what is paired becomes a target.
+    options : UpdateOptions, optional
+        Method and its settings.
+    basis : ParameterBasis, optional
+        What may change, and how likely: the parts of the FE model (`updating.parameters.structural_basis`) or what a
+        diagnosis has chosen. Without it the method uses its own generic parameters.
+    progress : Progress
+        Told how far the work is.
+
+    Returns
+    -------
+    UpdatedModel
+        The updated model, how it was reached and what remains open; look at `status`.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, or the method cannot work on this model.
+    NumericalError
+        If the matrices of the model cannot be worked with.
+    """
+    chosen = options or UpdateOptions()
+    known = method_names()
+    if chosen.method not in known:
+        raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, known)}")
+    module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
+    return cast("Method", module).update(make_problem(model, fit, pairs, basis), chosen, progress)
+
+
+def method_names() -> tuple[str, ...]:
+    """Names of the methods that are there.
+
+    Returns
+    -------
+    tuple of str
+        As [update] method has them.
+    """
+    return tuple(sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(methods.__path__)))
