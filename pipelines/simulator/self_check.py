@@ -32,7 +32,7 @@ from simulator.structures.reality import hang
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-SIGMA = 6.0  # decay of the exponential window over a record, for estimates from records
+SIGMA = 12.0  # decay of the exponential window over a record, for estimates from records: what is cut off is e^-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

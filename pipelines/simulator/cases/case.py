@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from simulator.cases.campaign import Drive, draw_drives, draw_noise, store, swing, true_records
 from simulator.cases.detectability import Lines, change, four, level_change, make_lines
 from simulator.cases.files import write_model, write_recording, write_test
+from simulator.cases.nuisance import make_ruler
 from simulator.cases.scatter import Scatter, draw_scatter, no_scatter
 from simulator.cases.set_up import MARGIN, SetUp, draw_set_up, moving_nodes
 from simulator.cases.specimens import KINDS, Specimen, draw_specimen
+from simulator.cases.substitutes import compare
 from simulator.cases.truth import GENERATOR, average_frf, describe, point_frfs, visibility
 from simulator.cases.world import World, make_world
 from simulator.effects.catalogue import draw_effects, kinds_for, needs_levels
@@ -27,6 +29,7 @@ from simulator.structures.nominal import NominalModel
 FloatArray = NDArray[np.float64]
 
 ATTEMPTS = 60
+WEIGHTS = {"frame": 2.5, "grid": 2.0, "plate": 1.5, "stepped": 1.5}  # of the kinds of specimens; 1 for all others
 MOST_COARSE = 1.5e-4  # error of a nominal frequency in band: a model that a user would trust
 LEAST_RATIO = 3.0  # of the change of the FRFs over their noise, RMS: below, nobody could see the effect
 LEAST_LEVEL_CHANGE = 0.01  # of responses to blows of different levels: less is hidden by the noise of a weak blow
@@ -39,10 +42,6 @@ class Case:
 
     Parameters
     ----------
-    seed, attempt : int
-        What it was drawn from.
-    asked : str
-        What was asked for: ``null``, the name of an effect, ``unknown:KIND``, ``pair``.
     world, base, ideal : World
         With the effects; without them; without them and without scatter.
     nominal : NominalModel
@@ -59,9 +58,6 @@ class Case:
         True FRFs at the points of interest, long form.
     """
 
-    seed: int
-    attempt: int
-    asked: str
     world: World
     base: World
     ideal: World
@@ -110,7 +106,7 @@ class _Ready:
     bench: Bench
 
 
-def make_case(seed: int, effect: str = "null", *, structure: str | None = None) -> Case:
+def make_case(seed: int, effect: str = "null", *, structure: str | None = None, analyse: bool = True) -> Case:
     """Make a blind case.
 
     Parameters
@@ -121,6 +117,8 @@ def make_case(seed: int, effect: str = "null", *, structure: str | None = None) 
         ``null``, the name of an effect of the contract, ``unknown`` or ``unknown:KIND``, ``pair`` or ``pair:A+B``.
     structure : str, optional
         One of the kinds of specimens; drawn among those that can have the effect.
+    analyse : bool
+        Measure the evidence for linear effects and look for others that explain the data as well.
 
     Returns
     -------
@@ -135,13 +133,16 @@ def make_case(seed: int, effect: str = "null", *, structure: str | None = None) 
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([seed, attempt])
         wanted, kinds = kinds_for(rng, effect, KINDS)
-        ready = _prepare(rng, structure or str(rng.choice(kinds)), wanted)
+        weights = np.array([WEIGHTS.get(kind, 1.0) for kind in kinds])
+        ready = _prepare(rng, structure or str(rng.choice(kinds, p=weights / weights.sum())), wanted)
         if ready is None:
             continue
         effects = draw_effects(rng, wanted, ready.bench)
         if effects is None:
             continue
-        case = _finish(rng, seed, attempt, effect, ready, effects)
+        case = _finish(
+            rng, ready, effects, head={"seed": seed, "attempt": attempt, "effect_asked": effect}, analyse=analyse
+        )
         if case is not None:
             return case
     raise RuntimeError(f"no specimen was found for the effect '{effect}' with seed {seed} in {ATTEMPTS} attempts")
@@ -191,7 +192,7 @@ def _prepare(rng: np.random.Generator, kind: str, wanted: tuple[str, ...]) -> _R
 
 
 def _finish(
-    rng: np.random.Generator, seed: int, attempt: int, asked: str, ready: _Ready, effects: tuple[Effect, ...]
+    rng: np.random.Generator, ready: _Ready, effects: tuple[Effect, ...], *, head: dict[str, Any], analyse: bool
 ) -> Case | None:
     """Simulate the test with the effects; None where nobody could see them, or where the structure is not stable."""
     world = make_world(ready.specimen, ready.set_up, ready.scatter, effects)
@@ -210,14 +211,13 @@ def _finish(
         if visible["level_ratio_rms"] < LEAST_RATIO or visible["level_change"] < LEAST_LEVEL_CHANGE:
             return None
     stored, full_scale = store(rng, signals, ready.noise, ready.set_up.bits)
-    truth = {"generator": GENERATOR, "seed": seed, "attempt": attempt, "effect_asked": asked}
+    truth = {"generator": GENERATOR} | head
     truth |= describe(ready.ideal, world, ready.nominal, ready.drives, ready.noise)
+    if analyse and not _depends_on_blow(effects):
+        truth |= _rivals(ready, world, visible)
     truth["noise"]["full_scale"] = [four(value) for value in full_scale]
     truth["detectability"] = visible | {"left_at_end": four(left)}
     return Case(
-        seed=seed,
-        attempt=attempt,
-        asked=asked,
         world=world,
         base=ready.base,
         ideal=ready.ideal,
@@ -228,6 +228,27 @@ def _finish(
         truth=truth,
         points=point_frfs(world, ready.drives, signals, points),
     )
+
+
+def _rivals(ready: _Ready, world: World, visible: dict[str, Any]) -> dict[str, Any]:
+    """Measure the evidence for each effect, and find what may explain a single one as well; adds to `visible`."""
+    if not world.effects:
+        return {}
+    ruler = make_ruler(world, ready.lines)
+    frequencies = ruler.frequencies_hz
+    ideal = make_world(ready.specimen, ready.set_up, ready.ideal.scatter, world.effects)
+    visible["scatter_nats"] = four(ruler.nats(ideal.measured_frf(frequencies)))
+    visible["evidence_nats"] = four(ruler.nats(ready.base.measured_frf(frequencies)))
+    if len(world.effects) > 1:
+        for i, one in enumerate(visible["each"]):
+            others = world.effects[:i] + world.effects[i + 1 :]
+            without = make_world(ready.specimen, ready.set_up, ready.scatter, others)
+            one["evidence_nats"] = four(ruler.nats(without.measured_frf(frequencies)))
+        return {}
+    found = compare(ready.bench, world, ruler)
+    equivalents = found.pop("equivalents")
+    visible |= found
+    return {"equivalents": equivalents}
 
 
 def _by_level(ready: _Ready, world: World, signals: FloatArray) -> dict[str, Any]:

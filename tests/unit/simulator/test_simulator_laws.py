@@ -23,7 +23,7 @@ MODEL = ModalReceptance(omega_rad_s=OMEGA, damping_ratio=RATIO, shapes=SHAPES, s
 
 
 def simulate(law, oversampling):
-    grid = LaplaceGrid(n_samples=500, rate_hz=500.0, oversampling=oversampling)
+    grid = LaplaceGrid(n_samples=250, rate_hz=500.0, oversampling=oversampling)
     drive = grid.spectrum(BLOW.force(grid.fine_time_s), all_lines=True)
     w = MODEL(grid.fine_s, [1], [0])[:, 0, 0] * drive
     step = 1 / (500.0 * oversampling)
@@ -41,8 +41,8 @@ def integrate(force):
         load = SHAPES[0] * BLOW.force(np.array([time]))[0] - SHAPES[1] * force(SHAPES[1] @ q, SHAPES[1] @ p)
         return np.concatenate([p, load - 2 * RATIO * OMEGA * p - OMEGA**2 * q])
 
-    time = np.arange(500) / 500.0
-    done = solve_ivp(derivative, (0, 1), np.zeros(6), t_eval=time, rtol=1e-8, atol=1e-11, max_step=1e-3)
+    time = np.arange(250) / 500.0
+    done = solve_ivp(derivative, (0, 0.5), np.zeros(6), t_eval=time, rtol=1e-8, atol=1e-11, max_step=1e-3)
     return SHAPES[1] @ done.y[:3]
 
 
