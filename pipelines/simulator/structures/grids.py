@@ -153,7 +153,7 @@ def build_grid(drawing: GridDrawing, reality: Reality | None = None) -> Structur
     Returns
     -------
     Structure
-        Its rows know ``z``, ``rx`` and ``ry`` at every node, with offsets along the member.
+        Its rows know ``z``, ``rx`` and ``ry`` at every node, with offsets along the member and beside it.
     """
     reality = reality or Reality()
     mesh = _Mesh(drawing, reality)
@@ -264,7 +264,14 @@ class _Mesh:
         return mass, stiffness
 
     def row(self, point: Point) -> FloatArray:
-        """Motion of a point for unit coordinates, before supports."""
+        """Motion of a point for unit coordinates, before supports; cross-sections are rigid."""
+        member = next(member for member in self.members if point.node in member.nodes)
+        across = point.offset_m[1 if member.along_x else 0]
+        if point.direction == "z" and across:
+            # beside the axis of a member its twist is felt too
+            along = (point.offset_m[0], 0.0) if member.along_x else (0.0, point.offset_m[1])
+            twist = self.row(Point(point.node, "rx" if member.along_x else "ry", along))
+            return self.row(Point(point.node, "z", along)) + (across if member.along_x else -across) * twist
         row = np.zeros(self.size)
         if point.node in self.first and point.offset_m == (0.0, 0.0):
             row[self.first[point.node] + DIRECTIONS.index(point.direction)] = 1.0

@@ -4,6 +4,7 @@ import ast
 import json
 import tomllib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,32 @@ SIMULATION = (
     5e-6  # FRFs estimated from noise-free records against the truth: what is cut off is exp(-12) = 6e-6 of a decay
 )
 CHANGED = 1e-3  # an effect that changes less than this would be no effect
+STRUCTURES = {"cubic_stiffness": "frame", "gap_contact": "frame", "dry_friction": "frame"}
+TABLE = {  # of the contract: what a location and the parameters of each effect may hold
+    "boundary_compliance": ({"end", "nodes"}, {"rotational_stiffness_Nm_rad", "translational_stiffness_N_m"}),
+    "added_mass": ({"nodes"}, {"mass_kg"}),
+    "local_stiffness": ({"elements", "springs", "groups"}, {"stiffness_ratio"}),
+    "global_stiffness": (set(), {"stiffness_ratio"}),
+    "grounded_spring": ({"nodes"}, {"stiffness_N_m"}),
+    "coupling_spring": ({"nodes"}, {"stiffness_N_m"}),
+    "attached_resonator": ({"nodes"}, {"mass_kg", "frequency_hz", "damping_ratio"}),
+    "axial_load": (set(), {"force_N"}),
+    "shear_rotary_inertia": (set(), set()),
+    "damping_level": (set(), {"modal_ratio"}),
+    "local_damper": ({"nodes"}, {"damping_Ns_m"}),
+    "structural_damping": (set(), {"loss_factor"}),
+    "viscoelastic_joint": (
+        {"nodes", "end", "springs"},
+        {"stiffness_N_m", "rotational_stiffness_Nm_rad", "relaxation_time_s"},
+    ),
+    "time_delay": ({"channels"}, {"delay_s"}),
+    "sensor_dynamics": ({"channels"}, {"kind", "corner_hz"}),
+    "sensor_gain": ({"channels"}, {"gain_ratio"}),
+    "sensor_misplaced": ({"channels", "nodes"}, set()),
+    "cubic_stiffness": ({"nodes", "springs"}, {"cubic_N_m3"}),
+    "gap_contact": ({"nodes", "springs"}, {"gap_m", "contact_stiffness_N_m"}),
+    "dry_friction": ({"nodes", "springs"}, {"friction_N"}),
+}
 LINEAR = [name for name in CONTRACT if name not in NONLINEAR]
 
 
@@ -68,9 +95,14 @@ def test_a_plate_without_scatter_is_the_nominal_model():
     assert check.exact < SIMULATION
 
 
+@cache
+def concealed(effect):
+    return make_case(31, effect, structure=STRUCTURES.get(effect, "clamped-pinned"))
+
+
 @pytest.mark.parametrize("effect", LINEAR)
 def test_each_linear_effect_changes_what_is_measured(effect):
-    case = make_case(31, effect, structure="clamped-pinned")
+    case = concealed(effect)
     truth = case.truth
     assert truth["effect"] == effect
     assert truth["detectability"]["frf_change"] > CHANGED
@@ -78,6 +110,30 @@ def test_each_linear_effect_changes_what_is_measured(effect):
     lines = case.world.set_up.lines_hz
     with_effect, without = case.world.measured_frf(lines), case.base.measured_frf(lines)
     assert np.linalg.norm(with_effect - without) / np.linalg.norm(without) > CHANGED
+
+
+def test_signs_of_sensors_and_blows_turn_the_frf_round():
+    world = make_case(31, "null", structure="clamped-pinned", analyse=False).base
+    set_up = world.set_up
+    turned = replace(
+        set_up,
+        sensors=tuple(replace(sensor, sign=-sensor.sign) for sensor in set_up.sensors),
+        struck=((set_up.struck[0][0], -set_up.struck[0][1]), *set_up.struck[1:]),
+    )
+    other = make_world(world.specimen, turned, world.scatter, ())
+    lines = set_up.lines_hz
+    expected = -world.measured_frf(lines)
+    expected[:, :, 0] *= -1
+    assert_allclose(other.measured_frf(lines), expected, rtol=ALGEBRA)
+
+
+def test_locations_and_parameters_are_those_of_the_contract():
+    for effect, (places, names) in TABLE.items():
+        truth = concealed(effect).truth
+        assert set(truth["location"]) <= places, effect
+        assert set(truth["parameters"]) <= names, effect
+        assert bool(truth["location"]) == bool(places), effect
+        assert bool(truth["parameters"]) == bool(names), effect
 
 
 def test_a_resonator_is_two_masses_and_a_spring():
@@ -222,10 +278,15 @@ def test_two_effects_are_both_there():
 
 
 def test_a_law_shows_in_blows_of_different_levels():
-    case = make_case(3, "cubic_stiffness", structure="frame")
+    case = concealed("cubic_stiffness")
     assert case.truth["nonlinear"]
     assert case.truth["detectability"]["level_change"] > 0.01
     assert {"cubic_N_m3"} == set(case.truth["parameters"])
+
+
+def test_the_catalogue_is_that_of_the_contract():
+    assert set(TABLE) == set(CONTRACT)
+    assert len(OUTSIDE) >= 10
 
 
 def test_unknown_names_are_refused():

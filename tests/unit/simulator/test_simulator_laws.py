@@ -1,12 +1,14 @@
 """Nonlinear laws against an adaptive integrator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from simulator.signals.hammer import Blow
-from simulator.signals.integrate import law_force
+from simulator.signals.integrate import _weights, law_force
 from simulator.signals.laplace import LaplaceGrid
 from simulator.signals.laws import BoucWen, Coulomb, Gap, PowerSpring, SquareDrag, TwoSided
 from simulator.signals.receptance import ModalReceptance
@@ -94,3 +96,48 @@ def test_hysteresis_is_a_spring_in_small_motions_and_slips_in_large_ones():
 def test_a_structure_that_runs_away_is_refused():
     with pytest.raises(FloatingPointError):
         simulate(PowerSpring(stiffness=-50 * STIFFNESS / SWING**2, power=3), 16)
+
+
+@pytest.mark.parametrize(
+    ("law", "force"),
+    [
+        (PowerSpring(stiffness=3.0, power=3), lambda w, _v: 3 * w**3),
+        (Gap(stiffness=5.0, gap=0.2), lambda w, _v: 5 * np.maximum(w - 0.2, 0)),
+        (TwoSided(stiffness=5.0, gap=0.2), lambda w, _v: 5 * np.sign(w) * np.maximum(np.abs(w) - 0.2, 0)),
+        (SquareDrag(drag=2.0), lambda _w, v: 2 * v * np.abs(v)),
+    ],
+    ids=["cubic", "gap", "two-sided", "drag"],
+)
+def test_a_law_knows_that_its_force_moves_its_place(law, force):
+    w, v = np.linspace(-1, 1, 21), np.linspace(2, -2, 21)
+    law.restart(w.size)
+    got = law.force(w, v, 0.05, 0.3)
+    assert_allclose(got, force(w - 0.05 * got, v - 0.3 * got), rtol=1e-6, atol=1e-9)  # three steps of Newton's method
+
+
+def test_weights_of_a_step_are_integrals():
+    u = (np.arange(200_000) + 0.5) / 200_000
+    for a in (-0.001 + 0.005j, -0.02 + 0.3j, -0.3 + 4j):
+        decay, first, last = _weights(np.array([a]))
+        kernel = np.exp(a * (1 - u))
+        assert_allclose(decay[0], np.exp(a), rtol=1e-12)
+        assert_allclose(first[0], np.mean(kernel * (1 - u)), rtol=1e-8)  # midpoint rule on 200 000 steps
+        assert_allclose(last[0], np.mean(kernel * u), rtol=1e-8)
+
+
+@pytest.mark.parametrize("law", [Coulomb(friction=0.02), SquareDrag(drag=20.0)], ids=["friction", "drag"])
+def test_a_stiff_mode_and_its_static_compliance_feel_the_same_law(law):
+    high = 2 * np.pi * 3000.0
+    shapes = np.hstack([SHAPES, [[0.0], [20.0]]])
+    summed = ModalReceptance(
+        omega_rad_s=np.append(OMEGA, high), damping_ratio=np.append(RATIO, 0.3), shapes=shapes, static=np.zeros((2, 2))
+    )
+    static = replace(MODEL, static=np.diag([0.0, (20.0 / high) ** 2]))
+    time = np.arange(4000) / 20_000
+    motion = 1e-3 * np.sin(2 * np.pi * 25 * time) * np.minimum(time / 0.02, 1)
+    velocity = np.gradient(motion, time)
+    one, other = (
+        law_force(model, np.array([0.0, 1.0]), law, motion[None], velocity[None], 1 / 20_000)[0]
+        for model in (summed, static)
+    )
+    assert np.linalg.norm(one - other) < 0.05 * np.linalg.norm(one)  # the stiff mode is not quite static

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from simulator.signals.receptance import solve_modes
+from simulator.signals.receptance import modal_receptance, solve_modes
 from simulator.structures.frames import FrameDrawing, Spring, build_frame
-from simulator.structures.grids import GridDrawing, build_grid
+from simulator.structures.grids import GridDrawing, Member, build_grid
 from simulator.structures.nominal import nominal_grid, nominal_plate
 from simulator.structures.plates import PlateDrawing, build_plate
 from simulator.structures.points import Point
@@ -131,3 +131,33 @@ def test_rows_of_a_plate_follow_an_offset_along_both_sides():
     for direction, sign, offset in (("ry", -1, (1e-4, 0.0)), ("rx", 1, (0.0, 1e-4))):
         there = plate.row(Point(34, "z", offset)) @ shape
         assert_allclose(there - here, sign * 1e-4 * (plate.row(Point(34, direction)) @ shape), rtol=1e-2)
+
+
+def test_a_crossing_turns_as_its_members_slope():
+    grid = build_grid(GRID)
+    shape = solve_modes(grid).shapes[:, 4]
+    here = grid.row(Point(1)) @ shape
+    there = grid.row(Point(1, "z", (1e-5, 0.0))) @ shape
+    assert_allclose(there - here, -1e-5 * (grid.row(Point(1, "ry")) @ shape), rtol=1e-2)  # the curvature over 0.01 mm
+    second, last = GRID.layout[1][3].nodes[1], GRID.layout[1][3].nodes[-1]  # of the first tie, along y
+    for node, step in ((second, 1e-5), (last, -1e-5)):
+        slope = (grid.row(Point(node, "z", (0.0, step))) - grid.row(Point(node))) @ shape / step
+        assert_allclose(slope, grid.row(Point(node, "rx")) @ shape, rtol=1e-2)
+
+
+def test_torsion_of_rectangles_is_that_of_saint_venant():
+    square, flat = (Member(name="", nodes=(), along_x=True, width_m=w, thickness_m=0.01) for w in (0.01, 0.1))
+    assert_allclose(square.torsion_constant, 0.1406 * 0.01**4, rtol=5e-3)  # what the closed approximation claims
+    assert_allclose(flat.torsion_constant, 0.3123 * 0.1 * 0.01**3, rtol=5e-3)
+
+
+def test_modes_above_the_sum_enter_by_their_static_compliance():
+    frame = build_frame(chain(30))
+    modes = solve_modes(frame)
+    rows = np.array([frame.row(Point(node, "x")) for node in (4, 5)])
+    ratio, s = np.full(30, 0.01), 2j * np.pi * np.linspace(0.1, modes.frequencies_hz[1], 20)
+    whole = modal_receptance(modes, rows, ratio, np.inf)(s, [0, 1], [0, 1])
+    cut = modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[15]))(s, [0, 1], [0, 1])
+    assert_allclose(cut, whole, rtol=1e-2)  # the square of the frequency ratio, of a small part
+    bare = replace(modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[15])), static=np.zeros((2, 2)))
+    assert np.abs(bare(s, [0], [0]) / whole[:, :1, :1] - 1).max() > 0.05
