@@ -191,8 +191,8 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
         rows = _chosen_rows(model, ritz, plan)
         if condition_number(ritz.shapes[rows]) > MAX_CONDITION:
             raise IllConditionedError(
-                f"{count} modes and residual vectors cannot be told apart at any DOFs of the model '{model.name}'; keep "
-                "fewer ([reduce] modes)"
+                f"{count} modes and residual vectors cannot be told apart at any DOFs of the model '{model.name}'; "
+                "keep fewer ([reduce] modes)"
             )
         notes.append("dofs: " + ", ".join(model.dofs[row].name for row in rows.tolist()))
     retained = {model.dofs[row] for row in rows.tolist()}
@@ -211,7 +211,9 @@ def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> In
         rows = choose_rows(ritz.shapes, wanted, translations, count)
         if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
             return rows
-    return choose_rows(ritz.shapes, wanted, np.arange(len(dofs)), count)
+    # rotations have another unit: only the directions of the rows can be compared
+    lengths = np.linalg.norm(ritz.shapes, axis=1, keepdims=True)
+    return choose_rows(ritz.shapes / np.where(lengths > 0, lengths, 1.0), wanted, np.arange(len(dofs)), count)
 
 
 def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:

@@ -30,7 +30,7 @@ COUPLED_ORDER = 100  # modes that viscous damping may couple; with more DOFs, th
 COUPLING = 1e-9  # of the geometric mean of the diagonal terms: damping below couples no modes
 LINES_AT_ONCE = 256  # keeps stacks of small matrices within some MB
 BESIDE_ZERO = 1e-6  # of the lowest other frequency, or rad/s: where 0 Hz is evaluated
-NO_POLE = 1e-6  # of the largest modulus: a pole within is that of a rigid-body motion, spread by rounding
+NO_STIFFNESS = 64.0  # roundings of the largest omega^2, times the condition of the mass: no stiffness to be seen
 REAL_POLE = 1e-12  # of the modulus: imaginary part of a pole that is real
 
 
@@ -89,15 +89,16 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
         If a large model is given without `up_to_hz`.
     """
     if isinstance(model, ReducedModel):
-        poles = _upper_half(damped_poles(model.mass, model.damping, model.stiffness).values)
+        poles = _pencil_poles(model.mass, model.damping, model.stiffness)
     else:
         basis = solve_basis(model, up_to_hz=up_to_hz)
         damping = _modal_damping(model, basis)
         if damping.ndim == 1:
             root = np.sqrt((damping / 2) ** 2 - basis.eigenvalues.astype(np.complex128))
-            poles = _upper_half(np.concatenate([-damping / 2 + root, -damping / 2 - root]))
+            poles = np.concatenate([-damping / 2 + root, -damping / 2 - root])
         else:
-            poles = _upper_half(damped_poles(np.eye(len(damping)), damping, np.diag(basis.eigenvalues)).values)
+            poles = _pencil_poles(np.eye(len(damping)), damping, np.diag(basis.eigenvalues))
+    poles = _upper_half(poles)
     return poles if up_to_hz is None else poles[np.abs(poles) <= 2 * np.pi * up_to_hz]
 
 
@@ -200,9 +201,17 @@ def _solved(
     return np.concatenate(blocks)
 
 
+def _pencil_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> ComplexArray:
+    """All poles of small matrices; rounding spreads the double pole of a rigid-body motion, which is put back to 0."""
+    poles = damped_poles(mass, damping, stiffness).values
+    scale = 1 / np.sqrt(np.diag(mass))
+    condition = float(np.linalg.cond(mass * np.outer(scale, scale)))
+    largest = np.abs(poles).max(initial=0.0)
+    unseen = largest * np.sqrt(NO_STIFFNESS * float(np.finfo(float).eps) * condition)
+    return np.asarray(np.where(np.abs(poles) <= unseen, 0.0, poles), np.complex128)
+
+
 def _upper_half(poles: ComplexArray) -> ComplexArray:
-    modulus = np.abs(poles)
-    poles = np.where(modulus <= NO_POLE * modulus.max(initial=0.0), 0.0, poles)
-    poles = np.where(np.abs(poles.imag) <= REAL_POLE * modulus, poles.real + 0j, poles)
+    poles = np.where(np.abs(poles.imag) <= REAL_POLE * np.abs(poles), poles.real + 0j, poles)
     kept = poles[poles.imag >= 0]
     return np.asarray(kept[np.argsort(np.abs(kept), kind="stable")], np.complex128)

@@ -261,6 +261,14 @@ def test_a_structure_that_only_turns_is_reduced_in_rotations():
     assert all(dof.direction == "rx" for dof in found.dofs)
 
 
+def test_rotations_help_out_where_translations_cannot_tell_modes_apart():
+    # eight translations of a stocky free beam, and nine modes and vectors
+    stocky = beam(elements=7, length_m=0.1, thickness_m=0.012, modal_ratio=0.03)
+    found = reduce(stocky, actuators=("4:z",), sensors=("4:z",), points=("4:z",), band_hz=(1e3, 3.2e4))
+    assert len(found.dofs) == 9
+    assert 1 <= sum(dof.direction == "ry" for dof in found.dofs) <= 2
+
+
 def test_chosen_rows_are_as_independent_as_can_be():
     rng = np.random.default_rng(2)
     shapes = rng.standard_normal((40, 5))
