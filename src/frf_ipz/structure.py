@@ -199,6 +199,8 @@ class StructuralModel:
         return int(np.count_nonzero(~self.fixed[:place]))
 
     def _free(self, matrix: Matrix) -> Matrix:
+        if not self.fixed.any():
+            return matrix
         keep = np.flatnonzero(~self.fixed)
         return matrix[keep][:, keep]
 

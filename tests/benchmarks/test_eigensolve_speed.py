@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from plate import plate_matrices
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from brick_plate import plate_matrices
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.options import ReduceOptions

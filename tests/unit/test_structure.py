@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from fe_models import beam
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError, ShapeError
+from frf_ipz.runs.codec import load_result, save_result
 from frf_ipz.structure import ReducedModel
 
 
@@ -52,6 +53,16 @@ def test_a_dof_that_cannot_move_is_said(dof, fragments):
     with pytest.raises(InputError) as caught:
         beam(elements=3, left="clamped").index(dof)
     assert all(fragment in str(caught.value) for fragment in fragments)
+
+
+def test_a_model_is_kept_exactly(tmp_path):
+    model = beam(elements=5, left="clamped", right="pinned", modal_ratio=0.01)
+    save_result(model, tmp_path / "model.npz")
+    kept = load_result(tmp_path / "model.npz")
+    assert kept.source == model.source
+    assert kept.geometry.supports == {1: "clamped", 6: "pinned"}
+    assert (kept.stiffness != model.stiffness).nnz == 0
+    assert kept.index(Dof(4, "ry")) == model.index(Dof(4, "ry"))
 
 
 def test_sizes_must_agree():

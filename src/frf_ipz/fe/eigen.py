@@ -32,6 +32,7 @@ NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy belo
 MAX_ROUNDING = 1e-9  # what a stiffness matrix printed with few digits may lack
 MOST_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is none of its own
+MANY_MODES = 4  # a larger share of all modes than one in so many is found faster by LAPACK
 FIRST_MODES = 24  # ARPACK's first guess at how many modes lie below a frequency
 FLEXIBILITY_STEPS = 60
 FLEXIBILITY_TOLERANCE = 1e-12  # change of a step, relative: the limit of double precision
@@ -230,7 +231,7 @@ def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
         raise InputError(f"{n_modes} modes are asked for; the model '{model.name}' has {order} free DOFs")
     if up_to_hz is not None and not up_to_hz > 0:
         raise InputError(f"modes up to {up_to_hz:g} Hz are asked for; give a frequency above 0")
-    if order < DENSE_ORDER:
+    if order < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
         basis = _solve_dense(model, n_modes or order, up_to_hz)
     elif n_modes is None and up_to_hz is None:
         raise InputError(

@@ -5,11 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import io, sparse
 
+from brick_plate import plate_matrices
 from fe_models import beam, export
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.eigen import solve_modes
+from frf_ipz.fe.matrices import neighbours
 from frf_ipz.fe.matrices.definiteness import DENSE_ORDER
+from frf_ipz.fe.matrices.neighbours import lines_between_neighbours
 from frf_ipz.fe.model_file import model_files, read_model
 
 PRINTED = 1e-12  # 17 digits are printed
@@ -178,6 +181,24 @@ def test_a_stiffness_matrix_may_be_negative_by_rounding(tmp_path):
         else:
             with pytest.raises(FileFormatError, match="indefinite"):
                 read_model(path)
+
+
+def brick_lines(counts):
+    stiffness, _, corners = plate_matrices(counts, np.array(counts) * [5e-3, 4e-3, 1e-3])
+    dofs = [Dof(node + 1, axis) for node in range(len(corners)) for axis in "xyz"]
+    return lines_between_neighbours(stiffness, dofs, np.arange(1, len(corners) + 1), corners)
+
+
+def test_of_bricks_the_edges_are_drawn():
+    lines = brick_lines((4, 3, 2))
+    assert len(lines) == 4 * 4 * 3 + 5 * 3 * 3 + 5 * 4 * 2
+    assert [1, 2] in lines.tolist()
+    assert [1, 7] not in lines.tolist()
+
+
+def test_a_model_of_very_many_nodes_is_drawn_without_lines(monkeypatch):
+    monkeypatch.setattr(neighbours, "MAX_NODES", 10)
+    assert brick_lines((4, 3, 2)).shape == (0, 2)
 
 
 def test_every_practice_model_reads(practice):

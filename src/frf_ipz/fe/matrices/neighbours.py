@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Matrix
 
 FEW_NEIGHBOURS = 6.0  # on average: frames and grids, of which every coupling is drawn
-NEAR = 1.5  # of the distance to the nearest neighbour: sides of elements are drawn, diagonals of squares just so
-MAX_LINES = 50_000  # more make a picture slow and black
+NEAREST = 30  # neighbours of a node that are looked at: an eight-node brick has 26
+MAX_NODES = 20_000  # more make a picture slow and black
+SLIGHTLY = 1 - 1e-9  # so that equal sides of a triangle all stay
 
 
 def lines_between_neighbours(
@@ -25,7 +26,8 @@ def lines_between_neighbours(
 ) -> IntArray:
     """Find pairs of nodes to join by a line.
 
-    Solids couple many nodes, and condensed matrices all of them; then only the near ones are joined.
+    Solids couple many nodes, and condensed matrices all of them; then two are joined only if no third lies nearer to
+    both than they to each other (the relative neighbourhood graph), which leaves the edges of elements.
 
     Parameters
     ----------
@@ -41,20 +43,30 @@ def lines_between_neighbours(
     Returns
     -------
     (n_lines, 2) int array
-        Node numbers; empty where there would be too many lines.
+        Node numbers; empty for a model of too many nodes.
     """
+    if len(nodes) > MAX_NODES:
+        return np.zeros((0, 2), np.int64)
     place = np.searchsorted(nodes, [dof.node for dof in dofs])
     members = sparse.csr_array((np.ones(len(dofs)), (place, np.arange(len(dofs)))), shape=(len(nodes), len(dofs)))
-    graph = sparse.coo_array(sparse.triu(members @ abs(stiffness) @ members.T, k=1))
-    is_coupled = graph.data > 0
-    first, second = graph.row[is_coupled].astype(np.int64), graph.col[is_coupled].astype(np.int64)
-    if first.size > FEW_NEIGHBOURS / 2 * len(nodes):
-        distance = np.linalg.norm(coordinates_m[first] - coordinates_m[second], axis=1)
-        nearest = np.full(len(nodes), np.inf)
-        np.minimum.at(nearest, first, distance)
-        np.minimum.at(nearest, second, distance)
-        is_near = distance <= NEAR * np.maximum(nearest[first], nearest[second])
-        first, second = first[is_near], second[is_near]
-    if first.size > MAX_LINES:
-        return np.zeros((0, 2), np.int64)
-    return np.stack([nodes[first], nodes[second]], 1)
+    graph = sparse.csr_array(members @ abs(stiffness) @ members.T)
+    graph.setdiag(0)
+    graph.eliminate_zeros()
+    if graph.nnz > FEW_NEIGHBOURS * len(nodes):
+        pairs = [pair for node in range(len(nodes)) for pair in _near_pairs(node, graph, coordinates_m)]
+    else:
+        pairs = list(zip(*graph.nonzero(), strict=True))
+    lines = sorted({(min(pair), max(pair)) for pair in pairs})
+    return nodes[np.array(lines, dtype=np.int64).reshape(-1, 2)]
+
+
+def _near_pairs(node: int, graph: Matrix, coordinates_m: FloatArray) -> list[tuple[int, int]]:
+    """Pair a node with its neighbours that no other neighbour lies between."""
+    coupled = graph.indices[graph.indptr[node] : graph.indptr[node + 1]]
+    distance = np.linalg.norm(coordinates_m[coupled] - coordinates_m[node], axis=1)
+    nearest = np.argsort(distance, kind="stable")[:NEAREST]
+    coupled, distance = coupled[nearest], distance[nearest]
+    across = np.linalg.norm(coordinates_m[coupled][:, None] - coordinates_m[coupled], axis=2)
+    np.fill_diagonal(across, np.inf)
+    is_between = np.maximum(across, distance) < SLIGHTLY * distance[:, None]
+    return [(node, int(other)) for other in coupled[~is_between.any(axis=1)]]

@@ -1,4 +1,4 @@
-"""A free thin plate of eight-node bricks, to time eigensolves on a model of the size that users bring."""
+"""A free thin plate of eight-node bricks, for eigensolves at the size that users bring."""
 
 from __future__ import annotations
 
