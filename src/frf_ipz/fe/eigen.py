@@ -265,7 +265,10 @@ def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -
 def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
     stiffness, mass = model.stiffness, model.mass
     frequency_hz = _first_shift_hz(model, stiffness, mass, up_to_hz)
-    basis = _at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
+    try:
+        basis = _at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
+    except ConvergenceError:  # parts of a held structure may be loose all the same: lift them farther from 0
+        return _at_shift(model, stiffness, mass, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
     elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
     if elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]:
         basis = _at_shift(model, stiffness, mass, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
@@ -299,14 +302,14 @@ def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: floa
     inverse = sparse_linalg.LinearOperator((order, order), matvec=factor.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(order)  # ARPACK's own start differs from run to run
     try:
-        inverses, shapes = sparse_linalg.eigsh(
+        eigenvalues, shapes = sparse_linalg.eigsh(
             stiffness, n_modes, M=mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
         )
     except sparse_linalg.ArpackNoConvergence as error:
         raise ConvergenceError(
             f"the eigensolver found {len(error.eigenvalues)} of {n_modes} modes; ask for fewer modes or a lower band"
         ) from None
-    return np.asarray(shapes[:, np.argsort(inverses)])
+    return np.asarray(shapes[:, np.argsort(eigenvalues)])
 
 
 def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_to_hz: float | None) -> float:

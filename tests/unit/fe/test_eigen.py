@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
 
 from brick_plate import plate_matrices
 from fe_models import beam, structural_model
 from frf_ipz.dofs import Dof
-from frf_ipz.errors import IllConditionedError, InputError
+from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
 from frf_ipz.fe import eigen
 from frf_ipz.fe.eigen import solve_basis, solve_modes
 
@@ -58,12 +59,14 @@ def test_first_elastic_mode_of_a_fine_mesh_keeps_its_digits(elements):
     assert_allclose(basis.eigenvalues[2], exact, rtol=1e-4 if elements == 10 else EIGENVALUE)
 
 
-def test_a_very_soft_suspension_is_no_rigid_body_motion():
-    model = beam(elements=60)
+@pytest.mark.parametrize("elements", [60, 720])
+def test_a_very_soft_suspension_is_no_rigid_body_motion(elements):
+    model = beam(elements=elements)
     hung = model.stiffness_all.tolil()
-    for node in (13, 49):
+    for node in (1 + elements // 5, 1 + 4 * elements // 5):
         hung[2 * node - 2, 2 * node - 2] += 1.0
-    modes = solve_modes(structural_model(model.mass_all, hung, model.all_dofs), n_modes=3)
+    places = model.geometry.coordinates_m
+    modes = solve_modes(structural_model(model.mass_all, hung, model.all_dofs, coordinates_m=places), n_modes=3)
     mass = 2690 * 0.4995 * 25.33e-3 * 5.1e-3
     assert_allclose(modes.natural_frequency_hz[0], np.sqrt(2.0 / mass) / (2 * np.pi), rtol=1e-3)
     assert modes.natural_frequency_hz[2] > 100
@@ -77,6 +80,49 @@ def test_large_models_have_the_modes_of_small_ones(free_plate, monkeypatch):
     assert_allclose(large.eigenvalues[6:], small.eigenvalues[6:], rtol=EIGENVALUE)
     require_modes(free_plate, large)
     require_modes(free_plate, small)
+
+
+def test_a_loose_part_of_a_held_structure_is_found(free_plate):
+    both = [sparse.block_diag([matrix] * 2, format="csr") for matrix in (free_plate.mass_all, free_plate.stiffness_all)]
+    corners = free_plate.geometry.coordinates_m
+    above = np.vstack([corners, corners + np.array([0, 0, 0.1])])
+    dofs = [Dof(node + 1, axis) for node in range(len(above)) for axis in "xyz"]
+    fixed = np.concatenate([np.repeat(corners[:, 0] < 1e-9, 3), np.zeros(3 * len(corners), bool)])
+    model = structural_model(*both, dofs, coordinates_m=above, fixed=fixed)
+    basis = solve_basis(model, n_modes=9)
+    assert basis.n_rigid == 6
+    require_modes(model, basis)
+
+
+def test_a_long_chain_of_masses_has_the_frequencies_of_the_formula():
+    count, stiffness = 1000, 1e6
+    springs = stiffness * sparse.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(count, count))
+    model = structural_model(sparse.eye_array(count), springs, [Dof(place + 1, "x") for place in range(count)])
+    exact = 2 * np.sqrt(stiffness) * np.sin(np.arange(1, 6) * np.pi / (2 * count + 2)) / (2 * np.pi)
+    assert_allclose(solve_modes(model, n_modes=5).natural_frequency_hz, exact, rtol=1e-9)
+
+
+def test_a_solve_that_does_not_converge_is_tried_farther_from_nought(free_plate, monkeypatch):
+    real, shifts = eigen._lanczos, []
+
+    def reluctant(stiffness, mass, factor, shift, n_modes):
+        shifts.append(shift)
+        if len(shifts) == 1:
+            raise ConvergenceError("the eigensolver found 0 of 8 modes")
+        return real(stiffness, mass, factor, shift, n_modes)
+
+    monkeypatch.setattr(eigen, "_lanczos", reluctant)
+    assert solve_basis(free_plate, n_modes=8).n_rigid == 6
+    assert_allclose(np.sqrt(shifts[1] / shifts[0]), eigen.SHIFT / eigen.HELD_SHIFT, rtol=ROUNDING)
+
+
+def test_no_convergence_is_said(free_plate, monkeypatch):
+    def never(*_, **__):
+        raise sparse_linalg.ArpackNoConvergence("none", np.zeros(2), np.zeros((3, 2)))
+
+    monkeypatch.setattr(eigen.sparse_linalg, "eigsh", never)
+    with pytest.raises(ConvergenceError, match="found 2 of 8 modes"):
+        solve_basis(free_plate, n_modes=8)
 
 
 def test_double_modes_are_both_found(free_plate):
