@@ -141,10 +141,14 @@ def _with_residual_vectors(model: StructuralModel, basis: ModalBasis, plan: Redu
     if not plan.residual_is_given:
         at = ", ".join(dof.name for dof in kept) or "none, as the modes hold all flexibility"
         notes.append(f"residual flexibility: {at}")
-    weights, axes = linalg.eigh(vectors.T @ apply(basis.stiffness, vectors), vectors.T @ apply(basis.mass, vectors))
+    weights = np.zeros(0)
+    if kept:
+        stiffness, mass = (vectors.T @ apply(matrix, vectors) for matrix in (basis.stiffness, basis.mass))
+        weights, axes = linalg.eigh(stiffness, mass)
+        vectors = vectors @ axes
     return _Ritz(
         eigenvalues=np.concatenate([basis.eigenvalues, weights]),
-        shapes=np.column_stack([basis.shapes, vectors @ axes]),
+        shapes=np.column_stack([basis.shapes, vectors]),
         n_modes=len(basis.eigenvalues),
         n_rigid=basis.n_rigid,
         residual=tuple(kept),
