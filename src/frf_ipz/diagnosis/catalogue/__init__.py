@@ -1,0 +1,1 @@
+"""Effects that a nominal model may lack: each one a module, found by itself."""

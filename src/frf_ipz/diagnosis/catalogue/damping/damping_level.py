@@ -1,0 +1,70 @@
+"""Another damping ratio of all modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.physics.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+BOUNDS = 1e-5, 0.5
+TRIED = np.geomspace(1 / 16, 16, 17)
+UNSTATED = 1e-3  # taken where the model states no damping
+
+
+class DampingLevel(Effect):
+    """The ratio of all modes."""
+
+    name = "damping_level"
+    imitators = ("structural_damping", "local_damper")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Everywhere."""
+        del specimen
+        return [Place(key=())]
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Damping ratio."""
+        del place
+        stated = _stated(specimen)
+        return (
+            Parameter(
+                name="modal_ratio",
+                low=BOUNDS[0],
+                high=BOUNDS[1],
+                neutral=stated,
+                tolerance=specimen.options.damping_tolerance * stated,
+            ),
+        )
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Give it to all modes."""
+        del specimen, place
+        return lambda values: Change(modal_ratio=float(values[0]))
+
+    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+        """Less and more than stated."""
+        del place
+        return np.clip(_stated(specimen) * TRIED, *BOUNDS)[:, None]
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how much."""
+        del place
+        ratio = values["modal_ratio"]
+        return (
+            f"All modes have a damping ratio of about {100 * ratio.value:.3g} % (+- {100 * ratio.std:.2g} %), not the "
+            f"{100 * _stated(specimen):.3g} % of the model."
+        )
+
+
+def _stated(specimen: Specimen) -> float:
+    stated = specimen.model.modal_damping
+    return float(np.median(stated)) if stated.size and np.median(stated) > 0 else UNSTATED

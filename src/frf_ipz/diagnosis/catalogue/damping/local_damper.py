@@ -1,0 +1,58 @@
+"""A damper to the ground that the model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.physics.change import Attachment, Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+WEAKEST, STRONGEST = 1e-6, 1e2  # of the structure's own stiffness over the lowest frequency
+
+
+class LocalDamper(Effect):
+    """A viscous damper between a node and the ground."""
+
+    name = "local_damper"
+    imitators = ("attached_resonator", "viscoelastic_joint", "damping_level")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Every node that moves."""
+        return at_nodes(specimen)
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Damping constant."""
+        scale = specimen.stiffness_against(_motion(specimen, place)) / (2 * np.pi * specimen.band_hz[0])
+        return (Parameter(name="damping_Ns_m", low=WEAKEST * scale, high=STRONGEST * scale),)
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Attach it."""
+        motion = _motion(specimen, place)[:, None]
+        return lambda values: Change(attachments=(Attachment(motions=motion, stiffness=lambda s: values[0] * s),))
+
+    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+        """Proportional to s."""
+        return Sketch(motion=_motion(specimen, place), shapes=specimen.contour[None], values=np.ones((1, 1)))
+
+    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """Nodes beside."""
+        return beside_node(specimen, place)
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how much, and where."""
+        damping = values["damping_Ns_m"]
+        return (
+            f"A damper of {damping.value:.4g} N s/m (+- {damping.std:.2g}) acts between "
+            f"{specimen.where(int(str(place.key[0])))} and the ground."
+        )
+
+
+def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))

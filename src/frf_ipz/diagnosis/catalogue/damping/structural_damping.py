@@ -1,0 +1,55 @@
+"""Loss within the material: a loss factor of the whole stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.physics.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+BOUNDS = 1e-5, 1.0
+TRIED = np.geomspace(2e-4, 0.5, 16)
+
+
+class StructuralDamping(Effect):
+    """K (1 + i eta) besides the modal damping."""
+
+    name = "structural_damping"
+    imitators = ("damping_level", "viscoelastic_joint", "local_damper")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Everywhere."""
+        del specimen
+        return [Place(key=())]
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Loss factor."""
+        del specimen, place
+        return (Parameter(name="loss_factor", low=BOUNDS[0], high=BOUNDS[1]),)
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Give it to the stiffness."""
+        del specimen, place
+        return lambda values: Change(loss_factor=float(values[0]))
+
+    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+        """From little to much."""
+        del specimen, place
+        return TRIED[:, None]
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how much."""
+        del specimen, place
+        loss = values["loss_factor"]
+        return (
+            f"The material loses energy by itself: a loss factor of {loss.value:.3g} (+- {loss.std:.2g}) of the whole "
+            "stiffness, besides the model's damping."
+        )

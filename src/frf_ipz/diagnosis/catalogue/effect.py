@@ -1,0 +1,214 @@
+"""What a module of the catalogue has to say about its effect.
+
+An effect is one module with one class that derives from `Effect`. It says where the effect could sit, which numbers it
+has and within which bounds, and what it changes for given numbers; everything else (search, fit, evidence, verdict,
+report) follows from that. A class in a user's own file does the same::
+
+    # my_effects.py, named in pipeline.toml: [diagnose] extra_effects = ["my_effects.py:Sloshing"]
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Sketch, at_nodes
+    from frf_ipz.diagnosis.physics.change import Attachment, Change
+
+    class Sloshing(Effect):
+        name = "sloshing"
+        imitators = ("attached_resonator", "added_mass")
+
+        def places(self, specimen):
+            return at_nodes(specimen)
+        ...
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+    from frf_ipz.diagnosis.physics.change import Change
+
+Builder = Callable[[FloatArray], "Change"]
+"""From the values of the parameters to what is changed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """A number that an effect has.
+
+    Parameters
+    ----------
+    name : str
+        As in `diagnosis.json`, with its unit at the end.
+    low, high : float
+        Bounds; the prior is uniform between them, or uniform in the logarithm.
+    is_log : bool
+        The logarithm is what is searched along: for what is known to a factor.
+    neutral : float
+        The value at which the effect vanishes; 0 or infinity for most, 1 for ratios.
+    tolerance : float
+        Distance from the neutral value that a user's tolerances allow; smaller effects are not significant.
+    """
+
+    name: str
+    low: float
+    high: float
+    is_log: bool = True
+    neutral: float = 0.0
+    tolerance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Somewhere an effect could sit.
+
+    Parameters
+    ----------
+    key : tuple
+        What tells it from others of the same effect.
+    location : mapping
+        As in `diagnosis.json`.
+    text : mapping of str to str
+        Parameters that are text: the kind of a filter.
+    """
+
+    key: tuple[object, ...]
+    location: Mapping[str, object] = field(default_factory=dict)
+    text: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sketch:
+    """An effect as one dynamic stiffness on one motion, for a fast search.
+
+    Parameters
+    ----------
+    motion : (n_all,) array
+        Weights of all DOFs.
+    shapes : (n_shapes, n_points) complex array
+        Dynamic stiffness along the contour for amplitude 1.
+    values : (n_shapes, n_parameters) array
+        Values of the parameters that each shape stands for, for amplitude 1.
+    amplitude : int
+        The parameter that multiplies the dynamic stiffness.
+    amplitudes : (n,) array, optional
+        What to try; chosen from the structure's own stiffness where it is left out.
+    """
+
+    motion: FloatArray
+    shapes: ComplexArray
+    values: FloatArray
+    amplitude: int = 0
+    amplitudes: FloatArray | None = None
+
+
+class Effect(ABC):
+    """One thing that a nominal model may lack."""
+
+    name: ClassVar[str]
+    """As in `diagnosis.json`."""
+    imitators: ClassVar[tuple[str, ...]] = ()
+    """Effects that look alike, the most alike first."""
+
+    @abstractmethod
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Say where the effect could sit: nowhere if it does not apply to this kind of model."""
+
+    @abstractmethod
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Say which numbers it has there."""
+
+    @abstractmethod
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Give what changes the model or the measuring chain, for values of the parameters."""
+
+    @abstractmethod
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say to the user what it is and where, in one sentence."""
+
+    def sketch(self, specimen: Specimen, place: Place) -> Sketch | None:
+        """Give the effect as one dynamic stiffness, if it is one; else it is searched by `starts`."""
+        del specimen, place
+        return None
+
+    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+        """Give values to start from, (n_starts, n_parameters): a grid over the bounds, unless an effect knows better."""
+        return grid(self.parameters(specimen, place), 8)
+
+    def reported(self, place: Place, name: str, value: float) -> float:
+        """Turn a value that was searched into the one that is reported: a sign, for one."""
+        del place, name
+        return value
+
+    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """Places beside one, to look at when it is nearly right."""
+        del specimen, place
+        return ()
+
+
+def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
+    """Spread values over the bounds of parameters.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        What to spread over.
+    count : int
+        How many along each.
+
+    Returns
+    -------
+    (n_values, n_parameters) array
+        All combinations.
+    """
+    axes = [
+        np.geomspace(parameter.low, parameter.high, count + 2)[1:-1]
+        if parameter.is_log
+        else np.linspace(parameter.low, parameter.high, count + 2)[1:-1]
+        for parameter in parameters
+    ]
+    return np.array(list(product(*axes))).reshape(-1, len(parameters))
+
+
+def at_nodes(specimen: Specimen) -> list[Place]:
+    """Every node that can move in a direction of the test.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What is tested.
+
+    Returns
+    -------
+    list of Place
+        Keys are node and direction.
+    """
+    return [Place(key=(dof.node, dof.direction), location={"nodes": [dof.node]}) for dof in specimen.moving_dofs]
+
+
+def beside_node(specimen: Specimen, place: Place) -> list[Place]:
+    """Nodes next to one.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What is tested.
+    place : Place
+        A place of `at_nodes`.
+
+    Returns
+    -------
+    list of Place
+        The nearest ones.
+    """
+    node, direction = place.key
+    return [
+        Place(key=(other, direction), location={"nodes": [other]})
+        for other in specimen.nodes_near(int(str(node)), str(direction))
+    ]

@@ -1,0 +1,1 @@
+"""Effects: masses and resonators, shear and rotary inertia."""

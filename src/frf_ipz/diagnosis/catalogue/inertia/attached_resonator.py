@@ -1,0 +1,106 @@
+"""Something that hangs on the structure and swings by itself: a cable, a loose part, an absorber."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.physics.change import Attachment, Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
+LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, a damper or a mass
+RATIOS = 1e-3, 0.5
+FREQUENCY_STEP = 1.06
+TRIED_RATIOS = (0.01, 0.06)
+
+
+class AttachedResonator(Effect):
+    """A mass on a spring and a damper at a node."""
+
+    name = "attached_resonator"
+    imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Every node that moves."""
+        return at_nodes(specimen)
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Mass, frequency, damping ratio."""
+        del place
+        low, high = specimen.band_hz
+        return (
+            Parameter(name="mass_kg", low=SMALLEST * specimen.mass_kg, high=LARGEST * specimen.mass_kg),
+            Parameter(name="frequency_hz", low=LOWEST * low, high=HIGHEST * high),
+            Parameter(name="damping_ratio", low=RATIOS[0], high=RATIOS[1]),
+        )
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Attach its dynamic stiffness."""
+        motion = _motion(specimen, place)[:, None]
+
+        def change(values: np.ndarray) -> Change:
+            mass, frequency_hz, ratio = values
+            return Change(
+                attachments=(
+                    Attachment(motions=motion, stiffness=lambda s: mass * dynamic_mass(s, frequency_hz, ratio)),
+                )
+            )
+
+        return change
+
+    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+        """All frequencies and some damping ratios."""
+        low, high = specimen.band_hz
+        count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
+        pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), TRIED_RATIOS))
+        return Sketch(
+            motion=_motion(specimen, place),
+            shapes=np.array([dynamic_mass(specimen.contour, frequency, ratio) for frequency, ratio in pairs]),
+            values=np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
+            amplitudes=np.geomspace(3e-4, 0.3, 9) * specimen.mass_kg,
+        )
+
+    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """Nodes beside."""
+        return beside_node(specimen, place)
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say what swings where."""
+        return (
+            f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at {specimen.where(int(str(place.key[0])))} and "
+            f"swings by itself at {values['frequency_hz'].value:.4g} Hz with a damping ratio of "
+            f"{100 * values['damping_ratio'].value:.2g} %."
+        )
+
+
+def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexArray:
+    """Dynamic stiffness of a resonator of unit mass: s^2 (k + c s) / (k + c s + s^2).
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    frequency_hz, ratio : float
+        Of the resonator, with its foot held.
+
+    Returns
+    -------
+    (n_points,) complex array
+        N/m per kg.
+    """
+    omega = 2 * np.pi * frequency_hz
+    spring = omega**2 + 2 * ratio * omega * s
+    return np.asarray(s**2 * spring / (s**2 + spring))
+
+
+def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))

@@ -1,0 +1,47 @@
+"""Shear flexibility and rotary inertia of a beam that was modelled without them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.fe.beams.beam_options import BeamFile
+from frf_ipz.fe.beams.variants import with_formulation
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+
+class ShearRotaryInertia(Effect):
+    """Timoshenko instead of Euler-Bernoulli."""
+
+    name = "shear_rotary_inertia"
+    imitators = ("global_stiffness", "axial_load", "added_mass")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """Return a beam that was modelled by Euler-Bernoulli."""
+        source = specimen.model.source
+        applies = isinstance(source, BeamFile) and source.beam.formulation == "euler-bernoulli"
+        return [Place(key=())] if applies else []
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """None: dimensions and material are known."""
+        del specimen, place
+        return ()
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Exchange the elements."""
+        del place
+        change = Change(model=with_formulation(specimen.model, "timoshenko"))
+        return lambda _: change
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say what the model lacks."""
+        del specimen, place, values
+        return (
+            "The beam is too thick for the Euler-Bernoulli theory of the model: it lacks shear flexibility and rotary "
+            'inertia (formulation = "timoshenko").'
+        )

@@ -1,0 +1,113 @@
+"""What effects may know about the structure and its test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.layout import Layout, extents
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.assembly import apply
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.physics.basis import Basis
+    from frf_ipz.structure import StructuralModel
+
+NEAREST = 8  # nodes that count as neighbours where nodes are not in a row
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Specimen:
+    """A structure on its test bench.
+
+    Parameters
+    ----------
+    basis : Basis
+        The nominal model in few coordinates.
+    layout : Layout
+        Sensors and blows.
+    band_hz : pair of float
+        Hz.
+    contour : (n_points,) complex array
+        Where effects are searched, rad/s.
+    options : DiagnoseOptions
+        Tolerances.
+    """
+
+    basis: Basis
+    layout: Layout
+    band_hz: tuple[float, float]
+    contour: ComplexArray
+    options: DiagnoseOptions
+
+    @property
+    def model(self) -> StructuralModel:
+        """The nominal model."""
+        return self.basis.model
+
+    @cached_property
+    def directions(self) -> tuple[str, ...]:
+        """Directions of sensors and blows."""
+        dofs = (*(dof for _, dof in self.layout.outputs), *self.layout.inputs)
+        return tuple(dict.fromkeys(dof.direction for dof in dofs))
+
+    @cached_property
+    def moving_dofs(self) -> tuple[Dof, ...]:
+        """DOFs in these directions that are not held, by node."""
+        model = self.model
+        free = [dof for dof, fixed in zip(model.all_dofs, model.fixed, strict=True) if not fixed]
+        return tuple(sorted(dof for dof in free if dof.direction in self.directions))
+
+    @cached_property
+    def mass_kg(self) -> float:
+        """Mass of the structure, held parts included."""
+        direction = self.directions[0]
+        rigid = np.array([float(dof.direction == direction) for dof in self.model.all_dofs])
+        return float(rigid @ apply(self.model.mass_all, rigid))
+
+    @cached_property
+    def positions(self) -> dict[int, FloatArray]:
+        """Where each node is, m."""
+        geometry = self.model.geometry
+        return dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
+
+    def unit(self, dof: Dof) -> FloatArray:
+        """Motion of one DOF, (n_all,) array."""
+        motion = np.zeros(len(self.model.all_dofs))
+        motion[self.model.place(dof)] = 1.0
+        return motion
+
+    def stiffness_against(self, motion: FloatArray) -> float:
+        """Stiffness of the structure against a motion by the elastic modes near the band, N/m."""
+        shapes = motion @ self.basis.loaded
+        squares = self.basis.modes.eigenvalues[: len(shapes)]
+        elastic = squares > 0
+        compliance = float(np.sum(shapes[elastic] ** 2 / squares[elastic]))
+        largest = float(np.max(np.sum(self.basis.loaded[:, elastic] ** 2 / squares[elastic], axis=1)))
+        return 1.0 / max(compliance, 1e-6 * largest)
+
+    def nodes_near(self, node: int, direction: str) -> list[int]:
+        """Nodes beside one that move in a direction: the next ones in a row, the nearest ones elsewhere."""
+        nodes = [dof.node for dof in self.moving_dofs if dof.direction == direction]
+        if self.model.kind in ("beam", "lumped"):
+            return [other for other in nodes if 0 < abs(other - node) <= 2]
+        here = self.positions[node]
+        return sorted((other for other in nodes if other != node), key=lambda other: self._distance(other, here))[
+            :NEAREST
+        ]
+
+    def where(self, node: int) -> str:
+        """Say where a node is: its number, and its place on structures that have places."""
+        if self.model.kind == "lumped" or node not in self.positions:
+            return f"node {node}"
+        span = extents(self.model)
+        place = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
+        return f"node {node} ({place})"
+
+    def _distance(self, node: int, here: FloatArray) -> float:
+        return float(np.linalg.norm(self.positions[node] - here))

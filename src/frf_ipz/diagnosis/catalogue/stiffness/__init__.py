@@ -1,0 +1,1 @@
+"""Effects: elastic parts that are softer or stiffer, or relax."""

@@ -1,0 +1,1 @@
+"""Effects: held ends, springs to ground and between nodes, axial force."""

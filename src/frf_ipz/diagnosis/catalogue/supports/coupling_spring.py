@@ -1,0 +1,96 @@
+"""A spring between two nodes that the model lacks: a strut, a cable, parts that touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch
+from frf_ipz.diagnosis.catalogue.supports.grounded_spring import floating, is_floating
+from frf_ipz.diagnosis.physics.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.finding import Estimate
+
+SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
+MOST_NODES = 130  # of which all pairs are looked at
+NEXT_TO = 2  # nodes in a row that count as one place: what joins them is the structure itself
+
+
+class CouplingSpring(Effect):
+    """A spring between two nodes."""
+
+    name = "coupling_spring"
+    imitators = ("grounded_spring", "local_stiffness", "axial_load")
+
+    def places(self, specimen: Specimen) -> Sequence[Place]:
+        """All pairs of nodes that are apart and not joined by a spring already."""
+        dofs = specimen.moving_dofs
+        thinned = dofs[:: -(-len(dofs) // MOST_NODES)]
+        return [
+            _place(first.node, second.node, first.direction)
+            for first, second in combinations(thinned, 2)
+            if first.direction == second.direction and _is_new(specimen, first.node, second.node)
+        ]
+
+    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+        """Stiffness."""
+        own = specimen.stiffness_against(_motion(specimen, place))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
+
+    def build(self, specimen: Specimen, place: Place) -> Builder:
+        """Add it to the matrix."""
+        motion = sparse.csr_array(_motion(specimen, place)[:, None])
+        unit = sparse.csr_array(motion @ motion.T)
+        floats = is_floating(place)
+        return lambda values: Change(stiffness=values[0] * unit, floating=floats)
+
+    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+        """Draw a constant."""
+        return Sketch(
+            motion=_motion(specimen, place),
+            shapes=np.ones((1, len(specimen.contour)), complex),
+            values=np.ones((1, 1)),
+        )
+
+    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """One of the ends at a node beside."""
+        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
+        pairs = [(near, second) for near in specimen.nodes_near(first, direction)]
+        pairs += [(first, near) for near in specimen.nodes_near(second, direction)]
+        found = [_place(a, b, direction) for a, b in pairs if a != b and _is_new(specimen, a, b)]
+        if is_floating(place):
+            return [floating(other) for other in found]
+        return [*found, *([floating(place)] if specimen.basis.modes.n_rigid else [])]
+
+    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how stiff, and between what."""
+        stiffness = values["stiffness_N_m"]
+        first, second = (specimen.where(int(str(node))) for node in place.key[:2])
+        return (
+            f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
+            "the model lacks it."
+        )
+
+
+def _place(first: int, second: int, direction: str) -> Place:
+    low, high = sorted((first, second))
+    return Place(key=(low, high, direction), location={"nodes": [low, high]})
+
+
+def _is_new(specimen: Specimen, first: int, second: int) -> bool:
+    model = specimen.model
+    if model.kind == "beam":
+        return abs(first - second) > NEXT_TO
+    return not any(part.kind == "spring" and {first, second} == set(part.nodes) for part in model.parts)
+
+
+def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+    first, second, direction = place.key[:3]
+    ends = {dof.node: dof for dof in specimen.moving_dofs if dof.direction == direction}
+    return specimen.unit(ends[int(str(second))]) - specimen.unit(ends[int(str(first))])

@@ -1,0 +1,110 @@
+"""Forces of hammer blows without the noise of the times at which nothing touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import periodogram
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
+from frf_ipz.diagnosis.observations import Blow
+
+LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
+ABOVE_NOISE = 6.0  # standard deviations
+RINGING = 25  # samples before and after the pulse that are kept whole: a converter's filter rings
+TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
+QUIET = 200  # samples after the pulse that are left out when the force's noise is read
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pulse:
+    """A blow with the noise outside its pulse taken away.
+
+    Parameters
+    ----------
+    blow : Blow
+        The blow with the force that is left.
+    start, stop : int
+        Samples that are kept.
+    """
+
+    blow: Blow
+    start: int
+    stop: int
+
+
+def isolate_pulse(blow: Blow) -> Pulse:
+    """Take away what the force shows while nothing touches.
+
+    Parameters
+    ----------
+    blow : Blow
+        A hammer blow.
+
+    Returns
+    -------
+    Pulse
+        The blow with a force that is zero outside the pulse and the ringing of the converter's filter.
+    """
+    size = np.abs(blow.force)
+    top = int(np.argmax(size))
+    noise = float(np.std(blow.force[: max(top // 2, 1)])) if top > 8 else 0.0
+    above = np.flatnonzero(size > max(ABOVE_NOISE * noise, LEAST_PART * size[top]))
+    sample = np.arange(blow.n_samples)
+    outside = np.maximum(int(above[0]) - RINGING - sample, sample - int(above[-1]) - RINGING)
+    window = np.cos(np.pi / 2 * np.clip(outside / TAPER, 0, 1)) ** 2
+    kept = np.flatnonzero(window > 0.5)
+    return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+
+
+def force_noise(blows: tuple[Blow, ...], pulses: tuple[Pulse, ...]) -> Noise:
+    """Read the noise of the force channel where nothing touches.
+
+    Parameters
+    ----------
+    blows : tuple of Blow
+        As recorded.
+    pulses : tuple of Pulse
+        The same blows, isolated.
+
+    Returns
+    -------
+    Noise
+        N^2 s.
+    """
+    lines: list[FloatArray] = []
+    energies: list[FloatArray] = []
+    for blow, pulse in zip(blows, pulses, strict=True):
+        quiet = blow.force[pulse.stop + QUIET :]
+        if len(quiet) < 64:
+            continue
+        frequency, density = periodogram(quiet, 1 / blow.step_s, detrend=False)
+        inside = (frequency > 0) & (frequency < 0.4 / blow.step_s)
+        lines.append(frequency[inside])
+        energies.append(density[inside] / 2)
+    if not lines:
+        return Noise(white=0.0)
+    frequency, energy = np.concatenate(lines), np.concatenate(energies)
+    return fit_noise(frequency, energy, np.ones_like(energy), np.zeros_like(energy))
+
+
+def window_energy(s: ComplexArray, pulse: Pulse) -> ComplexArray:
+    """Give the covariance that noise of density 1 within the pulse's stretch has on lines.
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    pulse : Pulse
+        Which stretch is kept.
+
+    Returns
+    -------
+    (n_points, n_points) complex array
+        s.
+    """
+    rate = s[:, None] + s[None, :].conj()
+    first, last = pulse.start * pulse.blow.step_s, pulse.stop * pulse.blow.step_s
+    return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)

@@ -1,0 +1,249 @@
+"""Transfer functions and their errors from single blows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+from scipy.fft import next_fast_len
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.measured.contour import COARSE_WIDTH, Resonances, find_resonances
+from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energy
+from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
+from frf_ipz.diagnosis.measured.transfer import Measured
+from frf_ipz.diagnosis.observations import Blow, Observations, spectra
+from frf_ipz.frf import FrfLabel
+
+ENOUGH = 8.0  # decays within a record: of a mode 3e-4 is left
+FINER = 4  # lines between those of the record: peaks are seen at their tops
+SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
+LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
+COMMON_PART = 1e-2  # of the largest: shared errors below are left out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Survey:
+    """What has to be known about recordings before a contour is laid.
+
+    Parameters
+    ----------
+    groups : tuple of tuple of Blow
+        Blows with the same place and the same sensors, forces without noise around them.
+    pulses : tuple of tuple of Pulse
+        The stretches of the forces that were kept; empty for shakers.
+    force : Noise
+        Of the force channel.
+    responses : dict of str to Noise
+        Of each output channel.
+    resonances : Resonances
+        Peaks of all FRFs.
+    least_decay_1_s : float
+        sigma that makes the ends of the records vanish.
+    """
+
+    groups: tuple[tuple[Blow, ...], ...]
+    pulses: tuple[tuple[Pulse, ...], ...]
+    force: Noise
+    responses: dict[str, Noise]
+    resonances: Resonances
+    least_decay_1_s: float
+
+
+def survey(observations: Observations) -> Survey:
+    """Find resonances, noise, and how fast records decay.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+
+    Returns
+    -------
+    Survey
+        What `measure` needs.
+    """
+    is_hammer = observations.kind == "hammer"
+    pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in _groups(observations)) if is_hammer else ()
+    groups = tuple(tuple(p.blow for p in group) for group in pulses) if is_hammer else _groups(observations)
+    noise = Noise(white=0.0)
+    if is_hammer:
+        flat = tuple(p for group in pulses for p in group)
+        noise = force_noise(tuple(b for group in _groups(observations) for b in group), flat)
+    decay = ENOUGH / min(blow.duration_s for group in groups for blow in group)
+    line_sets = [_lines(group, observations.band_hz, decay) for group in groups]
+    resonances = _resonances(line_sets, decay)
+    responses = _response_noise(groups, pulses, line_sets, noise)
+    return Survey(
+        groups=groups,
+        pulses=pulses,
+        force=noise,
+        responses=responses,
+        resonances=resonances,
+        least_decay_1_s=_least_decay(decay, resonances) if is_hammer else decay,
+    )
+
+
+def _groups(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
+    keys = dict.fromkeys(
+        (blow.input_dof, tuple((sensor.channel, sensor.dof) for sensor in blow.sensors)) for blow in observations.blows
+    )
+    return tuple(
+        tuple(
+            blow
+            for blow in observations.at(key[0])
+            if tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) == key[1]
+        )
+        for key in keys
+    )
+
+
+def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
+    """Sigma that makes what is left of every mode vanish, together with the mode's own decay."""
+    slowest = float(resonances.decay_1_s.min(initial=np.inf)) if len(resonances.decay_1_s) else 0.0
+    return max(enough_1_s - SURE_PART * slowest, LEAST_PART * enough_1_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Lines:
+    s: ComplexArray
+    force: ComplexArray  # (n_lines, n_blows)
+    responses: ComplexArray  # (n_lines, n_blows, n_sensors)
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        return np.asarray(self.s.imag / (2 * np.pi))
+
+    @property
+    def power(self) -> FloatArray:
+        return np.asarray((np.abs(self.force) ** 2).sum(1))
+
+    @property
+    def values(self) -> ComplexArray:
+        crossed = (self.responses * self.force.conj()[:, :, None]).sum(1)
+        return np.asarray(crossed / self.power[:, None])
+
+
+def _lines(group: tuple[Blow, ...], band_hz: tuple[float, float], decay: float) -> _Lines:
+    """Uniform lines by FFT; blows of a group may differ in length, the shortest counts."""
+    n, step = min(blow.n_samples for blow in group), group[0].step_s
+    window = np.exp(-decay * step * np.arange(n)) * step
+    padded = next_fast_len(FINER * n, real=True)
+    frequency = np.fft.rfftfreq(padded, step)
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    force = np.stack([np.fft.rfft(blow.force[:n] * window, padded)[inside] for blow in group], 1)
+    responses = np.stack([np.fft.rfft(blow.responses[:, :n] * window, padded)[:, inside].T for blow in group], 1)
+    s = np.asarray(decay + 2j * np.pi * frequency[inside], np.complex128)
+    return _Lines(s=s, force=force, responses=responses)
+
+
+def _response_noise(
+    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[_Lines], noise: Noise
+) -> dict[str, Noise]:
+    found = {}
+    channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
+    for channel in channels:
+        stacks: list[tuple[FloatArray, ...]] = []
+        for place, (group, lines) in enumerate(zip(groups, line_sets, strict=True)):
+            names = [sensor.channel for sensor in group[0].sensors]
+            if channel not in names or len(group) < 2:
+                continue
+            sensor = names.index(channel)
+            residual = lines.responses[:, :, sensor] - lines.values[:, sensor, None] * lines.force
+            energy = (np.abs(residual) ** 2).sum(1) / (len(group) - 1)
+            kept_s = np.mean([(p.stop - p.start) * p.blow.step_s for p in pulses[place]]) if pulses else 0.0
+            known = np.abs(lines.values[:, sensor]) ** 2 * noise.density(lines.frequency_hz) * kept_s
+            rate = 2 * lines.s.real
+            gain = (1 - np.exp(-rate * _duration_s(group))) / rate
+            stacks.append((lines.frequency_hz, energy, gain, known))
+        found[channel] = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
+    return found
+
+
+def _duration_s(group: tuple[Blow, ...]) -> float:
+    return min(blow.duration_s for blow in group)
+
+
+def _resonances(line_sets: list[_Lines], decay: float) -> Resonances:
+    lines = line_sets[0]
+    level = np.zeros(len(lines.frequency_hz))
+    for one in line_sets:
+        size = np.abs(one.values) ** 2
+        summed = (size / np.median(size, axis=0)).sum(1)
+        level += np.interp(lines.frequency_hz, one.frequency_hz, summed)
+    return find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
+
+
+def measure(found: Survey, s: ComplexArray) -> Measured:
+    """Evaluate transfer functions on a contour.
+
+    Parameters
+    ----------
+    found : Survey
+        Of the recordings.
+    s : (n_points,) complex array
+        rad/s.
+
+    Returns
+    -------
+    Measured
+        With the covariance of their errors.
+    """
+    wide = np.asarray(np.maximum(s.real, COARSE_WIDTH * s.imag) + 1j * s.imag)
+    labels, values, sizes, covariances, input_of, common = [], [], [], [], [], []
+    for place, group in enumerate(found.groups):
+        points = _at(group, s)
+        size = np.maximum(np.abs(points.values), np.abs(_at(group, wide).values))
+        crossed = points.force.conj() @ points.force.T / np.outer(points.power, points.power)
+        common.append(_common(found, place, points))
+        for column, sensor in enumerate(group[0].sensors):
+            labels.append(
+                FrfLabel(sensor.dof, group[0].input_dof, sensor.quantity, sensor.channel, group[0].input_channel)
+            )
+            values.append(points.values[:, column])
+            sizes.append(size[:, column])
+            covariances.append(crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group)))
+            input_of.append(place)
+    return Measured(
+        s=s,
+        labels=tuple(labels),
+        values=np.stack(values, 1),
+        size=np.stack(sizes, 1),
+        covariance=np.array(covariances),
+        common=tuple(common),
+        input_of=np.array(input_of),
+    )
+
+
+def _at(group: tuple[Blow, ...], s: ComplexArray) -> _Lines:
+    pairs = spectra(group, s)
+    return _Lines(
+        s=s,
+        force=np.stack([force for force, _ in pairs], 1),
+        responses=np.stack([responses for _, responses in pairs], 1),
+    )
+
+
+def _record_noise(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexArray:
+    """Covariance of the transform of noise over a whole record."""
+    rate = s[:, None] + s[None, :].conj()
+    root = np.sqrt(noise.density(s.imag / (2 * np.pi)))
+    return np.asarray(np.outer(root, root) * (1 - np.exp(-rate * duration_s)) / rate)
+
+
+def _common(found: Survey, place: int, points: _Lines) -> ComplexArray:
+    """Errors that the force's noise puts on all FRFs of a place, as independent columns."""
+    n = len(points.frequency_hz)
+    if not found.pulses or found.force.white == 0:
+        return np.zeros((n, 0), np.complex128)
+    s = points.s
+    root = np.sqrt(found.force.density(points.frequency_hz))
+    total = np.zeros((n, n), np.complex128)
+    for column, pulse in enumerate(found.pulses[place]):
+        force = points.force[:, column]
+        total += np.outer(force.conj(), force) * window_energy(s, pulse)
+    total *= np.outer(root, root) / np.outer(points.power, points.power)
+    values, vectors = linalg.eigh(total)
+    kept = values > COMMON_PART * values[-1]
+    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))

@@ -1,0 +1,174 @@
+"""Measured transfer functions on a contour, with the covariance of their errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.frf import FrfLabel
+
+SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that varies slowly along the band
+SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
+ROUGH_PART = 0.15  # of the tolerance: the same from point to point
+NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """Transfer functions on a contour.
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    labels : tuple of FrfLabel
+        One an FRF.
+    values : (n_points, n_frfs) complex array
+        SI.
+    size : (n_points, n_frfs) array
+        How large the FRF is without its zeros: what relative errors of a model refer to.
+    covariance : (n_frfs, n_points, n_points) complex array
+        Of the noise.
+    common : tuple of (n_points, n_shared) complex array
+        For each input, errors that all its FRFs share as a factor, from the noise of the force; each column is one
+        standard deviation.
+    input_of : (n_frfs,) int array
+        Which entry of `common` belongs to an FRF.
+    """
+
+    s: ComplexArray
+    labels: tuple[FrfLabel, ...]
+    values: ComplexArray
+    size: FloatArray
+    covariance: ComplexArray
+    common: tuple[ComplexArray, ...]
+    input_of: IntArray
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Frequencies of the points, Hz."""
+        return np.asarray(self.s.imag / (2 * np.pi))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Whitening:
+    """What turns errors of all FRFs into independent ones of variance 1.
+
+    Parameters
+    ----------
+    factors : (n_frfs, n_points, n_points) complex array
+        Inverses of the lower Cholesky factors of each FRF's covariance.
+    blocks : tuple of (FRFs, Q, shrink)
+        Errors that several FRFs share: orthonormal directions in whitened space, and the part to take off each.
+    """
+
+    factors: ComplexArray
+    blocks: tuple[tuple[IntArray, FloatArray, FloatArray], ...]
+
+    def __call__(self, errors: ComplexArray) -> FloatArray:
+        """Whiten.
+
+        Parameters
+        ----------
+        errors : (n_points, n_frfs, ...) complex array
+            SI.
+
+        Returns
+        -------
+        (2 n_points n_frfs, ...) array
+            Real and imaginary parts, each of variance 1.
+        """
+        n_points, n_frfs, *rest = errors.shape
+        white = _separately(self.factors, errors).reshape(n_frfs, 2 * n_points, -1)
+        for frfs, directions, shrink in self.blocks:
+            part = white[frfs].reshape(len(frfs) * 2 * n_points, -1)
+            part = part - directions @ (shrink[:, None] * (directions.T @ part))
+            white[frfs] = part.reshape(len(frfs), 2 * n_points, -1)
+        return np.ascontiguousarray(white.reshape(n_frfs * 2 * n_points, *rest))
+
+
+def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
+    """Whiten each FRF by itself, (n_frfs, 2 n_points, n) array."""
+    moved = np.moveaxis(errors, 1, 0).reshape(errors.shape[1], errors.shape[0], -1)
+    white = np.sqrt(2.0) * (factors @ moved)
+    return np.concatenate([white.real, white.imag], axis=1)
+
+
+def whiten(measured: Measured, *, tolerance: float, gain_std: float, floor: float = 1.0) -> Whitening:
+    """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
+
+    Parameters
+    ----------
+    measured : Measured
+        The data.
+    tolerance : float
+        Relative tolerance of the model: its FRFs are off by a part of it that no parameter stands for.
+    gain_std : float
+        Standard deviation of the gains of all channels.
+    floor : float
+        Factor of the model's errors: large ones let a search see past narrow peaks.
+
+    Returns
+    -------
+    Whitening
+        To apply to misfits and their derivatives.
+    """
+    log_omega = np.log(measured.s.imag)
+    apart = (log_omega[:, None] - log_omega[None, :]) / SMOOTH_LENGTH
+    smooth = SMOOTH_PART**2 * np.exp(-0.5 * apart**2) + ROUGH_PART**2 * np.eye(len(measured.s))
+    factors: list[ComplexArray] = []
+    for frf in range(len(measured.labels)):
+        relative = measured.size[:, frf] * np.exp(1j * np.angle(measured.values[:, frf]))
+        model = (floor * tolerance) ** 2 * smooth * np.outer(relative, relative.conj())
+        lower = linalg.cholesky(measured.covariance[frf] + model, lower=True, check_finite=False)
+        inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True, check_finite=False)
+        factors.append(np.asarray(inverse, np.complex128))
+    found = np.array(factors, np.complex128)
+    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, gain_std)))
+
+
+def _blocks(
+    measured: Measured, factors: ComplexArray, gain_std: float
+) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+    """Noise of the force for each blow's place; then gains of all channels."""
+    blocks = []
+    for place, shared in enumerate(measured.common):
+        frfs = np.flatnonzero(measured.input_of == place)
+        if shared.shape[1]:
+            blocks.append(_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
+    every = np.arange(len(measured.labels))
+    gains = _gain_columns(measured) * gain_std
+    errors = measured.values[:, :, None] * gains
+    found = _separately(factors, errors).reshape(-1, gains.shape[2])
+    for frfs, directions, shrink in blocks:
+        rows = (frfs[:, None] * 2 * len(measured.s) + np.arange(2 * len(measured.s))).ravel()
+        found[rows] -= directions @ (shrink[:, None] * (directions.T @ found[rows]))
+    return [*blocks, (every, *_directions(found))]
+
+
+def _block(
+    measured: Measured, factors: ComplexArray, frfs: IntArray, shared: ComplexArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    errors = measured.values[:, frfs, None] * shared[:, None, :]
+    columns = _separately(factors[frfs], errors).reshape(-1, shared.shape[1])
+    strong = np.sum(columns**2, 0) > NEGLIGIBLE
+    return (frfs, *_directions(columns[:, strong]))
+
+
+def _directions(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Directions of shared errors, and the part of them that is more than variance 1 allows."""
+    directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return directions, 1 - 1 / np.sqrt(1 + sizes**2)
+
+
+def _gain_columns(measured: Measured) -> FloatArray:
+    """Each channel's own FRFs, (1, n_frfs, n_channels): the force divides, outputs multiply."""
+    labels = measured.labels
+    channels = dict.fromkeys(label.output_channel or str(label.output_dof) for label in labels)
+    outputs = [
+        [float((label.output_channel or str(label.output_dof)) == name) for name in channels] for label in labels
+    ]
+    return np.hstack([np.ones((len(labels), 1)), np.array(outputs)])[None]

@@ -1,0 +1,168 @@
+"""Which motions are measured and struck, and in which directions sensors and blows may be off their places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.beams.interpolation import slope_row
+
+if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.structure import StructuralModel
+
+AXES = ("x", "y", "z")
+ROTATION = {("z", "x"): ("ry", -1.0), ("z", "y"): ("rx", 1.0), ("y", "x"): ("rz", 1.0),
+            ("y", "z"): ("rx", -1.0), ("x", "y"): ("rz", -1.0), ("x", "z"): ("ry", 1.0)}  # fmt: skip
+NEIGHBOURS = 6  # that tell how a motion changes from place to place, where a model has no rotations
+FLAT = 1e-6  # of the largest extent: a structure has no extent in such a direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """Sensors and blows of a test.
+
+    Parameters
+    ----------
+    outputs : tuple of (str, Dof)
+        Channel and DOF of each sensor position; one channel may have several.
+    inputs : tuple of Dof
+        Struck DOFs.
+    input_channel : str
+        Column of the force.
+    output_of, input_of : (n_frfs,) int array
+        Which of them each FRF connects.
+    power : (n_frfs,) int array
+        Power of s that makes a receptance the measured quantity.
+    """
+
+    outputs: tuple[tuple[str, Dof], ...]
+    inputs: tuple[Dof, ...]
+    input_channel: str
+    output_of: IntArray
+    input_of: IntArray
+    power: IntArray
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels, the force first."""
+        return (self.input_channel, *dict.fromkeys(channel for channel, _ in self.outputs))
+
+
+def lay_out(labels: Sequence[FrfLabel]) -> Layout:
+    """Sort what FRFs connect.
+
+    Parameters
+    ----------
+    labels : sequence of FrfLabel
+        One an FRF.
+
+    Returns
+    -------
+    Layout
+        Each sensor position and each struck DOF once.
+    """
+    named = [(label.output_channel or f"output {label.output_dof}", label.output_dof) for label in labels]
+    outputs, inputs = tuple(dict.fromkeys(named)), tuple(dict.fromkeys(label.input_dof for label in labels))
+    return Layout(
+        outputs=outputs,
+        inputs=inputs,
+        input_channel=labels[0].input_channel or f"input {labels[0].input_dof}",
+        output_of=np.array([outputs.index(name) for name in named]),
+        input_of=np.array([inputs.index(label.input_dof) for label in labels]),
+        power=np.array([label.quantity.power for label in labels]),
+    )
+
+
+def motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
+    """Weights of all DOFs in the motion that a sensor at a DOF sees, with its sign.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+    dof : Dof
+        The DOF.
+
+    Returns
+    -------
+    (n_all,) array
+        A single entry.
+    """
+    row = np.zeros(len(model.all_dofs))
+    row[model.place(dof)] = dof.sign
+    return row
+
+
+def extents(model: StructuralModel) -> Mapping[str, float]:
+    """Size of a structure along each axis.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+
+    Returns
+    -------
+    mapping of str to float
+        m; axes along which it has no size are left out, and all of a lumped model, whose masses have no places.
+    """
+    if model.kind == "lumped":
+        return {}
+    spans = np.ptp(model.geometry.coordinates_m, axis=0)
+    return {axis: float(span) for axis, span in zip(AXES, spans, strict=True) if span > FLAT * spans.max()}
+
+
+def shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
+    """How the motion at a DOF changes with its place.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+    dof : Dof
+        Of a sensor or a blow.
+
+    Returns
+    -------
+    dict of str to (n_all,) array
+        For each axis along which it could be elsewhere, weights of all DOFs in the derivative, 1/m.
+    """
+    axes = [axis for axis in extents(model) if axis != dof.direction]
+    return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
+
+
+def _shift_row(model: StructuralModel, dof: Dof, axis: str) -> FloatArray:
+    geometry = model.geometry
+    position = geometry.coordinates_m[np.searchsorted(geometry.nodes, dof.node)]
+    if model.kind == "beam":
+        return slope_row(model, float(position[0]))
+    row = np.zeros(len(model.all_dofs))
+    rotation, sign = ROTATION[dof.direction, axis]
+    if Dof(dof.node, rotation) in model.places:
+        row[model.places[Dof(dof.node, rotation)]] = sign
+        return row
+    return _from_neighbours(model, dof, AXES.index(axis))
+
+
+def _from_neighbours(model: StructuralModel, dof: Dof, axis: int) -> FloatArray:
+    """Slope of a plane through the motion of the nearest nodes."""
+    rows = [place for other, place in model.places.items() if other.direction == dof.direction]
+    nodes = np.array([model.all_dofs[row].node for row in rows])
+    places = model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, nodes)]
+    here = places[nodes == dof.node][0]
+    distance = np.linalg.norm(places - here, axis=1)
+    near = np.argsort(distance)[: NEIGHBOURS + 1]
+    offsets = (places - here)[near]
+    used = np.ptp(offsets, axis=0) > FLAT * distance[near].max()
+    plane = np.hstack([np.ones((len(near), 1)), offsets[:, used]])
+    row = np.zeros(len(model.all_dofs))
+    if used[axis]:
+        column = 1 + int(np.count_nonzero(used[:axis]))
+        row[np.array(rows)[near]] = np.linalg.pinv(plane)[column]
+    return row

@@ -1,0 +1,367 @@
+"""FRFs of a modified model, and their derivatives by what cannot be known.
+
+Structural changes are solved for in the basis, so that damping belongs to the modes that the structure really has.
+Scatter then acts on those modes, and what has dynamics of its own (resonators, dampers) is attached last, by the
+inversion lemma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.physics.layout import motion_row
+from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
+from frf_ipz.dofs import Dof
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.physics.basis import Basis
+    from frf_ipz.diagnosis.physics.change import Change
+    from frf_ipz.diagnosis.physics.layout import Layout
+    from frf_ipz.diagnosis.physics.nuisance import Nuisance, Unknowns
+
+RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
+LEAST_RATIO = 1e-6  # where a model states no damping at all
+SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modes:
+    """Modes of a modified structure at sensors and blows.
+
+    Parameters
+    ----------
+    omega : (q,) array
+        rad/s, before scatter; 0 for rigid-body modes.
+    squares : (q,) array
+        Squared frequencies with scatter.
+    stated_ratio, ratio : (q,) array
+        Damping ratios without and with scatter.
+    rotation : (m, m) array
+        Columns are the modes with scatter in terms of those without.
+    outputs, inputs : (n, q) array
+        Shapes with scatter, with signs.
+    output_shifts, input_shifts : (n, n_axes, q) array
+        How they change with places, 1/m.
+    vectors : (q_basis, q) array
+        The modes in terms of the basis.
+    viscous : (q, q) array, optional
+        Damping of the model's matrix, where it has one.
+    """
+
+    omega: FloatArray
+    squares: FloatArray
+    stated_ratio: FloatArray
+    ratio: FloatArray
+    rotation: FloatArray
+    outputs: FloatArray
+    inputs: FloatArray
+    output_shifts: FloatArray
+    input_shifts: FloatArray
+    vectors: FloatArray
+    viscous: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """FRFs, and the modal motions that they are made of.
+
+    Parameters
+    ----------
+    values : (n_points, n_frfs) complex array
+        SI, in the quantities of the FRFs, as the channels show them.
+    modes : Modes
+        The modes.
+    output_motion, input_motion : (n_points, q, n) complex array
+        Modal motion for unit forces at sensors and blows, attachments included.
+    chain : (n_points, n_frfs) complex array
+        Factor from receptance to what is shown.
+    s : (n_points,) complex array
+        rad/s.
+    attached_motion : (n_points, q, n) complex array
+        Modal motion for unit forces where something is attached, without it.
+    attached_stiffness : (n_points, n, n) complex array
+        Forces on the structure there per motion that it would have without.
+    """
+
+    values: ComplexArray
+    modes: Modes
+    output_motion: ComplexArray
+    input_motion: ComplexArray
+    chain: ComplexArray
+    s: ComplexArray
+    attached_motion: ComplexArray
+    attached_stiffness: ComplexArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """Sensors and blows in the coordinates of a basis.
+
+    Parameters
+    ----------
+    outputs, inputs : (n, q) array
+        With signs.
+    output_shifts, input_shifts : (n, n_axes, q) array
+        Their change with places, 1/m.
+    """
+
+    outputs: FloatArray
+    inputs: FloatArray
+    output_shifts: FloatArray
+    input_shifts: FloatArray
+
+
+def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) -> Rows:
+    """Bring sensors and blows into the coordinates of a basis.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    layout : Layout
+        Sensors and blows.
+    change : Change
+        Says which sensors are elsewhere.
+    nuisance : Nuisance
+        Says along which axes places are uncertain.
+
+    Returns
+    -------
+    Rows
+        Sensors where the change says they are.
+    """
+    outputs = tuple(
+        Dof(change.moved.get(channel, dof.node), dof.direction, dof.sign) for channel, dof in layout.outputs
+    )
+    return Rows(
+        outputs=np.array([motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,
+        inputs=np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors,
+        output_shifts=all_shift_rows(basis, nuisance, outputs),
+        input_shifts=all_shift_rows(basis, nuisance, layout.inputs),
+    )
+
+
+def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Modes:
+    """Solve for the modes of a modified structure, with scatter.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    change : Change
+        What is different in structure and damping.
+    rows : Rows
+        Sensors and blows.
+    unknowns : Unknowns
+        What cannot be known.
+
+    Returns
+    -------
+    Modes
+        By ascending frequency.
+    """
+    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
+    if change.mass is None:
+        squares, vectors = linalg.eigh(stiffness, check_finite=False)
+    else:
+        mass = np.eye(len(stiffness)) + basis.project(change.mass)
+        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
+    largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
+    vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
+    n_rigid = basis.modes.n_rigid
+    elastic = squares[n_rigid] if len(squares) > n_rigid else 1.0
+    squares = np.where(np.abs(squares) <= RIGID * abs(elastic), 0.0, squares)
+    if change.floating:
+        squares[:n_rigid] = 0.0
+    omega = np.sqrt(np.abs(squares))
+    scattered, rotation = _scatter(squares, omega, unknowns)
+    m = len(rotation)
+    turned = vectors.copy()
+    turned[:, :m] = vectors[:, :m] @ rotation
+    stated = _ratios(basis, change, squares)
+    stated[: basis.modes.n_rigid] = SUSPENSION_RATIO
+    ratio = stated.copy()
+    ratio[:m] *= 1 + unknowns.damping
+    viscous = turned.T @ basis.damping @ turned if basis.damping.any() else None
+    return Modes(
+        omega=omega,
+        squares=scattered,
+        stated_ratio=stated,
+        ratio=ratio,
+        rotation=rotation,
+        outputs=rows.outputs @ turned,
+        inputs=rows.inputs @ turned,
+        output_shifts=rows.output_shifts @ turned,
+        input_shifts=rows.input_shifts @ turned,
+        vectors=turned,
+        viscous=viscous,
+    )
+
+
+def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
+    m, rigid = len(unknowns.kappa), len(unknowns.cords)
+    block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
+    block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
+    values, rotation = linalg.eigh(block, np.eye(m) + unknowns.mu, check_finite=False)
+    rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
+    return np.concatenate([values, squares[m:]]), rotation
+
+
+def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
+    if change.modal_ratio is not None:
+        return np.full(len(squares), change.modal_ratio)
+    stated = basis.model.modal_damping
+    if not stated.size:
+        return np.full(len(squares), LEAST_RATIO if not basis.damping.any() else 0.0)
+    number = np.maximum(np.arange(len(squares)) - basis.modes.n_rigid, 0)
+    return stated[np.minimum(number, stated.size - 1)].copy()
+
+
+def respond(
+    modes: Modes, change: Change, layout: Layout, unknowns: Unknowns, s: ComplexArray, basis: Basis
+) -> Response:
+    """Evaluate the FRFs of a modified structure.
+
+    Parameters
+    ----------
+    modes : Modes
+        Of the structure.
+    change : Change
+        Its attachments, loss factor and channels.
+    layout : Layout
+        Sensors and blows.
+    unknowns : Unknowns
+        Shifts of sensors and blows.
+    s : (n_points,) complex array
+        rad/s.
+    basis : Basis
+        Of the structure.
+
+    Returns
+    -------
+    Response
+        What would be measured without noise.
+    """
+    left = modes.outputs + np.einsum("na,naq->nq", unknowns.output_shift, modes.output_shifts)
+    right = modes.inputs + np.einsum("na,naq->nq", unknowns.input_shift, modes.input_shifts)
+    n_left = len(left)
+    motions = [attachment.motions for attachment in change.attachments]
+    attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
+    loads = np.concatenate([left, right, attached])
+    motion = _solve(modes, change.loss_factor, loads, s)
+    own = motion[:, :, len(left) + len(right) :]
+    stiffness = _coupled(own, attached, change, s)
+    motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
+    output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
+    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of]
+    chain = s[:, None] ** layout.power * _channels(change, layout, s)
+    return Response(
+        values=receptance * chain,
+        modes=modes,
+        output_motion=output_motion,
+        input_motion=input_motion,
+        chain=chain,
+        s=s,
+        attached_motion=own,
+        attached_stiffness=stiffness,
+    )
+
+
+def _solve(modes: Modes, loss_factor: float, loads: FloatArray, s: ComplexArray) -> ComplexArray:
+    """Modal motion under loads, (n_points, q, n_loads)."""
+    squares = modes.squares * (1 + 1j * loss_factor)
+    damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
+    denominators = s[:, None] ** 2 + s[:, None] * damping + squares
+    if modes.viscous is None:
+        return np.asarray(loads.T[None] / denominators[:, :, None])
+    dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))
+    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads.T, (len(s), *loads.T.shape))), np.complex128)
+
+
+def _coupled(own: ComplexArray, attached: FloatArray, change: Change, s: ComplexArray) -> ComplexArray:
+    """D (1 + R D)^-1 of all attachments, (n_points, n, n)."""
+    n = len(attached)
+    if n == 0:
+        return np.zeros((len(s), 0, 0), complex)
+    stiffness = np.concatenate(
+        [
+            np.repeat(attachment.stiffness(s)[:, None], attachment.motions.shape[1], 1)
+            for attachment in change.attachments
+        ],
+        axis=1,
+    )
+    inner = np.eye(n) + stiffness[:, :, None] * np.matmul(attached, own)
+    return np.linalg.solve(inner, stiffness[:, :, None] * np.eye(n))
+
+
+def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:
+    factors = np.ones((len(s), len(layout.output_of)), complex)
+    for channel, transfer in change.channels.items():
+        gain = transfer(s)
+        if channel == layout.input_channel:
+            factors /= gain[:, None]
+        for index, (name, _) in enumerate(layout.outputs):
+            if name == channel:
+                factors[:, layout.output_of == index] *= gain[:, None]
+    return factors
+
+
+def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) -> ComplexArray:
+    """Differentiate FRFs by what cannot be known.
+
+    Parameters
+    ----------
+    response : Response
+        At the point of linearisation.
+    nuisance : Nuisance
+        The parameters.
+    layout : Layout
+        Sensors and blows.
+
+    Returns
+    -------
+    (n_points, n_frfs, size) complex array
+        Per standard deviation of each parameter.
+    """
+    modes, s, m = response.modes, response.s, nuisance.n_modes
+    scattered_left = response.output_motion[:, :m][:, :, layout.output_of]
+    scattered_right = response.input_motion[:, :m][:, :, layout.input_of]
+    left = np.matmul(modes.rotation, scattered_left)
+    right = np.matmul(modes.rotation, scattered_right)
+    i, j = nuisance.pairs
+    products = left[:, i] * right[:, j]
+    across = i != j
+    products[:, across] += left[:, j[across]] * right[:, i[across]]
+    omega = modes.omega[:m]
+    kappa = -products * (omega[i] * omega[j] * nuisance.kappa_std[i, j])[:, None]
+    mu = -products * (s**2)[:, None, None] * nuisance.mu_std[i, j][:, None]
+    own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance.damping_std
+    damping = -scattered_left * scattered_right * own[:, None] * s[:, None, None]
+    rigid = slice(0, nuisance.n_rigid)
+    cords = -left[:, rigid] * right[:, rigid] * nuisance.cords_std
+    parts = [kappa, mu, damping, cords]
+    parts += _shift_jacobians(response, nuisance, layout)
+    stacked = np.concatenate(parts, axis=1) * response.chain[:, None, :]
+    return np.asarray(np.moveaxis(stacked, 1, 2))
+
+
+def _shift_jacobians(response: Response, nuisance: Nuisance, layout: Layout) -> list[ComplexArray]:
+    modes = response.modes
+    outputs = np.einsum("naq,kqi->knai", modes.output_shifts, response.input_motion)
+    inputs = np.einsum("naq,kqo->knao", modes.input_shifts, response.output_motion)
+    n_frfs = len(layout.output_of)
+    found: list[ComplexArray] = []
+    for count, own, other, motion in (
+        (nuisance.n_outputs, layout.output_of, layout.input_of, outputs),
+        (nuisance.n_inputs, layout.input_of, layout.output_of, inputs),
+    ):
+        part = np.zeros((len(response.s), count, len(nuisance.axes), n_frfs), np.complex128)
+        frf = np.arange(n_frfs)
+        part[:, own, :, frf] = motion[:, own, :, other]
+        found.append((part * nuisance.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
+    return found

@@ -1,0 +1,169 @@
+"""A hypothesis: causes at their places, ready to be evaluated for any values of their parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.physics.basis import Basis, enrich
+from frf_ipz.diagnosis.physics.change import NOTHING, Change
+from frf_ipz.diagnosis.physics.nuisance import Nuisance
+from frf_ipz.diagnosis.physics.response import Response, Rows, modify, respond, rows_of
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cause:
+    """An effect at a place.
+
+    Parameters
+    ----------
+    effect : Effect
+        What.
+    place : Place
+        Where.
+    n_places : int
+        How many places it could have been: the prior of this one.
+    """
+
+    effect: Effect
+    place: Place
+    n_places: int
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells it from others."""
+        return (self.effect.name, *self.place.key)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """Causes together, with the coordinates that they need.
+
+    Parameters
+    ----------
+    causes : tuple of Cause
+        Empty for the nominal model.
+    parameters : tuple of Parameter
+        Of all causes in turn.
+    builders : tuple of Builder
+        Of each cause.
+    counts : tuple of int
+        Number of parameters of each cause.
+    basis : Basis
+        Coordinates.
+    rows : Rows
+        Sensors and blows in them.
+    specimen : Specimen
+        What is tested.
+    nuisance : Nuisance
+        What cannot be known.
+    """
+
+    causes: tuple[Cause, ...]
+    parameters: tuple[Parameter, ...]
+    builders: tuple[Builder, ...]
+    counts: tuple[int, ...]
+    basis: Basis
+    rows: Rows
+    specimen: Specimen
+    nuisance: Nuisance
+
+    @property
+    def key(self) -> tuple[tuple[object, ...], ...]:
+        """What tells it from others."""
+        return tuple(cause.key for cause in self.causes)
+
+    @property
+    def low(self) -> FloatArray:
+        """Lower bounds as searched."""
+        return self.searched(np.array([parameter.low for parameter in self.parameters]))
+
+    @property
+    def high(self) -> FloatArray:
+        """Upper bounds as searched."""
+        return self.searched(np.array([parameter.high for parameter in self.parameters]))
+
+    def searched(self, values: FloatArray) -> FloatArray:
+        """Turn physical values into what is searched along: logarithms, or parts of the range."""
+        return np.array(
+            [
+                np.log(value) if parameter.is_log else value / (parameter.high - parameter.low)
+                for parameter, value in zip(self.parameters, values, strict=True)
+            ]
+        )
+
+    def physical(self, searched: FloatArray) -> FloatArray:
+        """Turn what is searched along into physical values."""
+        return np.array(
+            [
+                np.exp(value) if parameter.is_log else value * (parameter.high - parameter.low)
+                for parameter, value in zip(self.parameters, searched, strict=True)
+            ]
+        )
+
+    def change(self, values: FloatArray) -> Change:
+        """Everything that is changed for physical values of the parameters."""
+        total, start = NOTHING, 0
+        for build, count in zip(self.builders, self.counts, strict=True):
+            total = total + build(values[start : start + count])
+            start += count
+        return total
+
+    def respond(self, values: FloatArray, unknown: FloatArray, s: ComplexArray) -> Response:
+        """FRFs for physical values of the parameters, and of what cannot be known in standard deviations."""
+        change, unknowns = self.change(values), self.nuisance.unpack(unknown)
+        modes = modify(self.basis, change, self.rows, unknowns)
+        return respond(modes, change, self.specimen.layout, unknowns, s, self.basis)
+
+
+def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
+    """Make a hypothesis.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What is tested.
+    nuisance : Nuisance
+        What cannot be known.
+    causes : tuple of Cause
+        Empty for the nominal model.
+    exact : bool
+        Add the static shapes that the causes need; without them a wide search is faster.
+
+    Returns
+    -------
+    Hypothesis
+        To evaluate.
+    """
+    parameters = tuple(cause.effect.parameters(specimen, cause.place) for cause in causes)
+    builders = tuple(cause.effect.build(specimen, cause.place) for cause in causes)
+    basis, moved = specimen.basis, NOTHING
+    for build, own in zip(builders, parameters, strict=True):
+        typical = build(np.array([_typical(parameter) for parameter in own]))
+        moved = moved + Change(moved=typical.moved)
+        if exact or typical.released or typical.model is not None:
+            basis = enrich(basis, typical)
+    return Hypothesis(
+        causes=causes,
+        parameters=tuple(parameter for own in parameters for parameter in own),
+        builders=builders,
+        counts=tuple(len(own) for own in parameters),
+        basis=basis,
+        rows=rows_of(basis, specimen.layout, moved, nuisance),
+        specimen=specimen,
+        nuisance=nuisance,
+    )
+
+
+def _typical(parameter: Parameter) -> float:
+    if parameter.is_log:
+        middle = float(np.sqrt(parameter.low * parameter.high))
+        return middle if not np.isclose(middle, parameter.neutral, rtol=0.05) else 1.3 * middle
+    return 0.3 * parameter.high
