@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
+from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet, poles_from
 
@@ -109,6 +110,48 @@ def fit_of_modes(truth, labels, band_hz, noise, rng, inside):
             delay_s=model.delay_s,
         )
     return as_fit(model, labels, band_hz, zeros, where, kinds, root @ root.T, residue_covariance)
+
+
+def fit_of_targets(poles, zeros, label, band_hz, *, relative_std=0.0):
+    """A fit that holds given poles and zeros of one FRF and nothing else: residues are 0."""
+    values = np.concatenate([poles, zeros])
+    model = PoleResidueModel(
+        poles=np.asarray(poles),
+        residues=np.zeros((len(poles), 1), complex),
+        powers=(),
+        coefficients=np.zeros((0, 1)),
+        scale_rad_s=1.0,
+        delay_s=np.zeros(1),
+    )
+    covariance = np.diag(np.repeat((relative_std * np.abs(values)) ** 2, 2))
+    kinds = ("complex",) * len(zeros)
+    where = np.zeros(len(zeros), int)
+    nothing = np.zeros((len(poles), 1, 2, 2))
+    return as_fit(model, (label,), band_hz, np.asarray(zeros), where, kinds, covariance, nothing)
+
+
+def in_order(fit, computed_poles, computed_zeros):
+    """Pairs of a fit of one FRF, the k-th with the k-th."""
+    rows = []
+    for kind, frf, measured, computed in (
+        ("pole", -1, fit.model.poles, computed_poles),
+        ("zero", 0, fit.zeros.values, computed_zeros),
+    ):
+        for place, (one, other) in enumerate(zip(measured, computed, strict=True)):
+            rows.append(
+                Pair(
+                    kind=kind,
+                    frf=frf,
+                    measured=place,
+                    computed=place,
+                    measured_value=complex(one),
+                    computed_value=complex(other),
+                    distance=0.0,
+                    verdict=Verdict.PAIRED,
+                    reason="in order",
+                )
+            )
+    return Pairs(rows=tuple(rows))
 
 
 def zeros_in_band(values, band_hz):

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
+from frf_ipz.numerics.pencils import damped_poles, damped_zeros
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
     from frf_ipz.structure import ReducedModel
 
+RIGID = 1e-9  # slope over the largest one below which a root is a double one at zero
 REAL = 1e-6  # imaginary part over modulus below which a root is real: rounding of a double root
 UNSTABLE = 1e-4  # real part over modulus above which a zero lies in the right half plane
 MIRRORED = 0.5  # distance of a mirrored zero from its image, over the real part, up to which the two are a quadruple
@@ -74,7 +75,10 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     roots = roots.take(chosen)
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    residues = (outputs @ roots.right) * (inputs @ roots.left) / roots.slope
+    products = (outputs @ roots.right) * (inputs @ roots.left)
+    # a rigid-body mode is a double root: it has no residue, and no measured mode is one
+    is_simple = np.abs(roots.slope) > RIGID * np.abs(roots.slope).max()
+    residues = np.where(is_simple, products / np.where(is_simple, roots.slope, 1.0), 0.0)
     return ModelPoles(values=roots.values, amplitudes=(residues * 2j * np.abs(roots.values)).T)
 
 
@@ -103,7 +107,7 @@ def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:
     return ModelZeros(
         values=upper.values,
         kind=tuple(kind for kind, kept in zip(kinds, keep, strict=True) if kept),
-        slope_sign=_slope_sign(model, upper, output, force),
+        slope_sign=_slope_sign(model, upper.values, output, force),
     )
 
 
@@ -133,11 +137,11 @@ def _kinds(values: ComplexArray) -> tuple[list[str], BoolArray]:
     return kinds, keep
 
 
-def _slope_sign(model: ReducedModel, zeros: Roots, output: FloatArray, force: FloatArray) -> FloatArray:
-    """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b: as the zero is simple, H changes sign there."""
-    poles = damped_poles(model.mass, model.damping, model.stiffness)
-    residues = (output @ poles.right) * (force @ poles.left) / poles.slope
-    gap = zeros.values[:, None] - poles.values
-    gap = np.where(gap == 0, np.finfo(float).tiny, gap)
-    slope = -(residues / gap**2).sum(axis=1)
+def _slope_sign(model: ReducedModel, zeros: ComplexArray, output: FloatArray, force: FloatArray) -> FloatArray:
+    """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b, from H' = -c P^-1 P' P^-1 b."""
+    s = zeros[:, None, None]
+    dynamic = s**2 * model.mass + s * model.damping + model.stiffness
+    right = np.linalg.solve(dynamic, np.broadcast_to(force[:, None], (*zeros.shape, len(force), 1)))
+    left = np.linalg.solve(dynamic.swapaxes(1, 2), np.broadcast_to(output[:, None], right.shape))
+    slope = -(left.swapaxes(1, 2) @ (2 * s * model.mass + model.damping) @ right)[:, 0, 0]
     return np.asarray(np.sign((1j * slope).real))

@@ -17,10 +17,14 @@ class UpdateOptions:
         ``minimal-change`` or ``ipz`` (as published), or the name of a further module in `updating.methods`.
     mass : bool
         Let the mass change too (minimal-change).
+    damping : bool
+        Change the damping after the stiffness.
     max_iterations : int, optional
         Stop after that many; the method's own limit where it is left out.
     alpha, beta, delta : float
         Regularisation, step and stop of ``ipz``, eqs. (15), (19) and (20) of the paper.
+    delta_damping : float
+        Stop of ``ipz`` when it changes the damping.
     cross_sensitivities : bool
         Use the off-diagonal blocks of eq. (14) (``ipz``).
     ensemble : int
@@ -33,10 +37,12 @@ class UpdateOptions:
 
     method: str = "minimal-change"
     mass: bool = False
+    damping: bool = True
     max_iterations: int | None = None
     alpha: float = 0.1
     beta: float = 0.3
     delta: float = 1e-3
+    delta_damping: float = 0.1
     cross_sensitivities: bool = True
     ensemble: int = 200
     seed: int = 0

@@ -76,6 +76,9 @@ class ParameterBasis:
         Their sum is the prior; its mean is 0.
     regions : tuple of Region
         Where parameters that belong to a place sit: those of the first `len(regions)` parameters.
+    chosen : bool
+        True where a diagnosis has named these very parameters; only then do methods with generic parameters of their
+        own use them instead.
 
     Raises
     ------
@@ -90,6 +93,7 @@ class ParameterBasis:
     logarithmic: BoolArray
     terms: tuple[PriorTerm, ...]
     regions: tuple[Region, ...] = ()
+    chosen: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -222,7 +226,29 @@ def join(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
         logarithmic=np.concatenate([first.logarithmic, second.logarithmic]),
         terms=tuple(terms),
         regions=first.regions,
+        chosen=first.chosen or second.chosen,
     )
+
+
+def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatArray) -> FloatArray:
+    """Turn whitened parameters into parameters.
+
+    Parameters
+    ----------
+    terms : tuple of PriorTerm
+        Prior of the parameters.
+    scales : (t,) array
+        Standard deviations of the terms.
+    whitened : (..., k) array
+        All terms' unit normal numbers.
+
+    Returns
+    -------
+    (..., p) array
+        Parameters.
+    """
+    root = np.hstack([scale * term.root for scale, term in zip(scales, terms, strict=True)])
+    return np.asarray(whitened @ root.T)
 
 
 def _part_basis(regions: tuple[Region, ...], *, stiffness: bool) -> ParameterBasis:

@@ -16,13 +16,13 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.updating.ensemble import Posterior, draw_ensemble
-from frf_ipz.updating.gauss_newton import PhaseResult, iterate
-from frf_ipz.updating.minimal_damping import DampingPhase, damping_phase
-from frf_ipz.updating.minimal_stiffness import StiffnessPhase, log_moduli
-from frf_ipz.updating.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
+from frf_ipz.updating.minimal.damping import DampingPhase, damping_phase
+from frf_ipz.updating.minimal.ensemble import Posterior, draw_ensemble
+from frf_ipz.updating.minimal.gauss_newton import PhaseResult, iterate
+from frf_ipz.updating.minimal.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
+from frf_ipz.updating.minimal.stiffness import StiffnessPhase, log_moduli
+from frf_ipz.updating.minimal.suspects import contradicted, unmet_targets
 from frf_ipz.updating.parameters import generic_basis
-from frf_ipz.updating.suspects import contradicted, unmet_targets
 from frf_ipz.updating.tracking import WantedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.problem import UpdateProblem
 
-MODULUS_FLOOR = 1e-6  # relative; below it a reduced model says nothing about a real structure
+SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
 LEFT_OUT = 1.0  # relative standard deviation given to a target that is left out
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness makes up for what damping does to it
 
@@ -62,18 +62,24 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     phase = replace(
         phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.wanted.frf)), left_out) * LEFT_OUT**2)
     )
-    result = iterate(phase, np.zeros(len(phase.basis.names)), start, max_iterations=options.max_iterations)
+    result = iterate(phase, start, max_iterations=options.max_iterations)
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
     damping = _damping(problem, frame, inner, phase, result)
-    damped = iterate(damping, damping.start(), damping.first_roots(), max_iterations=None)
+    damped = iterate(damping, damping.first_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
     shift = np.log(np.abs(damped.tracked.values(len(phase.wanted.frf)))) - log_moduli(
         result.tracked, len(phase.wanted.frf)
     )
-    if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(phase.noise))):
+    if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(result.noise))):
         phase = replace(phase, targets=phase.targets - shift, noise=phase.noise + np.diag((shift / 2) ** 2))
-        result = iterate(phase, result.theta, result.tracked, max_iterations=options.max_iterations)
+        result = iterate(
+            phase,
+            result.tracked,
+            start=result.whitened,
+            scales=result.scales,
+            max_iterations=options.max_iterations,
+        )
         history.append(("stiffness with damping", result))
     posterior = Posterior(
         frame=frame,
@@ -97,7 +103,7 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
         basis=basis_inside(frame, basis),
         wanted=WantedRoots(frf=problem.frf, rows=_rows(problem, frame)),
         targets=np.log(size),
-        noise=_projected(problem.covariance, gradient) + MODULUS_FLOOR**2 * np.eye(len(size)),
+        noise=_projected(problem.covariance, gradient) + SMALLEST_NOISE**2 * np.eye(len(size)),
         changes_mass=bool(np.any(basis.mass)),
     )
 
@@ -158,5 +164,5 @@ def _updated(
         before=problem.computed,
         after=tracked,
         ensemble=draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble),
-        unmet=unmet_targets(posterior.stiffness, posterior.stiffness_result, problem.names, left_out),
+        unmet=unmet_targets(posterior.stiffness_result, problem.names, left_out),
     )

@@ -15,6 +15,7 @@ from frf_ipz.numerics.pencils import undamped_sensitivity
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, follow
 
+SLACK = 1e-5  # relative standard deviation of what a reduced model cannot express of a real structure
 INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
 
@@ -49,6 +50,11 @@ class StiffnessPhase:
     def terms(self) -> tuple[PriorTerm, ...]:
         """Prior of the parameters."""
         return self.basis.terms
+
+    @property
+    def slack(self) -> FloatArray:
+        """Standard deviations of what no parameter explains, (n,)."""
+        return np.full(len(self.targets), SLACK)
 
     def matrices(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mass and stiffness for some parameters.

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.rational import damping_ratio
-from frf_ipz.updating.modal_frame import ModalFrame
-from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
+from frf_ipz.updating.minimal.modal_frame import ModalFrame
+from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, unwhiten
 from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, with_damping
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
@@ -24,9 +24,10 @@ COUPLING_STD = 0.1  # of a coupling, relative to the two modes' rates
 LARGEST_STEP = 1.5  # of a logarithm in one iteration: the real part is not linear in it
 SMALL_DAMPING = 0.2  # of the usual damping ratio: real parts below are not compared relative to themselves
 SMALLEST_RATIO = 1e-5  # below it no damping ratio is taken as usual
+SMALLEST_NOISE = 1e-4  # relative standard deviation of a real part: none is measured better
 NO_DAMPING = 1e-3  # of the usual rate: a model with less states no damping for that mode
-POLE_FLOOR = 2e-3  # relative standard deviation of a pole's real part: no structure is that linear
-ZERO_FLOOR = 0.05  # the same of a zero: its real part depends on shapes, and those are known no better
+POLE_SLACK = 1e-3  # relative standard deviation of what no damping matrix explains of a pole's real part
+ZERO_SLACK = 0.02  # the same of a zero, which depends on shapes too, and those are known no better
 INDEFINITE = 1e-9  # part of the largest rate below which a negative eigenvalue is rounding
 
 
@@ -56,6 +57,8 @@ class DampingPhase:
         What they are compared relative to, rad/s.
     noise : (n, n) array
         Covariance of the targets over their sizes.
+    pairs : pair of (r (r - 1) / 2,) int arrays
+        Rows and columns of the couplings.
     """
 
     eigenvalues: FloatArray
@@ -68,37 +71,50 @@ class DampingPhase:
     targets: FloatArray
     sizes: FloatArray
     noise: FloatArray
+    pairs: tuple[IntArray, IntArray]
+
+    @property
+    def slack(self) -> FloatArray:
+        """Standard deviations of what no parameter explains, (n,)."""
+        return np.where(self.wanted.frf < 0, POLE_SLACK, ZERO_SLACK)
 
     def damping(self, theta: FloatArray) -> FloatArray:
-        """Damping matrix for some parameters.
+        """Give the damping matrix for some parameters.
 
         Parameters
         ----------
-        theta : (p,) array
+        theta : (..., p) array
             Common logarithm, each mode's, couplings, chosen parameters.
 
         Returns
         -------
-        (r, r) array
+        (..., r, r) array
             Damping matrix.
         """
-        order = len(self.rates)
+        own = 1 + len(self.rates)
+        row, column = self.pairs
         roots = np.sqrt(self._factors(theta))
-        coupled = self.shape.copy()
-        upper = np.triu_indices(order, 1)
-        couplings = theta[1 + order : 1 + order + len(upper[0])]
-        coupled[upper] += couplings
-        coupled[upper[::-1]] += couplings
-        amounts = theta[1 + order + len(upper[0]) :]
-        return np.asarray(roots[:, None] * coupled * roots + np.tensordot(amounts, self.chosen, 1))
+        coupled = np.broadcast_to(self.shape, (*theta.shape[:-1], *self.shape.shape)).copy()
+        couplings = theta[..., own : own + len(row)]
+        coupled[..., row, column] += couplings
+        coupled[..., column, row] += couplings
+        coupled *= roots[..., :, None] * roots[..., None, :]
+        return np.asarray(coupled + np.tensordot(theta[..., own + len(row) :], self.chosen, 1))
 
     def start(self) -> FloatArray:
-        """Give the parameters of the nominal damping, (p,)."""
-        return np.zeros(self.terms[0].root.shape[0])
+        """Give whitened parameters to start from: the nominal damping times what the poles ask for on the whole."""
+        whitened = np.zeros(sum(term.root.shape[1] for term in self.terms))
+        poles = self.wanted.frf < 0
+        nominal = self._roots(self.damping(np.zeros(self.terms[0].root.shape[0])))
+        ratios = self.targets[poles] / -nominal.values(len(poles))[poles].real
+        if np.any(ratios > 0):
+            whitened[0] = np.log(np.median(ratios[ratios > 0])) / self.terms[0].std
+        return whitened
 
     def first_roots(self) -> TrackedRoots:
-        """Give the roots of the model with nominal damping."""
-        return self._roots(self.damping(self.start()))
+        """Give the roots of the model to start from."""
+        stds = np.array([term.std for term in self.terms])
+        return self._roots(self.damping(unwhiten(self.terms, stds, self.start())))
 
     def roots(self, theta: FloatArray, near: TrackedRoots | None = None) -> TrackedRoots | None:
         """Give the damped roots that belong to the targets; see `Phase`.
@@ -155,24 +171,24 @@ class DampingPhase:
         (n, p) array
             Over the sizes, per unit of the parameters.
         """
-        order = len(self.rates)
-        upper = np.triu_indices(order, 1)
-        own = self.damping(theta) - np.tensordot(theta[1 + order + len(upper[0]) :], self.chosen, 1)
-        couplings = np.sqrt(np.outer(self._factors(theta), self._factors(theta)))[upper]
+        row, column = self.pairs
+        own = self.damping(theta) - np.tensordot(theta[1 + len(self.rates) + len(row) :], self.chosen, 1)
+        rates = self._factors(theta)
+        couplings = np.sqrt(rates[row] * rates[column])
         result = np.zeros((len(self.targets), len(theta)))
         for places, roots in tracked.groups:
             # by each entry of the damping matrix: -s y x^T / slope; every parameter is a sum over entries
             weights = (roots.values / roots.slope)[:, None, None]
             entries = (weights * roots.left.T[:, :, None] * roots.right.T[:, None, :]).real
             by_mode = (entries * own).sum(axis=2) / 2 + (entries * own).sum(axis=1) / 2
-            by_coupling = (entries + entries.transpose(0, 2, 1))[:, upper[0], upper[1]] * couplings
+            by_coupling = (entries[:, row, column] + entries[:, column, row]) * couplings
             by_chosen = np.tensordot(entries, self.chosen, ([1, 2], [1, 2]))
             result[places] = np.hstack([by_mode.sum(axis=1, keepdims=True), by_mode, by_coupling, by_chosen])
         return result / self.sizes[:, None]
 
     def _factors(self, theta: FloatArray) -> FloatArray:
         """Rates of the modes."""
-        return np.asarray(self.rates * np.exp(theta[0] + theta[1 : 1 + len(self.rates)]))
+        return np.asarray(self.rates * np.exp(theta[..., :1] + theta[..., 1 : 1 + len(self.rates)]))
 
     def shown(self, theta: FloatArray) -> dict[str, float]:
         """Give the factor on every mode's damping.
@@ -264,7 +280,8 @@ def damping_phase(
         wanted=wanted,
         targets=-values.real,
         sizes=sizes,
-        noise=covariance / np.outer(sizes, sizes) + np.diag(np.where(wanted.frf < 0, POLE_FLOOR, ZERO_FLOOR) ** 2),
+        pairs=np.triu_indices(len(rates), 1),
+        noise=covariance / np.outer(sizes, sizes) + SMALLEST_NOISE**2 * np.eye(len(values)),
     )
 
 
@@ -276,8 +293,8 @@ def _make_terms(order: int, chosen: tuple[PriorTerm, ...]) -> tuple[PriorTerm, .
     places = np.eye(own + extra)
     terms = [
         PriorTerm(name="a factor on the damping", root=places[:, :1], std=COMMON_STD, doubt=0.0),
-        PriorTerm(name="damping of each mode", root=places[:, 1 : 1 + order], std=MODE_STD),
-        PriorTerm(name="coupling of modes by damping", root=places[:, 1 + order : own], std=COUPLING_STD, doubt=0.5),
+        PriorTerm(name="damping of each mode", root=places[:, 1 : 1 + order], std=MODE_STD, doubt=0.7),
+        PriorTerm(name="coupling of modes by damping", root=places[:, 1 + order : own], std=COUPLING_STD, doubt=0.0),
     ]
     for term in chosen:
         root = np.vstack([np.zeros((own, term.root.shape[1])), term.root])

@@ -8,11 +8,12 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.updating.gauss_newton import PhaseResult, unwhiten
-from frf_ipz.updating.gaussian import draw
-from frf_ipz.updating.minimal_damping import DampingPhase
-from frf_ipz.updating.minimal_stiffness import StiffnessPhase
-from frf_ipz.updating.modal_frame import ModalFrame
+from frf_ipz.updating.minimal.damping import DampingPhase
+from frf_ipz.updating.minimal.gauss_newton import PhaseResult
+from frf_ipz.updating.minimal.gaussian import draw
+from frf_ipz.updating.minimal.modal_frame import ModalFrame
+from frf_ipz.updating.minimal.stiffness import StiffnessPhase
+from frf_ipz.updating.parameters import unwhiten
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,8 +75,8 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
 
 def _draw_stiffness(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened = draw(result.step, result.sensitivity, phase.noise, rng, count)
-    mass, stiffness = phase.matrices(unwhiten(phase.terms, result.scales, whitened))
+    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    mass, stiffness = phase.matrices(unwhiten(phase.terms, result.scales[:-1], whitened))
     # what the linear step promised for the poles is imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.wanted.frf < 0)
     promised = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
@@ -99,8 +100,8 @@ def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wan
 
 def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
     phase, result = posterior.damping, posterior.damping_result
-    whitened = draw(result.step, result.sensitivity, phase.noise, rng, count)
-    members = np.array([phase.damping(theta) for theta in unwhiten(phase.terms, result.scales, whitened)])
+    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
     values, vectors = np.linalg.eigh(members)
     members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     return posterior.inner.outside(members)

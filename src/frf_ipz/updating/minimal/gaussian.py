@@ -5,8 +5,9 @@ With the whitened parameters xi (prior: unit normal), data ``d = G xi + noise`` 
 is not known beforehand; the standard deviations of the prior terms are those of the largest evidence ([MacKay1992],
 doi:10.1162/neco.1992.4.3.415), each with a log-normal prior of its own.
 
-The discrepancy principle decides how closely targets are met: the weighted misfit must not exceed their number, and
-where even that cannot be reached the targets contradict one another (or the model), and their covariance is enlarged.
+How closely targets are met follows from the discrepancy principle: the weighted misfit must not exceed their number.
+Where the change that is likely does not bring it down so far, the targets contradict one another (or what a reduced
+model can express), and the slack, a variance on top of their covariance, grows until it does.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.updating.parameters import PriorTerm
 
+GROWTH = 1.5  # of the slack from try to try
+MAX_TRIES = 40  # up to ten million times the slack
 MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
 
 
@@ -77,6 +80,36 @@ def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> 
         misfit=float(left @ cho_solve(cho_factor(noise), left)),
         freedom=float(np.einsum("nk,kn->", sensitivity, gain)),
     )
+
+
+def enough_slack(
+    sensitivity: FloatArray, data: FloatArray, noise: FloatArray, slack: FloatArray, factor: float
+) -> float:
+    """Find the smallest factor on the slack with which the misfit is no more than the number of data.
+
+    Parameters
+    ----------
+    sensitivity : (n, k) array
+        G.
+    data : (n,) array
+        d.
+    noise : (n, n) array
+        Covariance of the targets.
+    slack : (n,) array
+        Standard deviations of what no parameter explains, for a factor of 1.
+    factor : float
+        The most likely factor: the smallest that is tried.
+
+    Returns
+    -------
+    float
+        The factor by the discrepancy principle, to within its growth from try to try.
+    """
+    for _ in range(MAX_TRIES):
+        if solve_step(sensitivity, data, noise + np.diag((factor * slack) ** 2)).misfit <= len(data):
+            break
+        factor *= GROWTH
+    return factor
 
 
 def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float) -> int:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import IntArray
-from frf_ipz.updating.gaussian import likely_scales, unlikely
+from frf_ipz.updating.minimal.gaussian import likely_scales, unlikely
 
 if TYPE_CHECKING:
-    from frf_ipz.updating.gauss_newton import PhaseResult
-    from frf_ipz.updating.minimal_stiffness import StiffnessPhase
+    from frf_ipz.updating.minimal.gauss_newton import PhaseResult
+    from frf_ipz.updating.minimal.stiffness import StiffnessPhase
     from frf_ipz.updating.tracking import TrackedRoots
 
 CONTRADICTED = 6.0  # standard deviations from what all other targets and the prior say
@@ -19,6 +19,7 @@ CURVATURE = 0.5  # of the squared error: what a linear step cannot see
 MOST = 0.25  # part of the targets that may be left out
 LEFT_OUT = 1.0  # relative standard deviation of a target while it is left out
 UNMET = 4.0  # standard deviations off from which a target counts as not met
+NEAR_ENOUGH = 1e-4  # relative; what is nearer counts as met all the same
 DEAF = 1e-3  # relative change by the prior's standard deviations below which nothing moves a target
 
 
@@ -55,15 +56,11 @@ def contradicted(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
     return np.array([], int)  # so many contradictions are no exception: the model is far off, and all targets count
 
 
-def unmet_targets(
-    phase: StiffnessPhase, result: PhaseResult, names: tuple[str, ...], left_out: IntArray
-) -> tuple[str, ...]:
+def unmet_targets(result: PhaseResult, names: tuple[str, ...], left_out: IntArray) -> tuple[str, ...]:
     """Say which targets are not met.
 
     Parameters
     ----------
-    phase : StiffnessPhase
-        The stiffness phase.
     result : PhaseResult
         Where it ended.
     names : tuple of str
@@ -76,14 +73,14 @@ def unmet_targets(
     tuple of str
         One sentence each.
     """
-    deviation = np.sqrt(np.diagonal(phase.noise))
+    deviation = np.sqrt(np.diagonal(result.noise))
     reach = np.linalg.norm(result.sensitivity, axis=1)
     texts = []
     for place, name in enumerate(names):
-        off = f"the {name} stays {abs(result.error[place]):.2%} off"
+        off = f"the {name} stays {abs(result.error[place]):.2g} of its value off"
         if place in left_out:
             texts.append(f"{off}: all other targets contradict it, so it was left out; it may be paired wrongly")
-        elif abs(result.error[place]) > UNMET * deviation[place]:
+        elif abs(result.error[place]) > max(UNMET * deviation[place], NEAR_ENOUGH):
             many = abs(result.error[place]) / deviation[place]
             why = "nothing that may change moves it" if reach[place] < DEAF else "other targets pull the other way"
             texts.append(f"{off} ({many:.0f} standard deviations): {why}")

@@ -1,0 +1,1 @@
+"""The published iteration of [Dorosti2018], doi:10.1016/j.conengprac.2017.11.002."""
