@@ -93,14 +93,14 @@ def draw_drives(rng: np.random.Generator, set_up: SetUp, *, double_hit: bool = F
     return tuple(drives)
 
 
-def make_grid(world: World, *, refine: int = 1) -> LaplaceGrid:
+def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
     """Choose the sampling of the forces and the lines of the transforms.
 
     Parameters
     ----------
     world : World
         Hysteretic damping is defined on the imaginary axis only; nonlinear laws need small steps.
-    refine : int
+    refine : float
         Divides the step further.
 
     Returns
@@ -114,7 +114,7 @@ def make_grid(world: World, *, refine: int = 1) -> LaplaceGrid:
     if any(effect.law for effect in world.effects):
         steps = max(8, -int(-STEPS_PER_PERIOD * set_up.band_hz[1] // set_up.rate_hz))
     hysteretic = any(effect.loss_factor for effect in world.effects)
-    grid = LaplaceGrid(n_samples=set_up.n_samples + before, rate_hz=set_up.rate_hz, oversampling=refine * steps)
+    grid = LaplaceGrid(n_samples=set_up.n_samples + before, rate_hz=set_up.rate_hz, oversampling=round(refine * steps))
     return replace(grid, shift=0.0, padding=6) if hysteretic else grid
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.cases.campaign import Drive, draw_drives, draw_noise, store, swing, true_records
-from simulator.cases.detectability import Lines, change, four, level_change, make_lines
+from simulator.cases.detectability import Lines, change, four, level_change, make_lines, step_change
 from simulator.cases.files import write_model, write_recording, write_test
 from simulator.cases.nuisance import make_ruler
 from simulator.cases.scatter import Scatter, draw_scatter, no_scatter
@@ -33,6 +33,7 @@ WEIGHTS = {"frame": 2.5, "grid": 2.0, "plate": 1.5, "stepped": 1.5}  # of the ki
 MOST_COARSE = 1.5e-4  # error of a nominal frequency in band: a model that a user would trust
 LEAST_RATIO = 3.0  # of the change of the FRFs over their noise, RMS: below, nobody could see the effect
 LEAST_LEVEL_CHANGE = 0.01  # of responses to blows of different levels: less is hidden by the noise of a weak blow
+MOST_STEP_CHANGE = 0.02  # of the loudest responses when the step is doubled: more, and they are chaotic
 MOST_LEFT = 0.5  # of the motion at the end of a record: more, and it is a structure that feeds itself
 
 
@@ -206,6 +207,10 @@ def _finish(
     left = _left_at_end(signals, world)
     if left > MOST_LEFT:
         return None
+    if any(effect.law for effect in effects):
+        visible["step_change"] = four(step_change(world, ready.drives, signals))
+        if visible["step_change"] > MOST_STEP_CHANGE:
+            return None
     if _depends_on_blow(effects):
         visible |= _by_level(ready, world, signals)
         if visible["level_ratio_rms"] < LEAST_RATIO or visible["level_change"] < LEAST_LEVEL_CHANGE:

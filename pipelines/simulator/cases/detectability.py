@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.cases.campaign import Drive, force_of, make_grid
+from simulator.cases.campaign import Drive, force_of, make_grid, true_records
 from simulator.cases.world import World
 from simulator.signals.channels import Noise
 
@@ -142,6 +142,31 @@ def level_change(
     struck = np.array([drive.struck for drive in drives])
     spread = max(np.ptp(part[struck == one]) for one in np.unique(struck))
     return {"level_change": four(spread), "level_ratio_rms": four(ratio.max())}
+
+
+def step_change(world: World, drives: tuple[Drive, ...], signals: FloatArray) -> float:
+    """Double the time step of a nonlinear law.
+
+    Parameters
+    ----------
+    world : World
+        With a law.
+    drives : tuple of Drive
+        Blows or records.
+    signals : (n_drives, n_channels, n_samples) array
+        Without noise, with the step of `make_grid`.
+
+    Returns
+    -------
+    float
+        Change of the responses to the loudest blow within the band, norm over norm.
+    """
+    set_up = world.set_up
+    loudest = int(np.argmax(np.abs(signals[:, 0]).max(axis=1)))
+    coarse, _ = true_records(world, (drives[loudest],), grid=make_grid(world, refine=0.5))
+    index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
+    a, b = (np.fft.rfft(one[1:], axis=-1)[:, index] for one in (coarse[0], signals[loudest]))
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
 def four(value: float) -> float:

@@ -330,12 +330,10 @@ def test_each_effect_outside_the_contract_can_be_drawn(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("effect", "limit"), [("cubic_stiffness", 2e-3), ("gap_contact", 1e-2), ("dry_friction", 2e-2)]
-)
-def test_halving_the_step_changes_responses_little(effect, limit):
+@pytest.mark.parametrize("effect", ["cubic_stiffness", "gap_contact", "dry_friction"])
+def test_halving_the_step_changes_responses_little(effect):
     _, in_band = check_step(effect, 5)
-    assert in_band < limit
+    assert in_band < 5e-3  # a quarter of what the truth allows for a doubled step
 
 
 @pytest.mark.slow
