@@ -44,9 +44,13 @@ class Recordings:
     blows : DataFrame
         One row a blow or record: ``blow`` (file, or file#number), ``input_dof``, ``peak_force_N``, ``pulse_s``,
         ``used`` (bool), ``weight``, ``marks`` (what is wrong, joined by "; "), and what was measured to say so.
-        Empty for FRFs that were estimated elsewhere.
+        Further: ``second_pulse`` (height over the first), ``left_at_end`` and ``left_at_hz`` (what the slowest mode
+        still has at the end), ``snr_db``, ``force_noise_N``, ``step_s``, ``samples``, ``trigger_s``. Empty for FRFs
+        that were estimated elsewhere.
     traces : tuple of Trace
         Forces and responses to draw.
+    choices : tuple of str
+        What was chosen, and by what: windows, segments, lines.
     warnings : tuple of str
         What the user has to know.
     """
@@ -54,4 +58,5 @@ class Recordings:
     frfs: FrfSet
     blows: pd.DataFrame
     traces: tuple[Trace, ...] = ()
+    choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

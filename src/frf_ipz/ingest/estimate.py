@@ -1,0 +1,44 @@
+"""From a test to FRFs with their uncertainty, whatever its kind: the door of the stage."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frf_ipz.ingest.kinds.frf import estimate_frf_files
+from frf_ipz.ingest.kinds.hammer import estimate_hammer
+from frf_ipz.ingest.kinds.random import estimate_random
+from frf_ipz.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recordings import Recordings
+    from frf_ipz.ingest.test_file import Test
+
+KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
+
+
+def estimate_frfs(test: Test, options: IngestOptions, *, progress: Progress = silent) -> Recordings:
+    """Estimate the FRFs of a test.
+
+    Parameters
+    ----------
+    test : Test
+        What was measured, from `read_test`.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Told how far it is.
+
+    Returns
+    -------
+    Recordings
+        FRFs in SI with variance and coherence, the table of blows, what was chosen, what has to be known.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used: which file, which place, what to do.
+    """
+    result = KINDS[test.kind](test, options, progress)
+    progress(1.0, "FRFs estimated")
+    return result

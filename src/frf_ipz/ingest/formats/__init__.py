@@ -1,0 +1,1 @@
+"""File formats, one a module; a module that has a ``FORMAT`` is found by itself (see `registry`)."""

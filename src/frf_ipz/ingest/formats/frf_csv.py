@@ -1,0 +1,82 @@
+"""FRFs as long CSV: ``frequency_hz, output_dof, input_dof, real, imag`` and, if known, ``coherence``, ``variance``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
+from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+
+NUMBERS = ("frequency_hz", "real", "imag")
+LABELS = ("output_dof", "input_dof")
+OPTIONAL = ("coherence", "variance")
+
+
+class _LongCsv:
+    rank = 20
+
+    def holds(self, source: FrfSource, head: bytes) -> bool:
+        return not source.columns and b"frequency_hz" in head[:1000]
+
+    def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
+        layout = sniff(source.path)
+        names = layout.header[-1]
+        table = _read_table(layout, names)
+        groups: dict[tuple[str, str], list[int]] = {}
+        for row, pair in enumerate(zip(*(table[name].to_pylist() for name in LABELS), strict=True)):
+            groups.setdefault(pair, []).append(row)
+        dofs = {text: _dof(layout, text) for pair in groups for text in pair}
+        values = {name: table[name].to_numpy() for name in table.column_names if name not in LABELS}
+        return tuple(
+            _frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
+            for (output, input_), rows in groups.items()
+        )
+
+
+FORMAT = _LongCsv()
+
+
+def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
+    if len(names) != layout.n_columns:
+        problem = f"has {layout.n_columns} values where the header has {len(names)} columns"
+        raise FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
+    numeric = [*NUMBERS, *(name for name in OPTIONAL if name in names)]
+    places = {column_index(layout, names, name): name for name in (*numeric, *LABELS)}
+    types = {place: pa.string() if name in LABELS else pa.float64() for place, name in places.items()}
+    batches = list(read_blocks(layout, names, types))
+    table = pa.Table.from_batches(batches).rename_columns(list(places.values()))
+    needed = [place for place, name in places.items() if name in NUMBERS]
+    stacked = np.column_stack([table[name].to_numpy() for name in NUMBERS])
+    bad = ~np.isfinite(stacked).all(axis=1)
+    if bad.any():
+        raise not_a_number(layout, names, needed, int(np.argmax(bad)))
+    return table
+
+
+def _dof(layout: TextLayout, text: str) -> Dof:
+    try:
+        return parse_dof(text)
+    except InputError as error:
+        raise FileFormatError(layout.path, str(error), where="column 'output_dof' or 'input_dof'") from None
+
+
+def _frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[str, FloatArray]) -> MeasuredFrf:
+    order = np.argsort(columns["frequency_hz"], kind="stable")
+    return MeasuredFrf(
+        source=source,
+        output_dof=output_dof,
+        input_dof=input_dof,
+        frequency_hz=columns["frequency_hz"][order],
+        values=columns["real"][order] + 1j * columns["imag"][order],
+        coherence=columns["coherence"][order] if "coherence" in columns else None,
+        variance=columns["variance"][order] if "variance" in columns else None,
+    )

@@ -1,0 +1,118 @@
+"""What a file with FRFs is said to hold, what it holds, and what a format for such files must offer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.dofs import Dof
+from frf_ipz.quantities import FrfQuantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrfSource:
+    """A file with FRFs, as `test.toml` describes it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    quantity : FrfQuantity
+        What its FRFs are.
+    unit : str
+        Unit of the values; empty for what the file says, or SI.
+    output_dof, input_dof : Dof, optional
+        What the FRF connects where the file does not say so.
+    columns : tuple of str
+        What the columns of a text file are.
+    skip_rows : int
+        Lines before the numbers of a text file.
+    """
+
+    path: Path
+    quantity: FrfQuantity
+    unit: str = ""
+    output_dof: Dof | None = None
+    input_dof: Dof | None = None
+    columns: tuple[str, ...] = ()
+    skip_rows: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredFrf:
+    """One FRF of a file, in the file's units.
+
+    Parameters
+    ----------
+    source : FrfSource
+        Where it comes from.
+    output_dof, input_dof : Dof
+        What it connects.
+    frequency_hz : (n_lines,) array
+        Ascending, Hz.
+    values : (n_lines,) complex array
+        In `unit`.
+    unit : str
+        Unit that the file states; empty where it states none.
+    coherence, variance : (n_lines,) array, optional
+        Where the file has them; the variance is in the square of the unit.
+    """
+
+    source: FrfSource
+    output_dof: Dof
+    input_dof: Dof
+    frequency_hz: FloatArray
+    values: ComplexArray
+    unit: str = ""
+    coherence: FloatArray | None = None
+    variance: FloatArray | None = None
+
+
+@runtime_checkable
+class FrfFormat(Protocol):
+    """A format of files with FRFs.
+
+    Attributes
+    ----------
+    rank : int
+        Formats are asked in ascending order whether a file is theirs.
+    """
+
+    rank: int
+
+    def holds(self, source: FrfSource, head: bytes) -> bool:
+        """Tell whether a file is of this format.
+
+        Parameters
+        ----------
+        source : FrfSource
+            The file and what is said about it.
+        head : bytes
+            Its first bytes.
+
+        Returns
+        -------
+        bool
+            True if it is.
+        """
+
+    def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
+        """Read all its FRFs.
+
+        Parameters
+        ----------
+        source : FrfSource
+            The file and what is said about it.
+
+        Returns
+        -------
+        tuple of MeasuredFrf
+            At least one.
+
+        Raises
+        ------
+        FileFormatError
+            If it is none, or does not say what its FRFs connect.
+        """

@@ -1,0 +1,95 @@
+"""One FRF as columns of text, as analysers export it; ``columns`` of the test says what each column is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.text_layout import sniff
+from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks
+
+SKIP = "skip"
+KNOWN = (
+    "frequency_hz",
+    "real",
+    "imag",
+    "magnitude",
+    "magnitude_db",
+    "phase_deg",
+    "phase_rad",
+    "coherence",
+    "variance",
+    SKIP,
+)
+
+
+class _TextColumns:
+    rank = 10
+
+    def holds(self, source: FrfSource, head: bytes) -> bool:
+        del head
+        return bool(source.columns)
+
+    def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
+        _check(source)
+        columns = _read_columns(source)
+        if source.output_dof is None or source.input_dof is None:
+            raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
+        order = np.argsort(columns["frequency_hz"], kind="stable")
+        columns = {name: values[order] for name, values in columns.items()}
+        return (
+            MeasuredFrf(
+                source=source,
+                output_dof=source.output_dof,
+                input_dof=source.input_dof,
+                frequency_hz=columns["frequency_hz"],
+                values=_values(columns),
+                coherence=columns.get("coherence"),
+                variance=columns.get("variance"),
+            ),
+        )
+
+
+FORMAT = _TextColumns()
+
+
+def _check(source: FrfSource) -> None:
+    for name in source.columns:
+        if name not in KNOWN:
+            raise FileFormatError(source.path, f"'columns' names '{name}'; {did_you_mean(name, KNOWN)}")
+    given = set(source.columns)
+    complete = {"real", "imag"} <= given or (
+        len(given & {"magnitude", "magnitude_db"}) == 1 and len(given & {"phase_deg", "phase_rad"}) == 1
+    )
+    if "frequency_hz" not in given or not complete:
+        raise FileFormatError(
+            source.path,
+            f"'columns' are {', '.join(source.columns)}; needed are frequency_hz and either real and imag, or one "
+            "of magnitude, magnitude_db and one of phase_deg, phase_rad",
+        )
+
+
+def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
+    layout = sniff(source.path, skip_rows=source.skip_rows)
+    if layout.n_columns < len(source.columns):
+        problem = f"has {layout.n_columns} columns, but 'columns' of its [[frf]] names {len(source.columns)}"
+        raise FileFormatError(source.path, problem, where=f"line {layout.n_before + 1}")
+    names = [*source.columns, *[SKIP] * (layout.n_columns - len(source.columns))]
+    wanted = [index for index, name in enumerate(names) if name != SKIP]
+    table = pa.Table.from_batches(read_blocks(layout, names, dict.fromkeys(wanted, pa.float64())))
+    numbers = np.column_stack([table.column(place).to_numpy() for place in range(len(wanted))])
+    bad = ~np.isfinite(numbers).all(axis=1)
+    if bad.any():
+        raise not_a_number(layout, names, wanted, int(np.argmax(bad)))
+    return {names[index]: numbers[:, place] for place, index in enumerate(wanted)}
+
+
+def _values(columns: dict[str, FloatArray]) -> ComplexArray:
+    if "real" in columns:
+        return np.asarray(columns["real"] + 1j * columns["imag"])
+    phase = columns["phase_rad"] if "phase_rad" in columns else np.radians(columns["phase_deg"])
+    size = columns["magnitude"] if "magnitude" in columns else 10.0 ** (columns["magnitude_db"] / 20.0)
+    return np.asarray(size * np.exp(1j * phase))

@@ -1,0 +1,162 @@
+"""Sums of spectra per run into FRFs per label: estimator, coherence, variance, lines that are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.ingest.signals.windows import correlated_lines
+from frf_ipz.ingest.spectra import SpectrumSums, estimate_coherence, estimate_frf
+from frf_ipz.ingest.test_file import run_labels
+from frf_ipz.ingest.variance import frf_variance, power_to_variance
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.survey.facts import Survey
+    from frf_ipz.ingest.test_file import Run, Test
+
+
+@dataclass(slots=True, eq=False)
+class RunAverage:
+    """What has been summed for one run.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of all its blows or segments.
+    independent : float
+        How many independent ones they are worth.
+    response_noise, force_noise : array, optional
+        Noise power of one blow's responses, (n_outputs, n_lines), and force, (n_lines,), where it was measured in the
+        record itself.
+    """
+
+    sums: SpectrumSums
+    independent: float = 0.0
+    response_noise: FloatArray | None = None
+    force_noise: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Estimate:
+    values: ComplexArray
+    variance: FloatArray
+    coherence: FloatArray
+    count: int
+
+
+def assemble_frfs(test: Test, survey: Survey, averages: Mapping[Run, RunAverage], options: IngestOptions) -> FrfSet:
+    """Make the FRFs of a test.
+
+    Parameters
+    ----------
+    test : Test
+        The test.
+    survey : Survey
+        Step, length and window.
+    averages : mapping of Run to RunAverage
+        Sums of each run. An FRF that several runs measured is the mean of them all.
+    options : IngestOptions
+        The estimator.
+
+    Returns
+    -------
+    FrfSet
+        In the order of the test's labels.
+    """
+    estimates: dict[FrfLabel, _Estimate] = {}
+    for runs, labels in _sharing(test).items():
+        pooled = _pool(test, [averages[run] for run in runs], runs, labels)
+        estimates |= _estimate(pooled, labels, options.estimator)
+    ordered = [estimates[label] for label in test.labels]
+    duration = survey.n_samples * survey.step_s
+    every = correlated_lines(survey.decay_1_s * duration)
+    n_lines = survey.n_samples // 2 + 1
+    return FrfSet(
+        frequency_hz=np.arange(n_lines)[::every] / duration,
+        values=np.column_stack([one.values[::every] for one in ordered]),
+        labels=test.labels,
+        variance=np.column_stack([one.variance[::every] for one in ordered]),
+        coherence=np.column_stack([one.coherence[::every] for one in ordered]),
+        averages=np.array([one.count for one in ordered], np.int64),
+        window_decay_1_s=survey.decay_1_s,
+        unknown_scale=test.unknown_scale,
+    )
+
+
+def about_variance(averages: Mapping[Run, RunAverage]) -> tuple[str, ...]:
+    """Say where the variance comes from a single blow.
+
+    Parameters
+    ----------
+    averages : mapping of Run to RunAverage
+        Sums of each run.
+
+    Returns
+    -------
+    tuple of str
+        Warnings.
+    """
+    single = [str(run.input_dof) for run, average in averages.items() if average.sums.count == 1]
+    if not single:
+        return ()
+    known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
+    source = "is the noise in that record alone" if known else "is not known"
+    return (f"a single blow or record at {', '.join(dict.fromkeys(single))}: no coherence, and the variance {source}",)
+
+
+def _sharing(test: Test) -> dict[tuple[Run, ...], list[FrfLabel]]:
+    """Group the labels by the runs that measured them."""
+    groups: dict[tuple[Run, ...], list[FrfLabel]] = {}
+    for label in test.labels:
+        runs = tuple(run for run in test.runs if label in run_labels(test.channels, run))
+        groups.setdefault(runs, []).append(label)
+    return groups
+
+
+def _pool(test: Test, averages: Sequence[RunAverage], runs: Sequence[Run], labels: Sequence[FrfLabel]) -> RunAverage:
+    places = [[run_labels(test.channels, run).index(label) for label in labels] for run in runs]
+    first = averages[0]
+    if len(averages) == 1:
+        rows = places[0]
+        sums = SpectrumSums(first.sums.force, first.sums.cross[rows], first.sums.responses[rows], first.sums.count)
+        noise = None if first.response_noise is None else first.response_noise[rows]
+        return RunAverage(sums, first.independent, noise, first.force_noise)
+    parts = list(zip(averages, places, strict=True))
+    sums = SpectrumSums(
+        np.sum([one.sums.force for one in averages], axis=0),
+        np.sum([one.sums.cross[rows] for one, rows in parts], axis=0),
+        np.sum([one.sums.responses[rows] for one, rows in parts], axis=0),
+        sum(one.sums.count for one in averages),
+    )
+    return RunAverage(sums, sum(one.independent for one in averages))
+
+
+def _estimate(average: RunAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _Estimate]:
+    sums = average.sums
+    values = estimate_frf(sums, estimator)
+    coherence = estimate_coherence(sums)
+    variance = _variance(average, values)
+    return {
+        label: _Estimate(
+            values=values[:, place],
+            variance=variance[:, place],
+            coherence=coherence[:, place],
+            count=sums.count,
+        )
+        for place, label in enumerate(labels)
+    }
+
+
+def _variance(average: RunAverage, values: ComplexArray) -> FloatArray:
+    """Take the scatter between blows, and of a single blow the noise in its own record."""
+    if average.sums.count == 1 and average.response_noise is not None and average.force_noise is not None:
+        power = average.response_noise.T + average.force_noise[:, None] * np.abs(values) ** 2
+        return power_to_variance(power, average.sums.force)
+    return frf_variance(average.sums, average.independent)

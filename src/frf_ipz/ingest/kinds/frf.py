@@ -1,0 +1,144 @@
+"""FRFs that were estimated elsewhere: read, brought to SI and to common lines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError, QuantityError
+from frf_ipz.frf import FrfSet
+from frf_ipz.ingest.formats.registry import read_frfs
+from frf_ipz.ingest.kinds.table import empty_blow_table
+from frf_ipz.ingest.recordings import Recordings
+from frf_ipz.ingest.test_file import frf_label
+from frf_ipz.ingest.units import frf_factor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.ingest.formats.frf_file import MeasuredFrf
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.test_file import Test
+    from frf_ipz.progress import Progress
+
+SAME_LINE = 0.01  # of the spacing: frequencies that differ by less are one line
+MOST_LOST = 0.5  # of the lines that two files could share: more than that is another grid
+
+
+def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -> Recordings:
+    """Read FRFs that were estimated elsewhere.
+
+    Parameters
+    ----------
+    test : Test
+        The test.
+    options : IngestOptions
+        Not used: there is nothing left to choose.
+    progress : Progress
+        Told about each file.
+
+    Returns
+    -------
+    Recordings
+        FRFs in SI on the lines that all files share; no table of blows.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, two FRFs are the same, or the files share too few lines.
+    """
+    del options
+    frfs: list[MeasuredFrf] = []
+    for done, source in enumerate(test.frf_sources):
+        progress(done / len(test.frf_sources), f"reading {source.path.name}")
+        frfs += [_to_si(frf) for frf in read_frfs(source)]
+    labels = tuple(frf_label(frf.output_dof, frf.input_dof, frf.source.quantity) for frf in frfs)
+    _check(frfs, labels)
+    lines, warnings = _common_lines(frfs)
+    places = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
+    nothing = [np.full(len(frf.frequency_hz), np.nan) for frf in frfs]
+    pairs = list(zip(frfs, places, nothing, strict=True))
+    return Recordings(
+        frfs=FrfSet(
+            frequency_hz=lines,
+            values=np.column_stack([frf.values[place] for frf, place, _ in pairs]),
+            labels=labels,
+            variance=np.column_stack([_known(frf.variance, empty)[place] for frf, place, empty in pairs]),
+            coherence=np.column_stack([_known(frf.coherence, empty)[place] for frf, place, empty in pairs]),
+            averages=np.zeros(len(frfs), np.int64),
+            unknown_scale=test.unknown_scale,
+        ),
+        blows=empty_blow_table(),
+        warnings=warnings,
+    )
+
+
+def _known(values: FloatArray | None, nothing: FloatArray) -> FloatArray:
+    return nothing if values is None else values
+
+
+def _to_si(frf: MeasuredFrf) -> MeasuredFrf:
+    unit = frf.source.unit or frf.unit
+    if not unit:
+        return frf
+    directions = frf.output_dof.direction, frf.input_dof.direction
+    try:
+        factor = frf_factor(unit, frf.source.quantity, *directions)
+    except QuantityError as error:
+        raise QuantityError(f"{frf.source.path}: {error}") from None
+    variance = None if frf.variance is None else frf.variance * factor**2
+    return replace(frf, values=frf.values * factor, variance=variance)
+
+
+def _check(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None:
+    first: dict[FrfLabel, MeasuredFrf] = {}
+    for frf, label in zip(frfs, labels, strict=True):
+        path, frequency = frf.source.path, frf.frequency_hz
+        if label in first:
+            raise FileFormatError(path, f"holds the FRF {label} that {first[label].source.path.name} holds already")
+        first[label] = frf
+        if len(frequency) < 2 or (np.diff(frequency) <= 0.0).any() or frequency[0] < 0.0:
+            problem = f"the frequencies of the FRF {label} do not ascend from 0 or above, each once"
+            raise FileFormatError(path, problem, where="frequency_hz")
+        for name in ("coherence", "variance"):
+            values = getattr(frf, name)
+            if values is not None and (values < 0.0).any():
+                raise FileFormatError(path, f"the FRF {label} has a negative {name}", where=f"column '{name}'")
+
+
+def _spacing(frequency_hz: FloatArray) -> float:
+    return float(np.median(np.diff(frequency_hz))) if len(frequency_hz) > 1 else 0.0
+
+
+def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, ...]]:
+    """Find the lines that all FRFs have."""
+    lines = frfs[0].frequency_hz
+    for frf in frfs[1:]:
+        lines = lines[_has(frf.frequency_hz, lines)]
+    low = max(frf.frequency_hz[0] for frf in frfs)
+    high = min(frf.frequency_hz[-1] for frf in frfs)
+    for frf in frfs:
+        frequency = frf.frequency_hz
+        could = int(np.count_nonzero((frequency >= low * (1 - 1e-9)) & (frequency <= high * (1 + 1e-9))))
+        if len(lines) < 2 or len(lines) < MOST_LOST * could:
+            raise FileFormatError(
+                frf.source.path,
+                f"its lines ({len(frequency)} from {frequency[0]:g} to {frequency[-1]:g} Hz) are not those of "
+                f"{frfs[0].source.path.name} ({len(frfs[0].frequency_hz)} from {frfs[0].frequency_hz[0]:g} to "
+                f"{frfs[0].frequency_hz[-1]:g} Hz): all FRFs of a test need common lines; export them alike",
+            )
+    most = max(len(frf.frequency_hz) for frf in frfs)
+    if len(lines) == most:
+        return lines, ()
+    return lines, (f"{len(lines)} of up to {most} lines are used: those that all files share",)
+
+
+def _has(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
+    tolerance = SAME_LINE * _spacing(frequency_hz)
+    place = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
+    nearest = np.minimum(np.abs(frequency_hz[place] - lines), np.abs(frequency_hz[place - 1] - lines))
+    return np.asarray(nearest <= tolerance)

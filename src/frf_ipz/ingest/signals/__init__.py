@@ -1,0 +1,1 @@
+"""What single signals tell: pulses, clipping, decay, noise; arrays in, numbers out."""

@@ -1,0 +1,125 @@
+"""How much of a decaying response is left at the end of its record, mode by mode, and the noise under it.
+
+The second half of the response is compared with the first, frequency by frequency: a mode of decay rate a has lost
+exp(-a T) of its power from the one to the other, and that is also the share of its amplitude that is left at the end
+of the record. The median of neighbouring lines is the noise, since modes are narrow peaks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
+
+from frf_ipz.arrays import BoolArray, FloatArray
+
+FEWEST_LINES = 32
+NEIGHBOURS = 51  # lines whose median is the noise
+MEDIAN = np.log(2.0)  # of the power of noise, over its mean
+DISTINCT = 20.0  # times the noise: power of a mode that still rings
+NOTABLE = 0.01  # of the strongest peak, in the response or in its velocity: weaker modes do not decide on a window
+MAINS_HZ = (50.0, 60.0)
+STEADY = 0.8  # of its power is left of a hum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decay:
+    """What a response does towards the end of its record.
+
+    Parameters
+    ----------
+    left : float
+        Share of its amplitude that the slowest mode still has at the end; 0 where nothing rings above the noise.
+    frequency_hz : float
+        Of that mode, Hz; 0 where there is none.
+    noise : float
+        Standard deviation of the noise.
+    """
+
+    left: float
+    frequency_hz: float
+    noise: float
+
+
+def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
+    """Measure how much of a response is left at the end of its record.
+
+    Parameters
+    ----------
+    response : (n,) array
+        From the blow on, SI.
+    step_s : float
+        Time step, s.
+    power : int
+        0 for a displacement, 1 for a velocity, 2 for an acceleration.
+
+    Returns
+    -------
+    Decay
+        The slowest mode's rest, and the noise.
+    """
+    half = len(response) // 2
+    if half < 2 * FEWEST_LINES:
+        return Decay(left=0.0, frequency_hz=0.0, noise=0.0)
+    frequency, first, last = _halves(response, half, step_s)
+    floor = _floor(last)
+    noise = float(np.sqrt(np.mean(floor) / np.sum(np.hanning(half) ** 2)))
+    early = maximum_filter1d(first, 5)
+    rings = (last == maximum_filter1d(last, 7)) & (last > DISTINCT * floor) & (frequency > 2.5 / (half * step_s))
+    rings &= (last < early) & _is_notable(early, frequency, power)
+    left = np.where(rings, last / np.maximum(early, np.finfo(float).tiny), 0.0)
+    left[_is_hum(frequency, left)] = 0.0
+    slowest = int(np.argmax(left))
+    return Decay(left=float(left[slowest]), frequency_hz=float(frequency[slowest] * (left[slowest] > 0)), noise=noise)
+
+
+def noise_power(signal: FloatArray, step_s: float, frequency_hz: FloatArray) -> FloatArray:
+    """Estimate the power of the noise under a signal from its second half.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        A decaying response, or a force whose pulse lies in the first half.
+    step_s : float
+        Time step, s.
+    frequency_hz : (n_lines,) array
+        Where to estimate it.
+
+    Returns
+    -------
+    (n_lines,) array
+        Expected squared modulus of the noise's discrete transform, per sample that goes into it; NaN for a signal that
+        is too short.
+    """
+    half = len(signal) // 2
+    if half < 2 * FEWEST_LINES:
+        return np.full(len(frequency_hz), np.nan)
+    frequency, _, last = _halves(signal, half, step_s)
+    return np.interp(frequency_hz, frequency, _floor(last) / np.sum(np.hanning(half) ** 2))
+
+
+def _halves(signal: FloatArray, half: int, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    window = np.hanning(half)
+    parts = np.stack([signal[:half], signal[-half:]]) * window
+    spectra = np.fft.rfft(parts)
+    first, last = spectra.real**2 + spectra.imag**2
+    return np.asarray(np.fft.rfftfreq(half, step_s)), first, last
+
+
+def _floor(power: FloatArray) -> FloatArray:
+    return np.asarray(median_filter(power, NEIGHBOURS, mode="nearest") / MEDIAN)
+
+
+def _is_notable(power: FloatArray, frequency_hz: FloatArray, derivative: int) -> BoolArray:
+    """Tell which peaks are large, in the signal as it is or as a velocity, in which all modes weigh alike."""
+    velocity = power * np.maximum(frequency_hz, frequency_hz[3]) ** (2 * (1 - derivative))
+    return np.asarray((power > NOTABLE**2 * power[3:].max()) | (velocity > NOTABLE**2 * velocity[3:].max()))
+
+
+def _is_hum(frequency_hz: FloatArray, left: FloatArray) -> BoolArray:
+    """Tell which lines are multiples of the mains' frequency and do not decay."""
+    spacing = frequency_hz[1]
+    near = [np.abs(frequency_hz - mains * np.round(frequency_hz / mains)) < 1.5 * spacing for mains in MAINS_HZ]
+    # where lines are so wide that every one is near a multiple, nothing can be said
+    return np.asarray((near[0] | near[1]) & (left > STEADY) & (12.0 * spacing < MAINS_HZ[0]))

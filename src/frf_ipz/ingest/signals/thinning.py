@@ -1,0 +1,45 @@
+"""Signals with few enough points to draw, minima and maxima kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+
+
+def thin(values: FloatArray, n_points: int) -> tuple[np.ndarray, FloatArray]:
+    """Keep the lowest and the highest sample of each stretch of a signal.
+
+    Parameters
+    ----------
+    values : (n,) array
+        The signal.
+    n_points : int
+        Points to keep at most.
+
+    Returns
+    -------
+    places : (m,) int array
+        Which samples, ascending; m is at most `n_points`.
+    values : (m,) array
+        Their values.
+
+    Examples
+    --------
+    >>> places, kept = thin(np.sin(np.arange(10_000.0)), 100)
+    >>> len(places) <= 100, bool(kept.max() > 0.999)
+    (True, True)
+    """
+    if len(values) <= n_points:
+        return np.arange(len(values)), values
+    n_cells = max(n_points // 2, 1)
+    edges = np.linspace(0, len(values), n_cells + 1).astype(int)[:-1]
+    cells = np.split(values, edges[1:])
+    places = np.unique(
+        [
+            edge + place
+            for edge, cell in zip(edges, cells, strict=True)
+            for place in (int(np.argmin(cell)), int(np.argmax(cell)))
+        ]
+    )
+    return places, values[places]

@@ -1,0 +1,165 @@
+"""Averaged spectra and the FRFs made of them: H1, H2, Hv, coherence; arrays in, arrays out, one blow at a time.
+
+Only sums over the blows are kept, so memory does not grow with their number. [Bendat2010]: J. S. Bendat, A. G. Piersol,
+Random Data, 4th ed., Wiley 2010 (doi:10.1002/9781118032428).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+
+
+@dataclass(slots=True, eq=False)
+class SpectrumSums:
+    """Sums over blows of auto and cross spectra; `add` a blow at a time.
+
+    Parameters
+    ----------
+    force : (n_lines,) array
+        Sum of the force's squared modulus.
+    cross : (n_outputs, n_lines) complex array
+        Sum of the conjugate force spectrum times the responses'.
+    responses : (n_outputs, n_lines) array
+        Sum of the responses' squared moduli.
+    count : int
+        Blows in the sums.
+    """
+
+    force: FloatArray
+    cross: ComplexArray
+    responses: FloatArray
+    count: int = 0
+
+    def add(self, force: FloatArray, responses: FloatArray) -> None:
+        """Add one blow.
+
+        Parameters
+        ----------
+        force : (n_samples,) array
+            With its window applied.
+        responses : (n_outputs, n_samples) array
+            With theirs.
+
+        Raises
+        ------
+        ShapeError
+            If the number of outputs, or of the lines that the samples give, is another one.
+        """
+        require_shape("the responses of a blow", responses, (len(self.cross), len(force)))
+        require_shape("the spectrum of a blow", self.force, (len(force) // 2 + 1,))
+        self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses))
+
+    def add_spectra(self, force: ComplexArray, responses: ComplexArray) -> None:
+        """Add the spectra of one blow or segment.
+
+        Parameters
+        ----------
+        force : (n_lines,) complex array
+            Transform of the force.
+        responses : (n_outputs, n_lines) complex array
+            Transforms of the responses.
+        """
+        self.force += force.real**2 + force.imag**2
+        self.responses += responses.real**2 + responses.imag**2
+        self.cross += force.conj() * responses
+        self.count += 1
+
+
+def empty_sums(n_lines: int, n_outputs: int) -> SpectrumSums:
+    """Make sums to which nothing has been added.
+
+    Parameters
+    ----------
+    n_lines : int
+        Frequency lines: half of the samples plus one.
+    n_outputs : int
+        Responses.
+
+    Returns
+    -------
+    SpectrumSums
+        Zeros.
+    """
+    return SpectrumSums(np.zeros(n_lines), np.zeros((n_outputs, n_lines), complex), np.zeros((n_outputs, n_lines)))
+
+
+def estimate_frf(sums: SpectrumSums, estimator: str = "H1") -> ComplexArray:
+    """Estimate FRFs from averaged spectra, [Bendat2010].
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of at least one blow.
+    estimator : str
+        ``H1`` (noise on the responses), ``H2`` (noise on the force), ``Hv`` (on both: the geometric mean of the other
+        two, which does not depend on units).
+
+    Returns
+    -------
+    (n_lines, n_outputs) complex array
+        Unit of the responses over that of the force; 0 where there is no force.
+
+    Examples
+    --------
+    >>> sums = empty_sums(9, 1)
+    >>> force = np.sin(np.arange(16.0)) + 1.0
+    >>> sums.add(force, 3.0 * force[None])
+    >>> bool(np.allclose(estimate_frf(sums), 3.0, rtol=1e-12, atol=0.0))
+    True
+    """
+    h1 = _ratio(sums.cross, sums.force)
+    if estimator == "H1":
+        return h1
+    h2 = _ratio(sums.responses.astype(complex), sums.cross.conj().T)
+    if estimator == "H2":
+        return h2
+    size = np.sqrt(np.abs(h1) * np.abs(h2))
+    return np.asarray(size * np.exp(1j * np.angle(h1)))
+
+
+def estimate_coherence(sums: SpectrumSums) -> FloatArray:
+    """Estimate the share of the responses' power that the force explains, [Bendat2010].
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of any number of blows.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        0 to 1; NaN for fewer than two blows, for which it says nothing.
+    """
+    if sums.count < 2:
+        return np.full(sums.cross.T.shape, np.nan)
+    cross = sums.cross.real**2 + sums.cross.imag**2
+    return np.minimum(_ratio(cross, (sums.force * sums.responses).T).real, 1.0)
+
+
+def unexplained_power(sums: SpectrumSums) -> FloatArray:
+    """Give the responses' power that H1 does not explain, summed over blows.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of any number of blows.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        Its expectation is (count - 1) times the noise power of one blow.
+    """
+    cross = sums.cross.real**2 + sums.cross.imag**2
+    explained = _ratio(cross, sums.force).real
+    return np.maximum(sums.responses.T - explained, 0.0)
+
+
+def _ratio(top: ComplexArray | FloatArray, bottom: ComplexArray | FloatArray) -> ComplexArray:
+    """Divide (n_outputs, n_lines) by (n_lines,) or (n_lines, n_outputs), with 0 for what cannot be divided."""
+    above = np.asarray(top.T, complex)
+    below = bottom[:, None] if bottom.ndim == 1 else bottom
+    return np.asarray(np.divide(above, below, out=np.zeros_like(above), where=below != 0))

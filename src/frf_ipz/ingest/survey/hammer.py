@@ -1,0 +1,206 @@
+"""The survey of a hammer test: its blows, and the windows and the length of transform that fit them all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
+from frf_ipz.ingest.survey.checks import CUT_OFF, check_blow
+from frf_ipz.ingest.survey.choice import blow_name, check_names, choose, is_named
+from frf_ipz.ingest.survey.facts import Survey
+from frf_ipz.ingest.survey.scan import scan_file, split_blows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
+    from frf_ipz.ingest.survey.facts import BlowFacts
+    from frf_ipz.ingest.survey.scan import FileScan
+    from frf_ipz.progress import Progress
+
+LEFT = 3e-4  # share of the slowest mode that an automatic window leaves at the end: below the noise of good recordings
+ALIKE = 0.01  # relative difference in length up to which recordings are taken as equally long
+LONG_BEFORE = 0.12  # of a recording before its blow: more is cut off, for it holds nothing but noise
+SHORT_BEFORE = 0.05  # of a recording: what is left of it
+
+
+def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progress) -> Survey:
+    """Look at all blows of a hammer test and decide how they are used.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Told about each file.
+
+    Returns
+    -------
+    Survey
+        Blows, windows and length of the transforms.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used and is not dropped, or the user's choice makes no sense.
+    """
+    scans = _scan(files, options, progress)
+    usual = int(np.median([scan.longest for scan in scans]))
+    blows: list[BlowFacts] = []
+    for done, scan in enumerate(scans):
+        progress(0.5 + 0.5 * done / len(scans), f"checking {scan.path.name}")
+        blows += _check_file(files, scan, usual)
+    files_named = [blow_name(files.test, path, 1, 1) for path in files.test.files]
+    check_names([*files_named, *(blow.name for blow in blows if "#" in blow.name)], options)
+    verdict = choose(blows, options)
+    used = [blow for blow in verdict.blows if blow.used]
+    _check_lengths(scans, used, options)
+    n_samples = _common_length(used)
+    decay_1_s, about_decay = _decay(used, options)
+    decided, about_force = _keep_force(verdict.blows, options)
+    choices = (*about_decay, *about_force, *_about_lines(decay_1_s * n_samples * verdict.step_s))
+    return Survey(
+        blows=tuple(replace(blow, stop=min(blow.stop, blow.start + n_samples)) for blow in decided),
+        step_s=verdict.step_s,
+        n_samples=n_samples,
+        decay_1_s=decay_1_s,
+        force_window=bool(about_force),
+        choices=choices,
+        warnings=(*verdict.warnings, *_about_rest(used, decay_1_s)),
+    )
+
+
+def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> list[FileScan]:
+    """Scan all files; one that the user drops may be anything."""
+    test, scans = files.test, []
+    wanted = [(run, path) for run in test.runs for path in run.files]
+    for done, (run, path) in enumerate(wanted):
+        progress(0.5 * done / len(test.files), f"reading {path.name}")
+        try:
+            scans.append(scan_file(files, run, path, for_blows=True))
+        except InputError:
+            if not is_named(blow_name(test, path, 1, 1), [text for text in options.drop if "#" not in text]):
+                raise
+    if not scans:
+        raise InputError("[ingest] drop leaves no file to read; keep at least one")
+    return scans
+
+
+def _check_file(files: RecordingFiles, scan: FileScan, usual: int) -> list[BlowFacts]:
+    bounds = split_blows(scan, usual)
+    stretches = files.stretches(scan.run, scan.path, bounds)
+    blows = []
+    for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
+        name = blow_name(files.test, scan.path, number, len(bounds))
+        blows.append(_without_long_lead(check_blow(files.test, scan, name, rows, signals)))
+    return blows
+
+
+def _without_long_lead(blow: BlowFacts) -> BlowFacts:
+    """Begin a blow shortly before its pulse where the recording begins long before."""
+    if blow.trigger <= LONG_BEFORE * blow.n_samples:
+        return blow
+    start, stop = blow.pulse
+    lead = max(int(SHORT_BEFORE * blow.n_samples), 2 * (blow.trigger - start))
+    cut = max(blow.trigger - lead, 0)
+    return replace(
+        blow,
+        start=blow.start + cut,
+        trigger=blow.trigger - cut,
+        pulse=(start - cut, stop - cut),
+        kept_force=(0, blow.n_samples - cut),
+    )
+
+
+def _check_lengths(scans: Sequence[FileScan], used: Sequence[BlowFacts], options: IngestOptions) -> None:
+    """Refuse recordings of one blow whose lengths differ: one that was cut short would pass as a decay."""
+    names = {blow.path: blow.name for blow in used if "#" not in blow.name}
+    whole = [scan for scan in scans if scan.path in names]
+    usual = int(np.median([scan.n_rows for scan in whole])) if whole else 0
+    for scan in whole:
+        if abs(scan.n_rows / usual - 1.0) > ALIKE and not is_named(names[scan.path], options.keep):
+            raise FileFormatError(
+                scan.path,
+                f"holds {scan.n_rows} samples where the others hold {usual}; export it whole, leave it out by "
+                "[ingest] drop, or have it used as it is by [ingest] keep",
+            )
+
+
+def _common_length(used: Sequence[BlowFacts]) -> int:
+    """Take the longest of equally long recordings; of pieces of a longer one, what is usual."""
+    lengths = [blow.n_samples for blow in used]
+    longest, usual = max(lengths), int(np.median(lengths))
+    return longest if longest <= (1.0 + ALIKE) * usual else usual - usual % 2
+
+
+def _decay(used: Sequence[BlowFacts], options: IngestOptions) -> tuple[float, tuple[str, ...]]:
+    """Choose the exponential window: as asked for, or just what the slowest mode needs."""
+    if options.exponential_window_s is not None:
+        if options.exponential_window_s < 0.0:
+            raise InputError(f"[ingest] exponential_window_s is {options.exponential_window_s:g}; it is a time, or 0")
+        if options.exponential_window_s == 0.0:
+            return 0.0, ()
+        rate = 1.0 / options.exponential_window_s
+        return rate, (f"exponential window of {options.exponential_window_s:g} s on force and response, as asked for",)
+    rates = [(np.log(blow.left / LEFT) / blow.ringing_s, blow) for blow in used if blow.left > CUT_OFF]
+    if not rates:
+        return 0.0, ()
+    rate, worst = max(rates, key=lambda pair: float(pair[0]))
+    text = (
+        f"exponential window of {1.0 / rate:.4g} s on force and response: without it {100 * worst.left:.2g} % of the "
+        f"mode at {worst.left_hz:.4g} Hz would be cut off at the end of {worst.name}, with it {100 * LEFT:.2g} %; "
+        "the FRFs are exact at s = sigma + i omega"
+    )
+    return float(rate), (text,)
+
+
+def _keep_force(blows: Sequence[BlowFacts], options: IngestOptions) -> tuple[tuple[BlowFacts, ...], tuple[str, ...]]:
+    """Choose what is kept of the force: the pulse with its ringing, the same stretch for all blows."""
+    used = [blow for blow in blows if blow.used]
+    lead = max(blow.trigger - blow.pulse[0] for blow in used)
+    tail = max(blow.pulse[1] - blow.trigger for blow in used)
+    step_s, asked = used[0].step_s, options.force_window_s
+    if asked is not None and asked < 0.0:
+        raise InputError(f"[ingest] force_window_s is {asked:g}; it is a time, or 0 for none")
+    if asked is not None:
+        tail = max(int(np.ceil(asked / step_s)), 1)
+    silent = all(blow.force_noise == 0.0 for blow in used)
+    gains = 2 * (lead + tail + 2 * taper_length(0, lead + tail)) < min(blow.n_samples for blow in used)
+    if asked == 0.0 or (asked is None and (silent or not gains)):
+        return tuple(blows), ()
+    kept = tuple(replace(blow, kept_force=_stretch(blow, lead, tail)) for blow in blows)
+    why = "as asked for" if asked is not None else "the pulse and its ringing, as far as they stand out from the noise"
+    text = f"force window from {1e3 * lead * step_s:.3g} ms before the blow to {1e3 * tail * step_s:.3g} ms after it: "
+    return kept, (text + why,)
+
+
+def _stretch(blow: BlowFacts, lead: int, tail: int) -> tuple[int, int]:
+    """Take the stretch of all blows, longer only for one that hit twice and is used nevertheless."""
+    stop = blow.trigger + tail
+    return blow.trigger - lead, max(stop, blow.pulse[1]) if blow.second_pulse else stop
+
+
+def _about_lines(decay: float) -> tuple[str, ...]:
+    step = correlated_lines(decay)
+    if step == 1:
+        return ()
+    return (f"one frequency line in {step} is kept: the exponential window correlates the noise of those between",)
+
+
+def _about_rest(used: Sequence[BlowFacts], decay_1_s: float) -> tuple[str, ...]:
+    """Warn where a window that the user chose, or ruled out, leaves more than the automatic one would."""
+    left = [(blow.left * float(np.exp(-decay_1_s * blow.ringing_s)), blow) for blow in used]
+    most, worst = max(left, key=lambda pair: pair[0])
+    if most <= CUT_OFF:
+        return ()
+    return (
+        f"{100 * most:.2g} % of the mode at {worst.left_hz:.4g} Hz is cut off at the end of {worst.name}: FRFs are "
+        "wrong by about as much near it; leave out [ingest] exponential_window_s for a window that is strong enough",
+    )

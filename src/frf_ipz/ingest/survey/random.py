@@ -1,0 +1,225 @@
+"""The survey of a test with a shaker: its records, and whether they are used whole or in segments.
+
+A record that starts from rest can be used whole, with an exponential window on force and response: its FRF is then free
+of leakage, however narrow the modes are, but for the motion at its end, which the window has made small. Only the first
+part of a record counts, though. A stationary record that is long against the decay of the modes is better cut into
+segments (Welch). Which it is to be is measured: segments are long enough when the share of the response that the force
+does not explain no longer falls as they are made twice as long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.signals.windows import correlated_lines
+from frf_ipz.ingest.spectra import empty_sums, unexplained_power
+from frf_ipz.ingest.survey.checks import check_record
+from frf_ipz.ingest.survey.choice import blow_name, check_names, choose
+from frf_ipz.ingest.survey.facts import Survey
+from frf_ipz.ingest.survey.scan import scan_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
+    from frf_ipz.ingest.spectra import SpectrumSums
+    from frf_ipz.ingest.survey.facts import BlowFacts
+    from frf_ipz.ingest.survey.scan import FileScan
+    from frf_ipz.progress import Progress
+
+DECAY = 7.0  # rate of the window times the record: exp(-7) = 0.1 % of the motion at the end remains
+QUIET_SAMPLES = 2
+QUIET = 0.1  # of the signal's spread: what its first samples stay below if it starts from rest
+ENOUGH = 16  # averages that the shortest useful segments must give
+FEW = 6  # averages that tell something at all
+SETTLED = 1.3  # the unexplained share falls by less than this from one length of segments to the double
+SHORTEST = 256  # samples of a segment
+HANN_HALF_OVERLAP = 1.0 / 18.0  # twice the squared correlation of segments that overlap by half
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Segments:
+    """A length of segments, how many there are, and which share of the response they leave unexplained."""
+
+    length: int
+    count: int
+    unexplained: float
+
+
+def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progress) -> Survey:
+    """Look at all records of a test and decide how they are used.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Told about each file.
+
+    Returns
+    -------
+    Survey
+        Records, window or segments.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used, or the user's choice makes no sense.
+    """
+    check_names([blow_name(files.test, path, 1, 1) for path in files.test.files], options)
+    records = []
+    wanted = [(run, path) for run in files.test.runs for path in run.files]
+    for done, (run, path) in enumerate(wanted):
+        progress(0.5 * done / len(files.test.files), f"reading {path.name}")
+        records.append(_look(files, scan_file(files, run, path, for_blows=False)))
+    verdict = choose(records, options)
+    survey = Survey(
+        blows=verdict.blows, step_s=verdict.step_s, n_samples=max(record.n_samples for record in verdict.blows)
+    )
+    survey = replace(survey, n_samples=max(record.n_samples for record in survey.used), warnings=verdict.warnings)
+    progress(0.6, "choosing segments")
+    if options.segment_s is not None:
+        return _in_segments(survey, _asked_segment(survey, options.segment_s), "as asked for")
+    if options.exponential_window_s:
+        return _whole(survey, 1.0 / options.exponential_window_s, "as asked for")
+    return _choose(files, survey, may_window=options.exponential_window_s is None)
+
+
+def segments_of(signals: FloatArray, length: int) -> Iterator[FloatArray]:
+    """Cut signals into segments that overlap by half, under Hann windows.
+
+    Parameters
+    ----------
+    signals : (n_signals, n_samples) array
+        Force and responses.
+    length : int
+        Samples of a segment.
+
+    Yields
+    ------
+    (n_signals, length) array
+        One segment after the other.
+    """
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    for start in range(0, signals.shape[1] - length + 1, max(length // 2, 1)):
+        yield signals[:, start : start + length] * window
+
+
+def independent_segments(count: int) -> float:
+    """Return how many independent segments half-overlapping ones under Hann windows are worth.
+
+    Parameters
+    ----------
+    count : int
+        Segments.
+
+    Returns
+    -------
+    float
+        A little less.
+    """
+    return count / (1.0 + HANN_HALF_OVERLAP * (count - 1) / count) if count else 0.0
+
+
+def _look(files: RecordingFiles, scan: FileScan) -> BlowFacts:
+    (signals,) = files.stretches(scan.run, scan.path, [(0, scan.n_rows)])
+    name = blow_name(files.test, scan.path, 1, 1)
+    return check_record(files.test, scan, name, signals, rested=_is_rested(signals[1:]))
+
+
+def _is_rested(signals: FloatArray) -> bool:
+    """Tell whether force and responses all begin at their own zero, which a moving structure does not do."""
+    first = np.abs(signals[:, :QUIET_SAMPLES]).max(axis=1)
+    return bool(np.all(first < QUIET * signals.std(axis=1)))
+
+
+def _asked_segment(survey: Survey, segment_s: float) -> int:
+    length = round(segment_s / survey.step_s)
+    longest = min(record.n_samples for record in survey.used)
+    if not SHORTEST // 8 <= length <= longest:
+        raise InputError(
+            f"[ingest] segment_s = {segment_s:g} is {length} samples; possible are {SHORTEST // 8} to {longest} "
+            f"({SHORTEST // 8 * survey.step_s:.3g} to {longest * survey.step_s:.3g} s)"
+        )
+    return length
+
+
+def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Survey:
+    tried = _try_segments(files, survey)
+    settled = [
+        short
+        for short, double in zip(tried[1:], tried[:-1], strict=True)
+        if short.count >= ENOUGH and short.unexplained <= SETTLED * double.unexplained
+    ]
+    if settled:
+        best = settled[0]
+        why = f"{100 * best.unexplained:.2g} % of the response is unexplained, and longer segments do not explain more"
+        return _in_segments(survey, best.length, why)
+    if may_window and all(record.rested for record in survey.used):
+        shortest = min(record.n_samples for record in survey.used)
+        why = "all start from rest, and are too short for segments without leakage"
+        return _whole(survey, DECAY / (shortest * survey.step_s), why)
+    lengths = [trial.length for trial in sorted(tried, key=lambda trial: trial.unexplained)]
+    length = lengths[0] if lengths else min(record.n_samples for record in survey.used) // 4
+    warning = (
+        "the records are too short: segments without leakage would give too few averages, and they do not start from "
+        "rest; record longer, or switch the shaker on within the record. Expect peaks that are too low and too wide"
+    )
+    survey = _in_segments(survey, length, "the least bad")
+    return replace(survey, warnings=(*survey.warnings, warning))
+
+
+def _try_segments(files: RecordingFiles, survey: Survey) -> list[_Segments]:
+    """Measure what segments of different lengths leave unexplained, the longest first."""
+    shortest = min(record.n_samples for record in survey.used)
+    lengths = [length for k in range(12) if (length := 2 * (shortest // 2 ** (k + 1))) >= SHORTEST]
+    n_outputs = len(files.test.output_channels)
+    sums = {length: empty_sums(length // 2 + 1, n_outputs) for length in lengths}
+    run = survey.used[0].run
+    for record in survey.used:
+        if record.run is not run:
+            continue
+        (signals,) = files.stretches(record.run, record.path, [(record.start, record.stop)])
+        for length, total in sums.items():
+            for segment in segments_of(signals[1:] - np.array(record.offsets)[:, None], length):
+                total.add(segment[0], segment[1:])
+    return [_measure(length, total) for length, total in sums.items() if total.count >= FEW]
+
+
+def _measure(length: int, sums: SpectrumSums) -> _Segments:
+    independent = independent_segments(sums.count)
+    unexplained = unexplained_power(sums).sum(axis=0) / (independent - 1.0)
+    share = unexplained / np.maximum(sums.responses.sum(axis=1) / independent, np.finfo(float).tiny)
+    return _Segments(length=length, count=sums.count, unexplained=float(np.mean(share)))
+
+
+def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:
+    shortest = min(record.n_samples for record in survey.used) * survey.step_s
+    left = float(np.exp(-decay_1_s * shortest))
+    text = (
+        f"records used whole, with an exponential window of {1.0 / decay_1_s:.4g} s on force and response ({why}): the "
+        f"FRFs are exact at s = sigma + i omega but for {100 * left:.2g} % of the motion at the end"
+    )
+    step = correlated_lines(decay_1_s * survey.n_samples * survey.step_s)
+    lines = f"one frequency line in {step} is kept: the window correlates the noise of those between"
+    restless = [record.name for record in survey.used if not record.rested]
+    warnings = [f"{name} does not start from rest: its initial motion enters the FRFs" for name in restless]
+    return replace(
+        survey,
+        decay_1_s=decay_1_s,
+        choices=(text, lines) if step > 1 else (text,),
+        warnings=(*survey.warnings, *warnings),
+    )
+
+
+def _in_segments(survey: Survey, length: int, why: str) -> Survey:
+    text = f"segments of {length * survey.step_s:.4g} s under Hann windows, overlapping by half ({why})"
+    return replace(survey, segment=length, n_samples=length, choices=(text,))

@@ -1,0 +1,226 @@
+"""Units at the edge: what a column is in, as one factor to SI.
+
+pint reads units here and nowhere else; behind this module every value is SI.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from tokenize import TokenError
+
+import pint
+
+from frf_ipz.errors import QuantityError
+from frf_ipz.quantities import RESPONSES, FrfQuantity
+
+EXAMPLES = {
+    "force": "N, kN or lbf",
+    "acceleration": "m/s^2 or g_0",
+    "velocity": "m/s or mm/s",
+    "displacement": "m, mm or um",
+    "time": "s or ms",
+}
+UNREADABLE = (pint.PintError, ValueError, TypeError, AttributeError, AssertionError, TokenError, ZeroDivisionError)
+NUMBER = re.compile(r"^\s*[+-]?[\d.]*([eE][+-]?\d+)?")
+SAME = 1e-9  # relative: two factors that differ by less are one unit, written in two ways
+
+
+def si_unit(quantity: str, *, rotational: bool = False) -> str:
+    """Return the SI unit of a signal.
+
+    Parameters
+    ----------
+    quantity : str
+        ``force``, ``acceleration``, ``velocity``, ``displacement`` or ``time``.
+    rotational : bool
+        Along a rotation: a moment, an angle and its derivatives.
+
+    Returns
+    -------
+    str
+        For example ``m/s^2``.
+
+    Examples
+    --------
+    >>> si_unit("acceleration")
+    'm/s^2'
+    """
+    if quantity == "time":
+        return "s"
+    if quantity == "force":
+        return "N m" if rotational else "N"
+    return ("rad" if rotational else "m") + ("", "/s", "/s^2")[RESPONSES.index(quantity)]
+
+
+def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:
+    """Return what values in a unit are to be multiplied by to be SI.
+
+    Parameters
+    ----------
+    unit : str
+        Anything pint reads.
+    quantity : str
+        As in `si_unit`.
+    rotational : bool
+        As in `si_unit`.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Raises
+    ------
+    QuantityError
+        If the unit cannot be read or is none of this quantity.
+
+    Examples
+    --------
+    >>> unit_factor("g_0", "acceleration")
+    9.80665
+    """
+    return _to(_parse(unit), si_unit(quantity, rotational=rotational), f"'{unit}' is no unit of {quantity}", quantity)
+
+
+def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = False) -> float:
+    """Return the factor to SI of a column that holds what a sensor puts out.
+
+    Parameters
+    ----------
+    sensitivity : str
+        Output over what is measured, such as ``10.2 mV/g_0``; the column is in the unit of the numerator.
+    quantity : str
+        What is measured.
+    rotational : bool
+        As in `si_unit`.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Raises
+    ------
+    QuantityError
+        If it cannot be read, is zero, or measures something else.
+
+    Examples
+    --------
+    >>> round(sensitivity_factor("10 mV/N", "force"), 3)
+    0.1
+    """
+    value = _parse(sensitivity)
+    if value.magnitude == 0:
+        raise QuantityError(f"the sensitivity '{sensitivity}' is zero")
+    measured = _parse(numerator_of(sensitivity)) / value
+    problem = f"the sensitivity '{sensitivity}' is not per unit of {quantity}"
+    return _to(measured, si_unit(quantity, rotational=rotational), problem, quantity)
+
+
+def numerator_of(sensitivity: str) -> str:
+    """Return the unit that a column is in whose sensitivity is given.
+
+    Parameters
+    ----------
+    sensitivity : str
+        Such as ``10.2 mV/g_0``.
+
+    Returns
+    -------
+    str
+        Such as ``mV``.
+
+    Raises
+    ------
+    QuantityError
+        If there is no numerator and denominator.
+
+    Examples
+    --------
+    >>> numerator_of("10.2 mV/g_0")
+    'mV'
+    """
+    top, slash, _ = sensitivity.partition("/")
+    unit = NUMBER.sub("", top).strip()
+    if not slash or not unit:
+        raise QuantityError(f"the sensitivity '{sensitivity}' is no ratio of units; write it as in '10.2 mV/g_0'")
+    return unit
+
+
+def frf_factor(unit: str, quantity: FrfQuantity, output_direction: str, input_direction: str) -> float:
+    """Return the factor to SI of FRF values.
+
+    Parameters
+    ----------
+    unit : str
+        Such as ``g_0/lbf``.
+    quantity : FrfQuantity
+        What the FRF is.
+    output_direction, input_direction : str
+        ``x`` to ``rz``.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Raises
+    ------
+    QuantityError
+        If the unit cannot be read or is none of this quantity.
+
+    Examples
+    --------
+    >>> round(frf_factor("mm/s/N", FrfQuantity.MOBILITY, "z", "z"), 6)
+    0.001
+    """
+    wanted = quantity.unit(output_direction, input_direction)
+    return _to(_parse(unit), wanted, f"'{unit}' is no unit of {quantity.value}", "")
+
+
+def same_unit(one: str, other: str) -> bool | None:
+    """Tell whether two texts mean the same unit.
+
+    Parameters
+    ----------
+    one, other : str
+        Units.
+
+    Returns
+    -------
+    bool or None
+        None where one of them cannot be read: an analyser's own way of writing it says nothing.
+    """
+    try:
+        first, second = _parse(one), _parse(other)
+        ratio = float((first / second).to("").magnitude)
+    except QuantityError:
+        return None
+    except pint.PintError:
+        return False
+    return abs(ratio - 1.0) < SAME
+
+
+@cache
+def _registry() -> pint.UnitRegistry[float]:
+    return pint.UnitRegistry()
+
+
+@cache
+def _parse(text: str) -> pint.Quantity[float]:
+    try:
+        value: pint.Quantity[float] = _registry().Quantity(_registry().parse_expression(text)) * 1.0
+    except UNREADABLE:
+        raise QuantityError(f"'{text}' is no unit that can be read; write it as in N, m/s^2, g_0, mm/s or um") from None
+    return value
+
+
+def _to(value: pint.Quantity[float], wanted: str, problem: str, quantity: str) -> float:
+    try:
+        return float(value.to(wanted).magnitude)
+    except pint.PintError:
+        hint = EXAMPLES.get(quantity, "")
+        gram = "; 'g' is the gram, the acceleration of gravity is 'g_0'" if quantity == "acceleration" else ""
+        expected = f"expected is {hint}" if hint else f"expected is a unit like {wanted}"
+        raise QuantityError(f"{problem}; {expected}{gram}") from None

@@ -1,0 +1,161 @@
+"""The variance of estimated FRFs from the scatter between blows.
+
+The response's noise has the power a(f), the force's noise b(f), and what H1 leaves unexplained of one blow is
+
+    v = a + b |H|^2,   so that   var(H) = v / sum |F|^2.
+
+With few blows the raw scatter is far too noisy to be a weight, and smoothing it would smear peaks into their
+surroundings. Here a and b are smooth instead: they are fitted to the raw scatter in overlapping stretches of lines, by
+maximum likelihood for the gamma distribution that the unexplained power of n blows has (n - 1 degrees of freedom), and
+|H|^2 carries the peaks and notches exactly. Lines that stick out of the fit, such as hum, keep what they show.
+
+[Pintelon2012]: R. Pintelon, J. Schoukens, System Identification, 2nd ed., Wiley 2012 (doi:10.1002/9781118287422),
+chapter 2, for the distribution.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import gammainccinv
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.ingest.spectra import SpectrumSums, estimate_frf, unexplained_power
+
+ROUNDS = 30
+SETTLED = 1e-4
+FEWEST_LINES = 64  # in a stretch
+DEGREES = 192  # of freedom that a stretch has at least, where there are lines enough
+RARE = 1e-3  # lines of an FRF that may stick out by chance
+NOTHING = 1e-24  # of the responses' power: below this, scatter is rounding
+
+
+def frf_variance(sums: SpectrumSums, independent: float | None = None) -> FloatArray:
+    """Estimate the variance of H1 from the scatter between blows.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of all blows.
+    independent : float, optional
+        How many independent ones they are worth, where they overlap.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        E of the squared modulus of the error of `estimate_frf`; NaN for fewer than two blows and where there is no
+        force.
+    """
+    if sums.count < 2:
+        return np.full(sums.cross.T.shape, np.nan)
+    degrees = max((independent or sums.count) - 1.0, 0.5)
+    share = sums.count / (degrees + 1.0)  # overlapping segments: fewer independent ones in the same sums
+    scatter = unexplained_power(sums) / (degrees * share)
+    size = np.abs(estimate_frf(sums)) ** 2
+    floor = NOTHING * sums.responses.T.max(axis=0, initial=0.0)
+    power = np.column_stack(
+        [
+            noise_power(np.maximum(one, low), gain, degrees)
+            for one, gain, low in zip(scatter.T, size.T, floor, strict=True)
+        ]
+    )
+    return power_to_variance(power * share, sums.force)
+
+
+def power_to_variance(power: FloatArray, force: FloatArray) -> FloatArray:
+    """Turn the unexplained power of one blow into the variance of the FRF.
+
+    Parameters
+    ----------
+    power : (n_lines, n_outputs) array
+        a + b |H|^2.
+    force : (n_lines,) array
+        Sum of the force's squared modulus over the blows.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        Variance; NaN where there is no force.
+    """
+    below = np.broadcast_to(force[:, None], power.shape)
+    return np.asarray(np.divide(power, below, out=np.full(power.shape, np.nan), where=below > 0))
+
+
+def noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> FloatArray:
+    """Fit a + b |H|^2, with a and b smooth, to the scatter of one FRF.
+
+    Parameters
+    ----------
+    scatter : (n_lines,) array
+        Unexplained power of one blow, estimated line by line; gamma distributed about its expectation.
+    gain : (n_lines,) array
+        |H|^2.
+    degrees : float
+        Degrees of freedom of each line: complex, so blows less one.
+
+    Returns
+    -------
+    (n_lines,) array
+        The expectation.
+    """
+    if not scatter.any():
+        return np.zeros_like(scatter)
+    places, weights = _stretches(len(scatter), max(FEWEST_LINES, round(DEGREES / degrees)))
+    limit = gammainccinv(degrees, RARE / len(scatter)) / degrees
+    used = np.ones_like(scatter)
+    power = np.empty_like(scatter)
+    for _ in range(2):
+        response, force = _fit(scatter[places], gain[places], weights * used[places])
+        local = response[:, None] + force[:, None] * gain[places]
+        power = np.asarray(np.bincount(places.ravel(), (weights * local).ravel(), len(scatter)), np.float64)
+        used = (scatter <= limit * power).astype(float)
+        if used.all():
+            break
+    return np.where(used > 0, power, scatter)
+
+
+def _stretches(n_lines: int, width: int) -> tuple[np.ndarray, FloatArray]:
+    """Lay overlapping stretches over the lines; their weights add up to 1 at every line."""
+    if n_lines <= width:
+        return np.arange(n_lines)[None], np.ones((1, n_lines))
+    hop = width // 2
+    starts = np.append(np.arange(0, n_lines - width, hop), n_lines - width)
+    places = starts[:, None] + np.arange(width)
+    bell = np.sin(np.pi * (np.arange(width) + 0.5) / width) ** 2
+    weights = np.tile(bell, (len(starts), 1))
+    weights[0, :hop] = weights[-1, width - hop :] = 1.0
+    total = np.bincount(places.ravel(), weights.ravel(), n_lines)
+    return places, weights / total[places]
+
+
+def _fit(scatter: FloatArray, gain: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit a and b in every stretch by Fisher scoring, which for the gamma distribution is reweighted least squares."""
+    total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
+    mean_gain = np.maximum((weights * gain).sum(axis=1) / total, np.finfo(float).tiny)
+    relative = gain / mean_gain[:, None]
+    level = (weights * scatter).sum(axis=1) / total
+    response, force = 0.5 * level, 0.5 * level
+    tiny = np.finfo(float).tiny + 1e-12 * level
+    for _ in range(ROUNDS):
+        expected = response[:, None] + force[:, None] * relative + tiny[:, None]
+        weight = weights / expected**2
+        new = _positive_least_squares(weight, relative, scatter)
+        change = np.abs(new[0] - response) + np.abs(new[1] - force)
+        response, force = new
+        if np.all(change <= SETTLED * (response + force + tiny)):
+            break
+    return response, force / mean_gain
+
+
+def _positive_least_squares(weight: FloatArray, gain: FloatArray, scatter: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve scatter = a + b gain in every stretch with a and b not negative."""
+    s0, s1, s2 = (np.sum(weight * gain**power, axis=1) for power in range(3))
+    t0, t1 = (np.sum(weight * scatter * gain**power, axis=1) for power in range(2))
+    tiny = np.finfo(float).tiny
+    determinant = s0 * s2 - s1**2
+    solvable = determinant > 1e-10 * s0 * s2
+    safe = np.where(solvable, determinant, 1.0)
+    response = np.where(solvable, (s2 * t0 - s1 * t1) / safe, t0 / np.maximum(s0, tiny))
+    force = np.where(solvable, (s0 * t1 - s1 * t0) / safe, 0.0)
+    force = np.where(response < 0.0, t1 / np.maximum(s2, tiny), force)
+    response = np.where(force < 0.0, t0 / np.maximum(s0, tiny), response)
+    return np.maximum(response, 0.0), np.maximum(force, 0.0)
