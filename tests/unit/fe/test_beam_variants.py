@@ -104,6 +104,21 @@ def test_straight_lines_and_parabolas_are_met_between_nodes(formulation):
             assert_allclose(slope_row(model, at) @ motion, line.deriv()(at), rtol=1e-10)
 
 
+def test_a_stocky_cantilever_under_a_tip_load_is_met_between_nodes():
+    # the element's shapes are the static ones: w = P x^2 (3 L - x) / 6 E I + P x / kappa G A everywhere
+    thick, load = 0.1, 1e3
+    model = beam(elements=3, left="clamped", thickness_m=thick)
+    bending, shear_modulus = 69e9 * 25.33e-3 * thick**3 / 12, 69e9 / (2 * 1.33)
+    shear = 10 * 1.33 / (12 + 11 * 0.33) * shear_modulus * 25.33e-3 * thick
+    motion = np.zeros(len(model.all_dofs))
+    loads = np.zeros(len(model.dofs))
+    loads[model.index(Dof(4, "z"))] = load
+    motion[~model.fixed] = np.linalg.solve(model.stiffness.toarray(), loads)
+    for x in (0.05, 0.2, 0.31, LENGTH):
+        expected = load * x**2 * (3 * LENGTH - x) / (6 * bending) + load * x / shear
+        assert_allclose(deflection_row(model, x) @ motion, expected, rtol=1e-9)
+
+
 def test_the_slope_is_the_derivative_of_the_deflection():
     model = beam(elements=5, thickness_m=0.05)
     for at in (0.013, 0.111, 0.34):

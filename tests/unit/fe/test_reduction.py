@@ -126,6 +126,15 @@ def test_more_modes_make_room_for_many_sensors():
     assert any("more, so that" in note for note in many.choices)
 
 
+def test_modes_are_added_up_to_a_limit(monkeypatch):
+    monkeypatch.setattr(reduction, "FEW_DOFS", 0)
+    model = beam(left="clamped", elements=20, modal_ratio=0.005)
+    few = reduce(model, band_hz=(5.0, 60.0))
+    many = reduce(model, sensors=tuple(f"{node}:z" for node in range(2, 22)), band_hz=(5.0, 60.0))
+    assert len(few.dofs) < len(many.dofs) == reduction.MAX_GROWTH * len(few.dofs)
+    assert any("are no rows of their own" in note for note in many.choices)
+
+
 def test_a_copy_of_a_dof_is_reached_through_the_others():
     model = beam(left="clamped", elements=200, modal_ratio=0.005)
     found = reduce(model, actuators=("100:z",), sensors=("101:z",), points=("150:z",), band_hz=(5.0, 60.0))

@@ -103,6 +103,19 @@ def test_rayleigh_damping_couples_none(tmp_path):
     require_same(model_frfs(undamped, labels, S), direct(undamped, labels, S))
 
 
+def test_damping_that_couples_no_modes_adds_to_the_stated_ratios():
+    plain = beam(left="clamped", modal_ratio=0.01)
+    model = structural_model(
+        plain.mass_all,
+        plain.stiffness_all,
+        plain.all_dofs,
+        damping=8.0 * plain.mass_all,
+        modal_damping=[0.01],
+        fixed=plain.fixed,
+    )
+    require_same(model_frfs(model, LABELS, S), direct(model, LABELS, S, modal_damping_matrix(model)))
+
+
 def test_a_large_model_keeps_the_static_part_of_modes_left_out(monkeypatch):
     model = beam(left="clamped", elements=20, modal_ratio=1e-6)
     everything = model_frfs(model, LABELS, S)
