@@ -1,0 +1,88 @@
+"""FRFs of many models at once: the members of an update's ensemble."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+SOFT = 1e-3  # of the lowest line: frequency given to rigid-body modes, whose double poles at 0 have no residues
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Members:
+    """Members of an ensemble, in modes.
+
+    Parameters
+    ----------
+    ensemble : (m, 3, r, r) array
+        Mass, damping and stiffness of each.
+    lowest_rad_s : float
+        The lowest frequency at which FRFs will be asked for.
+    """
+
+    ensemble: FloatArray
+    lowest_rad_s: float
+
+    @cached_property
+    def modes(self) -> tuple[FloatArray, FloatArray]:
+        """Squared natural frequencies (m, r), ascending, and mass-normalised shapes (m, r, r)."""
+        mass, stiffness = self.ensemble[:, 0], self.ensemble[:, 2]
+        lower = np.linalg.inv(np.linalg.cholesky(mass))
+        values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
+        return np.maximum(values, (SOFT * self.lowest_rad_s) ** 2), lower.swapaxes(1, 2) @ vectors
+
+    @cached_property
+    def roots(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Poles (m, 2 r), and right and left vectors (m, r, 2 r) whose product is the receptance's residue."""
+        squares, shapes = self.modes
+        count, order = squares.shape
+        damping = shapes.swapaxes(1, 2) @ self.ensemble[:, 1] @ shapes
+        state = np.zeros((count, 2 * order, 2 * order))
+        state[:, :order, order:] = np.eye(order)
+        diagonal = np.arange(order)
+        state[:, order + diagonal, diagonal] = -squares
+        state[:, order:, order:] = -damping
+        poles, vectors = np.linalg.eig(state)
+        left = shapes @ np.linalg.inv(vectors)[:, :, order:].swapaxes(1, 2)
+        return poles.astype(complex), (shapes @ vectors[:, :order]).astype(complex), left.astype(complex)
+
+    def receptance(self, output: FloatArray, force: FloatArray, s: ComplexArray) -> ComplexArray:
+        """Evaluate one FRF of every member.
+
+        Parameters
+        ----------
+        output, force : (r,) array
+            Rows of sensor and blow.
+        s : (n_lines,) complex array
+            rad/s.
+
+        Returns
+        -------
+        (m, n_lines) complex array
+            m/N.
+        """
+        poles, right, left = self.roots
+        residues = (output @ right) * (force @ left)
+        return np.stack([(1 / (s[:, None] - p)) @ residue for p, residue in zip(poles, residues, strict=True)])
+
+    def amplitudes(self, output: FloatArray, force: FloatArray, count: int) -> FloatArray:
+        """Mass-normalised products of shapes at sensor and blow.
+
+        Parameters
+        ----------
+        output, force : (r,) array
+            Rows of sensor and blow.
+        count : int
+            Modes, from the lowest.
+
+        Returns
+        -------
+        (m, count) array
+            1/kg.
+        """
+        shapes = self.modes[1][:, :, :count]
+        return np.asarray((output @ shapes) * (force @ shapes))
