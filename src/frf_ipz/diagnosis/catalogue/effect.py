@@ -138,7 +138,7 @@ class Effect(ABC):
         return None
 
     def starts(self, specimen: Specimen, place: Place) -> FloatArray:
-        """Give values to start from, (n_starts, n_parameters): a grid over the bounds, unless an effect knows better."""
+        """Give values to start from, (n_starts, n_parameters): a grid over the bounds unless it knows better."""
         return grid(self.parameters(specimen, place), 8)
 
     def reported(self, place: Place, name: str, value: float) -> float:

@@ -107,6 +107,17 @@ class Nuisance:
         """Number of all parameters."""
         return sum(self.sizes)
 
+    @property
+    def frequency_places(self) -> IntArray:
+        """Where the relative errors of the squared frequencies, kappa_ii, stand among the parameters."""
+        rows, columns = self.pairs
+        return np.flatnonzero(rows == columns).astype(np.int64)
+
+    @property
+    def damping_places(self) -> IntArray:
+        """Where the relative errors of the damping ratios stand among the parameters."""
+        return np.arange(self.n_modes) + 2 * self.sizes[0]
+
     def unpack(self, values: FloatArray) -> Unknowns:
         """Give physical values.
 

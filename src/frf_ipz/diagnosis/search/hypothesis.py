@@ -11,7 +11,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.physics.basis import Basis, enrich
 from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.nuisance import Nuisance
-from frf_ipz.diagnosis.physics.response import Response, Rows, modify, respond, rows_of
+from frf_ipz.diagnosis.physics.response import Modes, Response, Rows, modify, respond, rows_of
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
@@ -115,6 +115,10 @@ class Hypothesis:
             total = total + build(values[start : start + count])
             start += count
         return total
+
+    def modes(self, values: FloatArray, unknown: FloatArray) -> Modes:
+        """Modes for physical values of the parameters, and of what cannot be known in standard deviations."""
+        return modify(self.basis, self.change(values), self.rows, self.nuisance.unpack(unknown))
 
     def respond(self, values: FloatArray, unknown: FloatArray, s: ComplexArray) -> Response:
         """FRFs for physical values of the parameters, and of what cannot be known in standard deviations."""

@@ -27,6 +27,7 @@ FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-8, 1e6
 FASTER, SLOWER = 0.2, 6.0  # what damping is multiplied with after a good and a bad step
 LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear range
 PRIOR_CURVATURE = 12.0  # over the squared range: that of a uniform prior, where the data say nothing
+LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
 MATTERS = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
 
@@ -111,7 +112,6 @@ def polish(
     unknown: FloatArray | None = None,
     iterations: int = 8,
     tolerance: float = 0.02,
-    used: BoolArray | None = None,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -129,8 +129,6 @@ def polish(
         At most that many.
     tolerance : float
         Stop when a step changes the objective by less, in squared standard deviations.
-    used : (n_nuisance,) bool array, optional
-        Unknowns that may move; those that matter where it is left out.
 
     Returns
     -------
@@ -138,27 +136,41 @@ def polish(
         The best found.
     """
     start = np.clip(hypothesis.searched(values), hypothesis.low, hypothesis.high)
-    unknown = np.zeros(hypothesis.nuisance.size) if unknown is None else unknown
-    point = _at(hypothesis, data, start, unknown)
+    point = _at(hypothesis, data, start, np.zeros(hypothesis.nuisance.size) if unknown is None else unknown)
+    slope = _linearise(hypothesis, data, point)
     damping, converged = FIRST_DAMPING, False
     for _ in range(iterations):
-        jacobian, used = _jacobian(hypothesis, data, point, used)
-        step_taken = False
+        gain = 0.0
         while damping < MOST_DAMPING:
-            trial = _step(hypothesis, data, point, jacobian, used, damping)
+            trial = _step(hypothesis, data, point, slope, damping)
             gain = point.objective - trial.objective
-            if gain > 0:
-                damping, step_taken = max(FASTER * damping, LEAST_DAMPING), True
-                point = trial
+            if gain > 0 or abs(gain) < tolerance:
                 break
             damping *= SLOWER
-            if abs(gain) < tolerance:
-                break
-        if not step_taken or gain < tolerance:
+        if gain > 0:
+            point, damping = trial, max(FASTER * damping, LEAST_DAMPING)
+            slope = _linearise(hypothesis, data, point)
+        if gain < tolerance:
             converged = True
             break
-    jacobian, _ = _jacobian(hypothesis, data, point, used)
-    return _finish(hypothesis, point, jacobian, converged=converged)
+    return _finish(hypothesis, point, slope, converged=converged)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Slope:
+    """How everything changes around a point: first by the parameters, then by the unknowns that matter."""
+
+    jacobian: FloatArray
+    used: BoolArray
+    squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies without scatter
+    ratios: FloatArray  # (m, n_parameters), of their damping ratios without scatter
+
+    def curvature(self, hypothesis: Hypothesis) -> FloatArray:
+        """Sum the data's curvature, the unknowns' priors, and uniform priors where data say nothing."""
+        n_parameters = len(hypothesis.parameters)
+        prior = np.ones(self.jacobian.shape[1])
+        prior[:n_parameters] = PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2
+        return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior))
 
 
 def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: FloatArray) -> _Point:
@@ -166,42 +178,34 @@ def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: Float
     return _Point(searched=searched, unknown=unknown, misfit=data.misfit(response), response=response)
 
 
-def _jacobian(
-    hypothesis: Hypothesis, data: Data, point: _Point, used: BoolArray | None
-) -> tuple[FloatArray, BoolArray]:
-    """Differentiate the whitened FRFs by parameters, then by the unknowns that matter."""
-    columns = [_derivative(hypothesis, data, point, index)[:, None] for index in range(len(hypothesis.parameters))]
+def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
+    m = hypothesis.nuisance.n_modes
+    columns, squares, ratios = [], [], []
+    for index in range(len(hypothesis.parameters)):
+        moved = point.searched.copy()
+        step = STEP if moved[index] + STEP <= hypothesis.high[index] else -STEP
+        moved[index] += step
+        response = hypothesis.respond(hypothesis.physical(moved), point.unknown, data.measured.s)
+        columns.append(data.whitening((response.values - point.response.values) / step)[:, None])
+        here, there = point.response.modes, response.modes
+        squares.append((there.omega[:m] ** 2 - here.omega[:m] ** 2) / step)
+        ratios.append((there.stated_ratio[:m] - here.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
-    if used is None:
-        white = data.whitening(by_unknown)
-        used = np.sum(white**2, 0) > MATTERS
-        return np.hstack([*columns, white[:, used]]), used
-    return np.hstack([*columns, data.whitening(by_unknown[:, :, used])]), used
+    white = data.whitening(by_unknown)
+    used = np.sum(white**2, 0) > MATTERS
+    return _Slope(
+        jacobian=np.hstack([*columns, white[:, used]]),
+        used=used,
+        squares=np.reshape(squares, (len(columns), m)).T,
+        ratios=np.reshape(ratios, (len(columns), m)).T,
+    )
 
 
-def _derivative(hypothesis: Hypothesis, data: Data, point: _Point, index: int) -> FloatArray:
-    moved = point.searched.copy()
-    step = STEP if moved[index] + STEP <= hypothesis.high[index] else -STEP
-    moved[index] += step
-    response = hypothesis.respond(hypothesis.physical(moved), point.unknown, data.measured.s)
-    return data.whitening((response.values - point.response.values) / step)
-
-
-def _normal(hypothesis: Hypothesis, jacobian: FloatArray) -> FloatArray:
-    """Curvature of the objective's half: data, priors of unknowns, and uniform priors where data say nothing."""
+def _step(hypothesis: Hypothesis, data: Data, point: _Point, slope: _Slope, damping: float) -> _Point:
     n_parameters = len(hypothesis.parameters)
-    prior = np.ones(jacobian.shape[1])
-    prior[:n_parameters] = PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2
-    return np.asarray(jacobian.T @ jacobian + np.diag(prior))
-
-
-def _step(
-    hypothesis: Hypothesis, data: Data, point: _Point, jacobian: FloatArray, used: BoolArray, damping: float
-) -> _Point:
-    n_parameters = len(hypothesis.parameters)
-    curvature = _normal(hypothesis, jacobian)
-    gradient = jacobian.T @ point.misfit
-    gradient[n_parameters:] -= point.unknown[used]
+    curvature = slope.curvature(hypothesis)
+    gradient = slope.jacobian.T @ point.misfit
+    gradient[n_parameters:] -= point.unknown[slope.used]
     damped = curvature + damping * np.diag(np.diag(curvature))
     step = linalg.cho_solve(linalg.cho_factor(damped, lower=True, check_finite=False), gradient, check_finite=False)
     longest = np.where([parameter.is_log for parameter in hypothesis.parameters], LONGEST_STEP, 0.1)
@@ -209,13 +213,79 @@ def _step(
         step *= min(1.0, float(np.min(longest / np.maximum(np.abs(step[:n_parameters]), 1e-300))))
     searched = np.clip(point.searched + step[:n_parameters], hypothesis.low, hypothesis.high)
     unknown = point.unknown.copy()
-    unknown[used] += step[n_parameters:]
+    unknown[slope.used] += step[n_parameters:]
+    if n_parameters:
+        unknown = _keep_modes(hypothesis, point, slope, searched, unknown)
     return _at(hypothesis, data, searched, unknown)
 
 
-def _finish(hypothesis: Hypothesis, point: _Point, jacobian: FloatArray, *, converged: bool) -> Fit:
+def _keep_modes(
+    hypothesis: Hypothesis, point: _Point, slope: _Slope, searched: FloatArray, unknown: FloatArray
+) -> FloatArray:
+    """Bring frequencies and damping of the modes to where the linear step wants them.
+
+    A sharp peak allows a parameter no long step, unless the scatter of its frequency makes up for what the step does to
+    it beyond the linear: the data fix frequencies, not the parameters that they depend on.
+    """
+    nuisance, here = hypothesis.nuisance, point.response.modes
+    there = hypothesis.modes(hypothesis.physical(searched), unknown)
+    m, moved, spread = nuisance.n_modes, searched - point.searched, np.diag(nuisance.kappa_std)
+    corrected = unknown.copy()
+    linear = here.omega[:m] ** 2 + slope.squares @ moved
+    places, elastic = nuisance.frequency_places, (there.omega[:m] > 0) & (spread > 0) & (here.omega[:m] > 0)
+    elastic &= slope.used[places]
+    kappa = unknown[places] * spread
+    wanted = linear * (1 + point.unknown[places] * spread) + here.omega[:m] ** 2 * (
+        kappa - point.unknown[places] * spread
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):  # rigid-body modes are left out below
+        corrected[places] = np.where(elastic, (wanted / there.omega[:m] ** 2 - 1) / spread, unknown[places])
+    places = nuisance.damping_places
+    linear_ratio = here.stated_ratio[:m] + slope.ratios @ moved
+    old, new = point.unknown[places] * nuisance.damping_std, unknown[places] * nuisance.damping_std
+    wanted_ratio = linear_ratio * (1 + old) + here.stated_ratio[:m] * (new - old)
+    damped = slope.used[places] & (there.stated_ratio[:m] > 0)
+    corrected[places] = np.where(
+        damped,
+        (np.maximum(wanted_ratio, LEAST_OF_RATIO * there.stated_ratio[:m]) / there.stated_ratio[:m] - 1)
+        / nuisance.damping_std,
+        unknown[places],
+    )
+    return corrected
+
+
+def same_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArray:
+    """Give a hypothesis the frequencies and damping ratios of a fit: the data fix them, whatever their cause.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Causes near those of the fit.
+    values : (n_parameters,) array
+        Physical values of its parameters.
+    fit : Fit
+        With the right modes.
+
+    Returns
+    -------
+    (n_nuisance,) array
+        What cannot be known, in standard deviations: zero but for frequencies and damping.
+    """
+    nuisance = hypothesis.nuisance
+    m, unknown, spread = nuisance.n_modes, np.zeros(nuisance.size), np.diag(nuisance.kappa_std)
+    here, there = hypothesis.modes(values, unknown), fit.hypothesis.modes(fit.values, fit.unknown)
+    elastic = (here.omega[:m] > 0) & (spread > 0)
+    kappa = there.squares[:m] / np.where(elastic, here.omega[:m], 1.0) ** 2 - 1
+    unknown[nuisance.frequency_places] = np.where(elastic, kappa / np.where(spread > 0, spread, 1.0), 0.0)
+    damped = here.stated_ratio[:m] > 0
+    change = there.ratio[:m] / np.where(damped, here.stated_ratio[:m], 1.0) - 1
+    unknown[nuisance.damping_places] = np.where(damped, change / nuisance.damping_std, 0.0)
+    return unknown
+
+
+def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: bool) -> Fit:
     n_parameters = len(hypothesis.parameters)
-    curvature = _normal(hypothesis, jacobian)
+    curvature = slope.curvature(hypothesis)
     lower = linalg.cholesky(curvature, lower=True, check_finite=False)
     log_volume = float(np.sum(np.log(np.diag(lower))))
     log_prior = -sum(np.log(cause.n_places) for cause in hypothesis.causes)

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Effect
-from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
-from frf_ipz.diagnosis.search.polish import Data, Fit, polish
-from frf_ipz.diagnosis.search.refine import refine, robust_misfit
-from frf_ipz.diagnosis.search.sketches import Start, search_sketches
+from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
+from frf_ipz.diagnosis.search.refine import refine
+from frf_ipz.diagnosis.search.sketches import Start
+from frf_ipz.diagnosis.search.wide import best_start, close_search, wide_search
 
-if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
-    from frf_ipz.diagnosis.measured.transfer import Measured
-    from frf_ipz.diagnosis.physics.nuisance import Nuisance
+Fits: TypeAlias = dict[tuple[object, ...], Fit]
+"""Fits by the key of their last cause."""
 
-WIDE_ERROR, REFINED_ERROR = 0.02, 0.01  # of an FRF's size: what counts as a misfit in the wide search, and after
+REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
+NEARLY_RIGHT = 20.0  # sum of squares over the number of values: small effects are looked for on top of such a fit
+CLOSE_EACH = 2  # places of an effect that are fitted after the close search
 PLACES_EACH = 3  # of an effect that are refined
 NEAR = 2  # nodes or elements: places so near count as one there
 FITTED = 12  # hypotheses that are fitted exactly
@@ -28,51 +28,6 @@ CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS = 2000.0  # nats behind the best: not looked at any more
 GAIN = 0.5  # nats: a neighbour must be better by that
 MOST_STEPS = 12
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Bench:
-    """Everything a search works with.
-
-    Parameters
-    ----------
-    specimen : Specimen
-        What is tested.
-    nuisance : Nuisance
-        What cannot be known.
-    effects : mapping of str to Effect
-        What is looked for.
-    coarse : Measured
-        Transfer functions far from the axis.
-    data : Data
-        Those near the axis, with their errors.
-    early : Data
-        The same, with larger errors: for first steps.
-    """
-
-    specimen: Specimen
-    nuisance: Nuisance
-    effects: Mapping[str, Effect]
-    coarse: Measured
-    data: Data
-    early: Data
-
-    def weights(self, error: float) -> FloatArray:
-        """Weights of squared misfits far from the axis, for a relative error of the model."""
-        noise = np.array([np.diag(covariance).real for covariance in self.coarse.covariance]).T
-        return np.asarray(1 / ((error * self.coarse.size) ** 2 + noise))
-
-    def suppose(self, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
-        """Make a hypothesis."""
-        return suppose(self.specimen, self.nuisance, causes, exact=exact)
-
-    def fit(self, causes: tuple[Cause, ...], values: FloatArray, unknown: FloatArray | None = None) -> Fit:
-        """Fit causes, from values and what cannot be known."""
-        hypothesis = self.suppose(causes)
-        if unknown is None:
-            first = polish(hypothesis, self.early, values, iterations=6, tolerance=1.0)
-            values, unknown = first.values, first.unknown
-        return polish(hypothesis, self.data, values, unknown=unknown, iterations=10)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,69 +82,31 @@ def search(bench: Bench, base: Fit) -> Ranking:
         All that was fitted.
     """
     starts = wide_search(bench, base)
-    refined = _refined(bench, base, starts)
-    fits = _fitted(bench, base, refined)
-    fits = _climbed(bench, base, fits)
+    fits = _fitted(bench, base, _refined(bench, base, starts))
+    if base.misfit < NEARLY_RIGHT * len(bench.data.measured.values.ravel()):
+        _add_close(bench, base, fits)
+    _climb_all(bench, base, fits)
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     return Ranking(base=base, fits=tuple(ranked), n_tried=len(starts))
 
 
-def wide_search(bench: Bench, base: Fit) -> list[Start]:
-    """Look at all effects at all places for many values.
-
-    Parameters
-    ----------
-    bench : Bench
-        Data and effects.
-    base : Fit
-        What is supposed already.
-
-    Returns
-    -------
-    list of Start
-        The best values of each cause, by rising cost.
-    """
-    specimen = bench.specimen
-    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
-    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
-    weights = bench.weights(WIDE_ERROR)
-    response = base.hypothesis.respond(base.values, np.zeros(bench.nuisance.size), specimen.contour)
-    sketched = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
-    found = search_sketches(
-        [cause for cause, _ in sketched],
-        [sketch for _, sketch in sketched],
-        response,
-        base.hypothesis.basis,
-        specimen.layout,
-        bench.coarse,
-        weights,
-    )
-    direct = [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
-    found += [_best_start(bench, base, cause, weights) for cause in direct]
-    return sorted(found, key=lambda start: start.cost)
+def _add_close(bench: Bench, base: Fit, fits: Fits) -> None:
+    """Fit small effects from where the base is."""
+    for start in _spread(close_search(bench, base), CLOSE_EACH):
+        hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
+        values = np.concatenate([base.values, start.values])
+        fit = polish(hypothesis, bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2)
+        _keep(fits, fit)
 
 
-def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
-    """Give an effect at all its places."""
-    places = effect.places(specimen)
-    return [Cause(effect=effect, place=place, n_places=len(places)) for place in places]
-
-
-def _best_start(bench: Bench, base: Fit, cause: Cause, weights: FloatArray) -> Start:
-    hypothesis = bench.suppose((*base.hypothesis.causes, cause), exact=False)
-    unknown = np.zeros(bench.nuisance.size)
-    n_own = hypothesis.counts[-1]
-    grid = cause.effect.starts(bench.specimen, cause.place) if n_own else np.zeros((1, 0))
-    costs = []
-    for values in grid:
-        response = hypothesis.respond(np.concatenate([base.values, values]), unknown, bench.specimen.contour)
-        costs.append(robust_misfit(bench.coarse.values - response.values, weights))
-    place = int(np.argmin(costs))
-    return Start(cause=cause, values=grid[place], cost=costs[place])
+def _keep(fits: Fits, fit: Fit) -> None:
+    key = fit.hypothesis.causes[-1].key
+    if key not in fits or fits[key].log_evidence < fit.log_evidence:
+        fits[key] = fit
 
 
 def _refined(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
-    weights = bench.weights(REFINED_ERROR)
+    weights = weights_of(bench.coarse, REFINED_ERROR)
     found = []
     for start in _spread(starts, PLACES_EACH):
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
@@ -217,17 +134,14 @@ def _beside(first: Cause, second: Cause) -> bool:
     return others_agree and bool(numbers) and max(numbers) <= NEAR
 
 
-def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> dict[tuple[object, ...], Fit]:
-    fits: dict[tuple[object, ...], Fit] = {}
-    best = -np.inf
+def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
+    fits: Fits = {}
     for start in refined[:FITTED]:
-        fit = bench.fit((*base.hypothesis.causes, start.cause), start.values)
-        fits[start.cause.key] = fit
-        best = max(best, fit.log_evidence)
+        _keep(fits, bench.fit((*base.hypothesis.causes, start.cause), start.values))
     return fits
 
 
-def _climbed(bench: Bench, base: Fit, fits: dict[tuple[object, ...], Fit]) -> dict[tuple[object, ...], Fit]:
+def _climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
     """Step to neighbours as long as that makes an effect more probable."""
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     leaders: dict[str, Fit] = {}
@@ -237,10 +151,9 @@ def _climbed(bench: Bench, base: Fit, fits: dict[tuple[object, ...], Fit]) -> di
         best = max(fit.log_evidence for fit in fits.values())
         if leader.log_evidence > best - HOPELESS:
             _climb(bench, base, leader, fits)
-    return fits
 
 
-def _climb(bench: Bench, base: Fit, fit: Fit, fits: dict[tuple[object, ...], Fit]) -> None:
+def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
     for _ in range(MOST_STEPS):
         cause = fit.hypothesis.causes[-1]
         better = fit
@@ -260,10 +173,11 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: dict[tuple[object, ...], Fit
 def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
+    weights = weights_of(bench.coarse, REFINED_ERROR)
     if len(hypothesis.parameters) == len(fit.values):
-        return polish(hypothesis, bench.data, fit.values, unknown=fit.unknown, iterations=6, tolerance=0.2)
-    start = _best_start(bench, base, cause, bench.weights(REFINED_ERROR))
-    values, _ = refine(
-        hypothesis, bench.coarse, bench.weights(REFINED_ERROR), np.concatenate([base.values, start.values])
-    )
+        values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
+        unknown = same_modes(hypothesis, values, fit)
+        return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1)
+    start = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
+    values, _ = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
     return bench.fit(causes, values)

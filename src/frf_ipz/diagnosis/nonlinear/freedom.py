@@ -1,0 +1,301 @@
+"""What the linear model may be wrong by: unknowns that are fitted besides a law, each with its prior.
+
+All are counted in units of their prior standard deviation: frequencies and damping ratios of the modes of the band, the
+shapes at sensors and blows (positions, gains, uneven stiffness), and the motion at the start of a stretch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.nonlinear.plant import Deviations, Plant, PlantResponse, no_deviations
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.options import DiagnoseOptions
+    from frf_ipz.dofs import Dof
+
+BEYOND = 1.25  # times the top of the band: modes whose parameters are free
+UNIFORM = 3**-0.5  # standard deviation of a uniform distribution over its half width
+CORD_SPREAD = 0.7  # of the logarithm of frequency and damping on soft cords: a factor of two
+UNEVEN = 2.0  # times the stiffness tolerance: what uneven stiffness does to shapes
+NEAREST = 4  # nodes that tell the slope of a shape
+START_SPREAD = 30.0  # times the size of a mode's response: a start that is not known at all
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Freedom:
+    """Unknowns of the linear model and how far they may go.
+
+    Parameters
+    ----------
+    plant : Plant
+        The structure.
+    modes : (n_free,) int array
+        Modes whose parameters are free.
+    frequency, damping : (n_free,) array
+        Prior standard deviations of logarithms.
+    sensors : (n_sensors, n_free) array
+        Of shapes at sensors.
+    inputs : (n_inputs, n_free) array
+        Of shapes at blows.
+    starts : (n_moving, n_free) array
+        Of the modal velocity at the start of stretches, and of displacement times omega, m/s kg^1/2.
+    moving : (n_moving,) int array
+        Stretches that start in motion.
+    """
+
+    plant: Plant
+    modes: IntArray
+    frequency: FloatArray
+    damping: FloatArray
+    sensors: FloatArray
+    inputs: FloatArray
+    starts: FloatArray
+    moving: IntArray
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of unknowns: frequencies, damping, sensors, inputs, starting motions and velocities."""
+        return (
+            *(self.frequency.size, self.damping.size, self.sensors.size, self.inputs.size),
+            *(self.starts.size, self.starts.size),
+        )
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of all unknowns."""
+        return sum(self.sizes)
+
+    def deviations(self, unknowns: FloatArray) -> Deviations:
+        """Turn unknowns into deviations of the plant.
+
+        Parameters
+        ----------
+        unknowns : (n_unknowns,) array
+            In prior standard deviations.
+
+        Returns
+        -------
+        Deviations
+            Zero for modes that are not free.
+        """
+        found = no_deviations(self.plant)
+        frequency, damping, sensors, inputs, _, _ = self._split(unknowns)
+        found.frequency[self.modes] = frequency * self.frequency
+        found.damping[self.modes] = damping * self.damping
+        found.sensors[:, self.modes] = sensors.reshape(self.sensors.shape) * self.sensors
+        found.inputs[:, self.modes] = inputs.reshape(self.inputs.shape) * self.inputs
+        return found
+
+    def place_starts(self, unknowns: FloatArray, response: PlantResponse, place: int) -> ComplexArray:
+        """Motion of a place that stems from how stretches start.
+
+        Parameters
+        ----------
+        unknowns : (n_unknowns,) array
+            In prior standard deviations.
+        response : PlantResponse
+            On the lines wanted.
+        place : int
+            Index in `Plant.places`.
+
+        Returns
+        -------
+        (n_moving, n_lines) complex array
+            m s.
+        """
+        free = _free_motion(response, self.modes, 0) * self.plant.at_places.shapes[place, self.modes, None]
+        return np.asarray(np.einsum("cbm,cml->bl", self._starts(unknowns), free))
+
+    def sensor_starts(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
+        """What sensors show of how stretches start.
+
+        Parameters
+        ----------
+        unknowns : (n_unknowns,) array
+            In prior standard deviations.
+        response : PlantResponse
+            On the lines wanted.
+
+        Returns
+        -------
+        (n_moving, n_sensors, n_lines) complex array
+            As `Stretches.motion`.
+        """
+        starts, shapes = self._starts(unknowns), response.sensor_shapes[:, self.modes]
+        seen = [
+            np.einsum("cbm,cml->bl", starts, _free_motion(response, self.modes, sensor.quantity.power) * shape[:, None])
+            for sensor, shape in zip(self.plant.sensors, shapes, strict=True)
+        ]
+        return np.stack(seen, 1)
+
+    def _starts(self, unknowns: FloatArray) -> FloatArray:
+        """(2, n_moving, n_free) motion and velocity of modes at the start of stretches."""
+        parts = self._split(unknowns)[4:]
+        return np.array([part.reshape(self.starts.shape) * self.starts for part in parts])
+
+    def columns(
+        self, stretches: Stretches, response: PlantResponse, place_force: ComplexArray, place_shapes: FloatArray
+    ) -> ComplexArray:
+        """Change of the weighted responses by each unknown.
+
+        Parameters
+        ----------
+        stretches : Stretches
+            The data; `response` is on their used lines.
+        response : PlantResponse
+            The structure as it is thought to be.
+        place_force : (n_blows, n_used) complex array
+            Force of the law on the structure, N s.
+        place_shapes : (n_modes,) array
+            Shapes at the law's place.
+
+        Returns
+        -------
+        (n_unknowns, n_blows, n_sensors, n_used) complex array
+            Per prior standard deviation, over the standard deviation of the data.
+        """
+        plant, modes = self.plant, self.modes
+        own = response.modes[modes]
+        force = stretches.force[:, stretches.used]
+        push = response.input_shapes[stretches.input_of][:, modes, None] * force[:, None]
+        motion = (push + place_shapes[modes, None] * place_force[:, None]) * own  # blow, mode, line
+        omega = plant.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes])
+        ratio = plant.damping_ratio[modes] * np.exp(response.deviations.damping[modes])
+        by_damping = -own * (2 * ratio * omega)[:, None] * response.s * self.damping[:, None]
+        by_frequency = -own * ((2 * omega**2)[:, None] + (2 * ratio * omega)[:, None] * response.s)
+        weight = 1 / np.sqrt(stretches.variance[:, :, stretches.used])
+        shapes = response.sensor_shapes[:, modes].T  # mode, sensor
+
+        def seen(modal: ComplexArray) -> ComplexArray:
+            """(n_free, n_blows, n_sensors, n_used) from modal motion (n_blows, n_free, n_used)."""
+            return np.asarray(modal.swapaxes(0, 1)[:, :, None] * shapes[:, None, :, None] * weight)
+
+        parts = [seen(motion * by_frequency * self.frequency[:, None]), seen(motion * by_damping)]
+        parts.append(_one_by_one(motion.swapaxes(0, 1), self.sensors, weight))
+        for number in range(len(plant.inputs)):
+            mine = (stretches.input_of == number)[:, None, None]
+            parts.append(seen(np.where(mine, force[:, None] * own, 0.0) * self.inputs[number][:, None]))
+        parts += self._start_columns(response, weight)
+        return np.concatenate(parts)
+
+    def _start_columns(self, response: PlantResponse, weight: FloatArray) -> list[ComplexArray]:
+        columns = np.zeros((2, *self.starts.shape, *weight.shape), complex)
+        for row, (sensor, shape) in enumerate(zip(self.plant.sensors, response.sensor_shapes, strict=True)):
+            free = _free_motion(response, self.modes, sensor.quantity.power) * shape[self.modes, None]
+            for number, blow in enumerate(self.moving):
+                columns[:, number, :, blow, row] = free * self.starts[number][:, None] * weight[blow, row]
+        return list(columns.reshape(-1, self.starts.shape[1], *weight.shape)) if len(self.moving) else []
+
+    def _split(self, unknowns: FloatArray) -> list[FloatArray]:
+        return np.split(unknowns, np.cumsum(self.sizes)[:-1])
+
+
+def _free_motion(response: PlantResponse, modes: IntArray, power: int) -> ComplexArray:
+    """Transforms of free vibrations, (2, n_free, n_lines), s / omega and s^2 / omega, as displacements.
+
+    They start with a modal displacement of 1 / omega, or with a velocity of 1. What is measured as velocity or
+    acceleration and divided by s or s^2 lacks the polynomial in t that integration from rest leaves out.
+    """
+    s, own = response.s, response.modes[modes]
+    omega = (response.plant.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes]))[:, None]
+    ratio = (response.plant.damping_ratio[modes] * np.exp(response.deviations.damping[modes]))[:, None]
+    loss = 2 * ratio * omega
+    displaced, moving = (
+        ((s + loss) / omega, np.ones_like(own)),
+        (-omega / s * np.ones_like(own), np.ones_like(own)),
+        (-omega / s * np.ones_like(own), -(s * loss + omega**2) / s**2),
+    )[power]
+    return np.stack([displaced * own, moving * own])
+
+
+def _one_by_one(motion: ComplexArray, sizes: FloatArray, weight: FloatArray) -> ComplexArray:
+    """Columns that change one mode at one sensor: (n_sensors n_free, n_blows, n_sensors, n_lines)."""
+    n_sensors, n_free = sizes.shape
+    columns = np.zeros((n_sensors, n_free, *weight.shape), complex)
+    for sensor in range(n_sensors):
+        columns[sensor, :, :, sensor] = motion * sizes[sensor][:, None, None] * weight[:, sensor]
+    return columns.reshape(-1, *weight.shape)
+
+
+def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: DiagnoseOptions) -> Freedom:
+    """Say what may deviate, from the tolerances of the user.
+
+    Parameters
+    ----------
+    plant : Plant
+        The structure.
+    stretches : Stretches
+        Which of them start in motion.
+    top_hz : float
+        Top of the band.
+    options : DiagnoseOptions
+        Tolerances.
+
+    Returns
+    -------
+    Freedom
+        For the modes of the band and the first ones above it.
+    """
+    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
+    rigid = modes < plant.n_rigid
+    frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM
+    moving = np.flatnonzero(stretches.moving)
+    starts = np.zeros((len(moving), len(modes)))
+    if len(moving):
+        response = np.abs(plant.at_inputs.shapes[stretches.input_of[moving]][:, modes]).max(1, keepdims=True)
+        impulse = np.sqrt(np.mean(np.abs(stretches.force[:, stretches.used]) ** 2, 1))[moving]
+        starts = START_SPREAD * response * impulse[:, None] * np.ones(len(modes))
+    return Freedom(
+        plant=plant,
+        modes=modes,
+        frequency=np.where(rigid, CORD_SPREAD, frequency),
+        damping=np.where(rigid, CORD_SPREAD, options.damping_tolerance * UNIFORM),
+        sensors=_shape_spread(plant, tuple(s.dof for s in plant.sensors), modes, options),
+        inputs=_shape_spread(plant, plant.inputs, modes, options),
+        starts=starts,
+        moving=moving,
+    )
+
+
+def _shape_spread(plant: Plant, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+    """How far shapes at points may be off: by gains, uneven stiffness and, off the exact place, by their slope."""
+    largest = np.abs(plant.at_places.shapes[:, modes]).max(0)
+    points = np.vstack([plant.at_sensors.shapes, plant.at_inputs.shapes])[:, modes]
+    known = {
+        dof.unsigned: dof.sign * row
+        for dof, row in zip((*(s.dof for s in plant.sensors), *plant.inputs), points, strict=True)
+    }
+    spread = []
+    for dof in dofs:
+        slope = _slope(plant, dof, known[dof.unsigned], modes)
+        size = np.abs(known[dof.unsigned])
+        parts = (
+            options.gain_tolerance * UNIFORM * size,
+            UNEVEN * options.stiffness_tolerance * largest,
+            options.position_tolerance_m_per_m * UNIFORM * slope,
+        )
+        spread.append(np.sqrt(np.sum(np.square(parts), 0)))
+    return np.array(spread)
+
+
+def _slope(plant: Plant, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
+    """Largest change of shapes towards neighbours, per length of the structure."""
+    if plant.model.kind == "lumped":
+        return np.zeros(len(modes))
+    geometry = plant.model.geometry
+    where = dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
+    extent = float(np.ptp(geometry.coordinates_m, axis=0).max())
+    others = [
+        (float(np.linalg.norm(where[place.ends[0].node] - where[dof.node])), row)
+        for row, place in enumerate(plant.places)
+        if len(place.ends) == 1 and place.ends[0].direction == dof.direction and place.ends[0].node != dof.node
+    ]
+    near = sorted(other for other in others if other[0] > 0)[:NEAREST]
+    slopes = [np.abs(plant.at_places.shapes[row, modes] - shape) / way for way, row in near]
+    return extent * np.max(slopes, axis=0) if slopes else np.zeros(len(modes))

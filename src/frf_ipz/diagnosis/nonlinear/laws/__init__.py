@@ -1,0 +1,1 @@
+"""Force laws, one a module, found by themselves."""

@@ -1,0 +1,33 @@
+"""A spring whose force is the cube of its motion: a clamp that stretches, a plate that stiffens."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.nonlinear.laws.law import Law, StepCompliance
+
+NEWTON_STEPS = 3  # the time steps are short: the first one is nearly exact
+
+
+class CubicStiffness(Law):
+    """Force k3 w^3."""
+
+    name = "cubic_stiffness"
+    strength_name = "cubic_N_m3"
+    strength_can_be_negative = True
+    phrase = "a cubic spring of {} N/m^3"
+
+    def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
+        """The cube of the motion."""
+        del v, shape
+        return np.asarray(w**3)
+
+    def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
+        """Newton's method for u + beta k u^3 = w."""
+        del v
+        u = w
+        for _ in range(NEWTON_STEPS):
+            square = step.motion * step.strength * u * u
+            u = u - (u + square * u - w) / (1 + 3 * square)
+        return np.asarray(step.strength * u**3)

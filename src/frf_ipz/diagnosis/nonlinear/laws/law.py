@@ -1,0 +1,84 @@
+"""What a module of `laws` has to say about its force law.
+
+A law is one module with one class that derives from `Law`: the force for motion and velocity at its place, linear in one
+number (its strength), and perhaps bent by a second one (its shape). Search, fit, simulation and verdict follow from
+that. A class in a user's own file does the same::
+
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
+
+    class SquareDrag(Law):
+        name = "square_drag"
+        strength_name = "drag_Ns2_m2"
+
+        def unit_force(self, w, v, shape):
+            return v * abs(v)
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+
+NEWTON_STEPS = 4  # from the force of the step before
+DIFFERENCE = 1e-6  # of the motion: step of a derivative, half the digits of double precision
+LEAST_WAY = 1e-30  # m: keeps a derivative at rest finite
+
+
+class Law(ABC):
+    """A force between a place and the ground, or across a spring, against its motion w and velocity v."""
+
+    name: ClassVar[str]
+    """As in `diagnosis.json`."""
+    strength_name: ClassVar[str]
+    """The parameter that the force is proportional to."""
+    shape_name: ClassVar[str] = ""
+    """The parameter that bends the law; empty for a law without, or for one whose shape is no parameter."""
+    strength_can_be_negative: ClassVar[bool] = False
+    phrase: ClassVar[str] = ""
+    """What sits at the place, in words, with the strength in braces as a number with its unit."""
+
+    @abstractmethod
+    def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
+        """Force for a strength of 1, N; `w` in m and `v` in m/s have any common shape."""
+
+    def shapes(self, largest_w: float, largest_v: float) -> FloatArray:
+        """Shapes to start from, for the largest motion and velocity of the place; one zero where there is none."""
+        del largest_w, largest_v
+        return np.zeros(1)
+
+    def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
+        """Force at the end of a time step, where w and v are those without it and it gives way by the compliance.
+
+        The default is Newton's method on the force itself; a law with a kink or a jump had better say it in closed form.
+        """
+        force = np.zeros_like(w)
+        for _ in range(NEWTON_STEPS):
+            here = step.strength * self.unit_force(w - step.motion * force, v - step.velocity * force, step.shape)
+            way = DIFFERENCE * np.maximum(np.abs(w), LEAST_WAY)
+            more = way / np.maximum(step.motion, LEAST_WAY)
+            there = step.strength * self.unit_force(
+                w - step.motion * (force + more), v - step.velocity * (force + more), step.shape
+            )
+            force = force - (force - here) / (1 - (there - here) / more)
+        return force
+
+
+class StepCompliance:
+    """What a force at the end of a time step does to its own place, and the law's numbers.
+
+    Parameters
+    ----------
+    motion, velocity : array or float
+        Motion and velocity that a unit force takes away, m/N and m/s/N.
+    strength, shape : array or float
+        Of the law.
+    """
+
+    __slots__ = ("motion", "shape", "strength", "velocity")
+
+    def __init__(self, motion: FloatArray, velocity: FloatArray, strength: FloatArray, shape: FloatArray) -> None:
+        self.motion, self.velocity, self.strength, self.shape = motion, velocity, strength, shape

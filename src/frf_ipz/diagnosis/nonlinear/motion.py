@@ -1,0 +1,138 @@
+"""Motion of a place nobody measured: by the model, and corrected by what the sensors show.
+
+A law's force g at a place moves the place by u = -G_pp g and each sensor by (G_sp / G_pp) u. So u follows from what the
+sensors show beyond the linear response, line by line, as the mean of its posterior: the model's errors on resonances
+do not enter, and where no sensor sees the place, the prior is what remains. Force and law need not be known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+
+OVERSAMPLING = 4
+FADE = (0.76, 0.86)  # part of the stretch over which the end is faded out: exp(sigma t) blows up errors there
+AROUND = 7  # lines over which sizes are averaged
+KNOWN = 0.3  # of the law's motion: how far the data may correct it
+TRACE = 0.01  # of the linear motion, besides
+HIGHEST = 0.45  # of the sampling rate: above, recordings hold nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clock:
+    """Goes between lines in the s-plane and times.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        Which lines.
+    oversampling : int
+        Times per sample.
+    """
+
+    stretches: Stretches
+    oversampling: int = OVERSAMPLING
+
+    @property
+    def n_times(self) -> int:
+        """Number of times."""
+        return self.oversampling * self.stretches.n_samples
+
+    @property
+    def step_s(self) -> float:
+        """Step of the times, s."""
+        return self.stretches.step_s / self.oversampling
+
+    def window(self) -> FloatArray:
+        """(n_times,) exp(-sigma t), faded out at the end."""
+        return np.exp(-self.stretches.sigma_1_s * self.step_s * np.arange(self.n_times)) * self._fade()
+
+    def at_times(self, lines: ComplexArray) -> FloatArray:
+        """Signals, (n_blows, n_times), from their transforms, (n_blows, n_lines).
+
+        A stretch that starts in motion starts with a jump, of which a finite series gives half at time 0. It is taken
+        out before and put back after.
+        """
+        signals = self._series(lines)
+        jumps = np.where(self.stretches.moving, 2 * signals[:, 0], 0.0)[:, None]
+        if jumps.any():
+            signals = jumps * self._fade() + self._series(lines - jumps / self.stretches.s)
+        return signals
+
+    def _series(self, lines: ComplexArray) -> FloatArray:
+        kept = np.where(self.stretches.s.imag <= 2 * np.pi * HIGHEST / self.stretches.step_s, lines, 0.0)
+        padded = np.zeros((len(lines), self.n_times // 2 + 1), complex)
+        padded[:, : lines.shape[-1]] = kept
+        growth = np.exp(self.stretches.sigma_1_s * self.step_s * np.arange(self.n_times)) * self._fade()
+        return np.asarray(np.fft.irfft(padded, self.n_times, axis=-1) * (growth / self.step_s))
+
+    def at_lines(self, signals: FloatArray) -> ComplexArray:
+        """Transforms, (..., n_lines), of signals, (..., n_times)."""
+        window = self.window() * self.step_s
+        window[0] /= 2  # a jump at the start counts by half; from rest there is nothing
+        lines = np.fft.rfft(signals * window, axis=-1)
+        return np.asarray(lines[..., : len(self.stretches.s)])
+
+    def velocity(self, signals: FloatArray) -> FloatArray:
+        """Derivative of signals to the fourth order, (..., n_times)."""
+        ahead, back = np.roll(signals, -1, -1), np.roll(signals, 1, -1)
+        far = np.roll(signals, -2, -1) - np.roll(signals, 2, -1)
+        slope = (8 * (ahead - back) - far) / (12 * self.step_s)
+        slope[..., :2] = (signals[..., 1:3] - signals[..., :2]) / self.step_s
+        slope[..., -2:] = 0.0
+        return np.asarray(slope)
+
+    def _fade(self) -> FloatArray:
+        part = np.arange(self.n_times) / self.n_times
+        return np.clip((FADE[1] - part) / (FADE[1] - FADE[0]), 0.0, 1.0)
+
+
+def place_motion(
+    stretches: Stretches,
+    beyond: ComplexArray,
+    linear: ComplexArray,
+    ratio: ComplexArray,
+    by_law: ComplexArray | None = None,
+) -> ComplexArray:
+    """Estimate the motion of a place.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    beyond : (n_blows, n_sensors, n_lines) complex array
+        What the sensors show beyond the linear response, m s.
+    linear : (n_blows, n_lines) complex array
+        Linear motion of the place, m s.
+    ratio : (n_sensors, n_lines) complex array
+        Motion of the sensors over that of the place, for a force at the place.
+    by_law : (n_blows, n_lines) complex array, optional
+        Motion by the force of a law, where one is known already.
+
+    Returns
+    -------
+    (n_blows, n_lines) complex array
+        m s.
+    """
+    spread = _smooth(linear)
+    start: ComplexArray | float = 0.0
+    if by_law is not None:
+        start = by_law
+        beyond = beyond - ratio * by_law[:, None]
+        spread = KNOWN**2 * _smooth(by_law) + TRACE**2 * spread
+    weight = 1 / stretches.variance
+    seen = np.sum(ratio.conj() * beyond * weight, 1)
+    certain = np.sum(np.abs(ratio) ** 2 * weight, 1) + 1 / np.maximum(spread, 1e-300)
+    return np.asarray(linear + start + seen / certain)
+
+
+def _smooth(lines: ComplexArray) -> FloatArray:
+    return uniform_filter1d(np.abs(lines) ** 2, AROUND, axis=-1, mode="nearest")

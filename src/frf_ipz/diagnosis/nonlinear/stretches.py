@@ -1,0 +1,312 @@
+"""Stretches of single blows, transformed along a line in the s-plane.
+
+Force and responses of a stretch are multiplied by exp(-sigma t) before the transform: the ratio of a blow from rest is
+then exactly the transfer function at sigma + i omega. A stretch that starts while the structure moves needs the motion
+at its start besides, which is unknown (`moving`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import next_fast_len, prev_fast_len
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import resample
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.measured.forces import isolate_pulse
+from frf_ipz.errors import InputError
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.plant import Plant
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
+THIN = 2  # lines are closer than the window resolves: every second one is independent enough
+EDGE = 40  # samples beside a stretch that moves: they are faded out
+FINER = 8  # times as many samples, where a stretch starts with a jump
+BEFORE = 4  # samples before the pulse
+AROUND = 5  # lines over which a response's size is averaged
+OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
+QUIET_PART = 0.3  # quantile of a band of lines that holds noise, between resonances
+QUIET_MEDIAN = 0.42  # that quantile of the mean of a few exponential variables over their mean
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stretches:
+    """Transforms of stretches of the blows of a test; what is called a blow here is one stretch.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        All lines up to half the sampling rate, rad/s.
+    used : (n_used,) int array
+        Lines of the band that are fitted.
+    step_s : float
+        Time step of the recordings, s.
+    n_samples : int
+        Of the stretch.
+    force : (n_blows, n_lines) complex array
+        N s.
+    start_force : (n_blows, 2) array
+        Force and its slope at the start of stretches that start in motion, N and N/s; else 0.
+    motion : (n_blows, n_sensors, n_lines) complex array
+        Responses as displacements, in the signs of the sensors, m s; 0 where a blow lacks a sensor.
+    noise : (n_sensors, n_lines) array
+        Variance of `motion` by the noise of the channels.
+    variance : (n_blows, n_sensors, n_lines) array
+        With what the model cannot be expected to meet; infinite where a blow lacks a sensor.
+    input_of : (n_blows,) int array
+        Rows of `Plant.inputs`.
+    blow_of : (n_blows,) int array
+        Which of the observations' blows each stretch is of.
+    moving : (n_blows,) bool array
+        The structure moves at the start.
+    """
+
+    s: ComplexArray
+    used: IntArray
+    step_s: float
+    n_samples: int
+    force: ComplexArray
+    start_force: FloatArray
+    motion: ComplexArray
+    noise: FloatArray
+    variance: FloatArray
+    input_of: IntArray
+    blow_of: IntArray
+    moving: BoolArray
+
+    @property
+    def n_blows(self) -> int:
+        """Number of blows."""
+        return len(self.force)
+
+    @property
+    def sigma_1_s(self) -> float:
+        """Real part of the lines."""
+        return float(self.s[0].real)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """Which part of the recordings is looked at, and how closely.
+
+    Parameters
+    ----------
+    duration_s : float
+        Length of the stretches; the whole records where they are shorter.
+    start_s : float
+        Where stretches of a hammer's blows start; 0 is at the blow.
+    per_record : int
+        Stretches of each record of a shaker.
+    floor : float
+        Misfit that the model is allowed, as a part of the response.
+    """
+
+    duration_s: float
+    start_s: float = 0.0
+    per_record: int = 2
+    floor: float = 0.01
+
+
+def transform(observations: Observations, plant: Plant, noise: FloatArray, window: Window) -> Stretches:
+    """Cut stretches and transform them.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+    plant : Plant
+        Names the sensors and blows.
+    noise : (n_sensors, 2) array
+        White and 1/f part of the density of each channel, see `channel_noise`.
+    window : Window
+        Which part.
+
+    Returns
+    -------
+    Stretches
+        Of all blows, with one length.
+
+    Raises
+    ------
+    InputError
+        If recordings differ in their time step.
+    """
+    step = common_step(observations)
+    cuts, n = _cuts(observations, window, step)
+    sigma = DECAYS / (n * step)
+    s = np.asarray(sigma + 2j * np.pi * np.fft.rfftfreq(n, step))
+    powers = np.array([sensor.quantity.power for sensor in plant.sensors])
+    force = np.zeros((len(cuts), len(s)), complex)
+    start_force = np.zeros((len(cuts), 2))
+    motion = np.zeros((len(cuts), len(plant.sensors), len(s)), complex)
+    present = np.zeros(motion.shape[:2], bool)
+    for number, cut in enumerate(cuts):
+        rows = [_row(plant, sensor.channel, sensor.dof) for sensor in cut.blow.sensors]
+        lines, start_force[number] = _lines(cut, n, sigma)
+        force[number], motion[number, rows] = lines[0], lines[1:]
+        present[number, rows] = True
+    motion /= s ** powers[:, None]
+    frequency = s.imag / (2 * np.pi)
+    density = noise[:, :1] + noise[:, 1:] / np.maximum(frequency, frequency[1])
+    known = density * (1 - np.exp(-2 * DECAYS)) / (2 * sigma) / np.abs(s) ** (2 * powers[:, None])
+    low, high = observations.band_hz
+    floor = np.where(frequency <= high, window.floor, OUTSIDE)
+    size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
+    variance = known + floor**2 * size
+    variance[~present] = np.inf
+    return Stretches(
+        s=s,
+        used=np.flatnonzero((frequency >= low) & (frequency <= high))[::THIN],
+        step_s=step,
+        n_samples=n,
+        force=force,
+        start_force=start_force,
+        motion=motion,
+        noise=known,
+        variance=variance,
+        input_of=np.array([plant.inputs.index(cut.blow.input_dof) for cut in cuts]),
+        blow_of=np.array([cut.number for cut in cuts]),
+        moving=np.array([cut.is_moving for cut in cuts]),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cut:
+    number: int
+    blow: Blow
+    start: int
+    is_moving: bool
+
+
+def _cuts(observations: Observations, window: Window, step: float) -> tuple[list[_Cut], int]:
+    """Where stretches start: at the blow, or, of a shaker, spread over the record."""
+    blows, wanted = observations.blows, round(window.duration_s / step)
+    if observations.kind == "hammer" and not window.start_s:
+        pulses = [isolate_pulse(blow) for blow in blows]
+        starts = [max(int(np.argmax(np.abs(pulse.blow.force) > 0)) - BEFORE, 0) for pulse in pulses]
+        n = min(wanted, *(blow.n_samples - start for blow, start in zip(blows, starts, strict=True)))
+        return [_Cut(i, pulse.blow, start, False) for i, (pulse, start) in enumerate(zip(pulses, starts, strict=True))], (
+            _fast_length(n)
+        )
+    shortest = min(blow.n_samples for blow in blows)
+    n = _fast_length(min(wanted, shortest - 2 * EDGE))
+    if observations.kind == "hammer":
+        start = min(EDGE + round(window.start_s / step), shortest - n - EDGE)
+        return [_Cut(i, isolate_pulse(blow).blow, start, True) for i, blow in enumerate(blows)], n
+    room, count = shortest - n - 2 * EDGE, window.per_record
+    parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
+    return [_Cut(i, blow, start, True) for i, blow in enumerate(blows) for start in parts], n
+
+
+def _lines(cut: _Cut, n: int, sigma: float) -> tuple[ComplexArray, FloatArray]:
+    """Transforms of force and responses, and the force and its slope at the start.
+
+    A signal that jumps at the start is not band-limited: the sum over samples is off by half the first one, and, on
+    finer samples, by little more.
+    """
+    signals, step = np.vstack([cut.blow.force, cut.blow.responses]), cut.blow.step_s
+    if not cut.is_moving:
+        decay = np.exp(-sigma * step * np.arange(n)) * step
+        return np.fft.rfft(signals[:, cut.start : cut.start + n] * decay, axis=1), np.zeros(2)
+    fine = step / FINER
+    around = slice(cut.start - EDGE, min(cut.start + n + EDGE, signals.shape[1]))
+    tapered = _tapered(signals[:, around])
+    finer = resample(tapered, FINER * tapered.shape[1], axis=1)[:, FINER * EDGE : FINER * (EDGE + n)]
+    decay = np.exp(-sigma * fine * np.arange(FINER * n)) * fine
+    decay[0] /= 2
+    slope = (finer[0, 1] - finer[0, 0]) / fine - finer[0, :3] @ np.array([1, -2, 1]) / (2 * fine)
+    return np.fft.rfft(finer * decay, axis=1)[:, : n // 2 + 1], np.array([finer[0, 0], slope])
+
+
+def _tapered(signals: FloatArray) -> FloatArray:
+    """Fade both ends, which are outside the stretch, so that the periodic interpolation does not ring."""
+    ramp = np.sin(np.pi / 2 * np.arange(EDGE // 2) / (EDGE // 2)) ** 2
+    window = np.ones(signals.shape[1])
+    window[: EDGE // 2] = ramp
+    window[-(EDGE // 2) :] = ramp[::-1]
+    return signals * window
+
+
+def common_step(observations: Observations) -> float:
+    """Time step of all recordings.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+
+    Returns
+    -------
+    float
+        s.
+
+    Raises
+    ------
+    InputError
+        If recordings differ in it.
+    """
+    steps = np.array([blow.step_s for blow in observations.blows])
+    if np.ptp(steps) > 1e-4 * steps[0]:
+        odd = observations.blows[int(np.argmax(np.abs(steps - np.median(steps))))]
+        raise InputError(
+            f"the blow {odd.name} has a time step of {odd.step_s:g} s, the others of {np.median(steps):g} s; "
+            "what depends on level is looked for in recordings of one sampling rate: leave it out"
+        )
+    return float(steps.mean())
+
+
+def channel_noise(observations: Observations, plant: Plant) -> FloatArray:
+    """Read the noise of the response channels between the resonances of the records' second halves.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+    plant : Plant
+        Names the sensors.
+
+    Returns
+    -------
+    (n_sensors, 2) array
+        White part, unit^2 s, and what is divided by the frequency in Hz, unit^2: two-sided densities. Of a shaker's
+        records, whose responses never end, only a trace.
+    """
+    found = np.zeros((len(plant.sensors), 2))
+    for row, sensor in enumerate(plant.sensors):
+        tails = []
+        for blow in observations.blows:
+            mine = [i for i, s in enumerate(blow.sensors) if (s.channel, s.dof) == (sensor.channel, sensor.dof)]
+            tails += [blow.responses[i, blow.n_samples // 2 :] for i in mine]
+        step = observations.blows[0].step_s
+        if observations.kind == "hammer":
+            found[row] = _quiet_density(tails, step)
+        else:
+            found[row, 0] = 1e-6 * step * np.mean([np.var(tail) for tail in tails])
+    return found
+
+
+def _quiet_density(tails: list[FloatArray], step_s: float) -> FloatArray:
+    n = min(len(tail) for tail in tails)
+    hann = np.hanning(n)
+    energy = np.mean([np.abs(np.fft.rfft((tail[:n] - tail[:n].mean()) * hann)) ** 2 for tail in tails], 0)
+    energy *= step_s / np.sum(hann**2)
+    edges = np.unique(np.geomspace(3, len(energy), 25).astype(int))
+    frequency = np.array([(a + b - 1) / 2 / (n * step_s) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    quiet = np.array([np.quantile(energy[a:b], QUIET_PART) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    quiet /= QUIET_MEDIAN ** (1 / len(tails))
+    white = float(np.median(np.sort(quiet)[: max(len(quiet) // 3, 1)]))
+    pink = float(np.quantile(np.maximum(quiet - white, 0.0) * frequency, 0.4))
+    return np.array([white, pink])
+
+
+def _fast_length(n: int) -> int:
+    return int(prev_fast_len(n, real=True)) if n > 64 else int(next_fast_len(n, real=True))
+
+
+def _row(plant: Plant, channel: str, dof: object) -> int:
+    return next(i for i, s in enumerate(plant.sensors) if (s.channel, s.dof) == (channel, dof))

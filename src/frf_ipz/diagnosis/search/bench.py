@@ -1,0 +1,78 @@
+"""Everything a search works with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
+from frf_ipz.diagnosis.search.polish import Data, Fit, polish
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.physics.nuisance import Nuisance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bench:
+    """Everything a search works with.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What is tested.
+    nuisance : Nuisance
+        What cannot be known.
+    effects : mapping of str to Effect
+        What is looked for.
+    coarse : Measured
+        Transfer functions far from the axis.
+    data : Data
+        Those near the axis, with their errors.
+    early : Data
+        The same, with larger errors: for first steps.
+    """
+
+    specimen: Specimen
+    nuisance: Nuisance
+    effects: Mapping[str, Effect]
+    coarse: Measured
+    data: Data
+    early: Data
+
+    def suppose(self, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
+        """Make a hypothesis."""
+        return suppose(self.specimen, self.nuisance, causes, exact=exact)
+
+    def fit(self, causes: tuple[Cause, ...], values: FloatArray, unknown: FloatArray | None = None) -> Fit:
+        """Fit causes, from values and what cannot be known."""
+        hypothesis = self.suppose(causes)
+        if unknown is None:
+            first = polish(hypothesis, self.early, values, iterations=6, tolerance=1.0)
+            values, unknown = first.values, first.unknown
+        return polish(hypothesis, self.data, values, unknown=unknown, iterations=10)
+
+
+def weights_of(measured: Measured, error: float) -> FloatArray:
+    """Weigh squared misfits, line by line.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions.
+    error : float
+        Relative error of the model.
+
+    Returns
+    -------
+    (n_points, n_frfs) array
+        One over the expected square.
+    """
+    noise = np.array([np.diag(covariance).real for covariance in measured.covariance]).T
+    return np.asarray(1 / ((error * measured.size) ** 2 + noise))

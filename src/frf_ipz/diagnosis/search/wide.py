@@ -1,0 +1,140 @@
+"""Wide search: all effects at all places for many values, on transfer functions that are not fitted exactly yet.
+
+Far from the axis, where large effects are seen, misfits count by their logarithm. Near it, on top of a fit that is
+nearly right, small effects are seen, and misfits count by their squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.refine import robust_misfit
+from frf_ipz.diagnosis.search.sketches import Start, search_sketches
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.search.polish import Fit
+
+WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
+CLOSE_ERROR = 1e-3  # the same near the axis
+
+
+def wide_search(bench: Bench, base: Fit) -> list[Start]:
+    """Look for large effects, far from the axis.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, by rising cost.
+    """
+    return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
+
+
+def close_search(bench: Bench, base: Fit) -> list[Start]:
+    """Look for small effects, near the axis, on top of a fit.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already, nearly right.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, by rising cost.
+    """
+    near = replace(bench.specimen, contour=bench.data.measured.s)
+    return _search(bench, near, bench.data.measured, base, base.unknown, CLOSE_ERROR)
+
+
+def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
+    """Give an effect at all its places.
+
+    Parameters
+    ----------
+    effect : Effect
+        What.
+    specimen : Specimen
+        What is tested.
+
+    Returns
+    -------
+    list of Cause
+        One a place.
+    """
+    places = effect.places(specimen)
+    return [Cause(effect=effect, place=place, n_places=len(places)) for place in places]
+
+
+def _search(
+    bench: Bench, specimen: Specimen, measured: Measured, base: Fit, unknown: FloatArray, error: float
+) -> list[Start]:
+    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
+    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
+    weights = weights_of(measured, error)
+    response = base.hypothesis.respond(base.values, unknown, measured.s)
+    sketched = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
+    found = search_sketches(
+        [cause for cause, _ in sketched],
+        [sketch for _, sketch in sketched],
+        response,
+        base.hypothesis.basis,
+        specimen.layout,
+        measured,
+        weights,
+    )
+    direct = [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    found += [best_start(bench, base, cause, measured, weights, unknown) for cause in direct]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def best_start(
+    bench: Bench, base: Fit, cause: Cause, measured: Measured, weights: FloatArray, unknown: FloatArray
+) -> Start:
+    """Try the values that an effect proposes to start from.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already.
+    cause : Cause
+        Effect and place.
+    measured : Measured
+        Transfer functions.
+    weights : (n_points, n_frfs) array
+        Over the squared misfit.
+    unknown : (n_nuisance,) array
+        What cannot be known, in standard deviations.
+
+    Returns
+    -------
+    Start
+        The best of them.
+    """
+    hypothesis = bench.suppose((*base.hypothesis.causes, cause), exact=False)
+    grid = cause.effect.starts(bench.specimen, cause.place) if hypothesis.counts[-1] else np.zeros((1, 0))
+    costs = []
+    for values in grid:
+        response = hypothesis.respond(np.concatenate([base.values, values]), unknown, measured.s)
+        costs.append(robust_misfit(measured.values - response.values, weights))
+    place = int(np.argmin(costs))
+    return Start(cause=cause, values=grid[place], cost=costs[place])

@@ -1,0 +1,1 @@
+"""The maximum-likelihood fit: compressed data, refined poles, structured residues, covariance."""

@@ -1,0 +1,198 @@
+"""Thousands of measured lines compressed into a small triangular system that says the same about the model.
+
+Around poles p every FRF f is linear: ``h_f = S c_f + Phi(p) R_f + D(p) T(R_f) dp``, with smooth columns S, partial
+fractions Phi, and D their derivative. The weighted columns ``B = [S, Phi, D]`` are reduced to ``B = Q U``; then
+``|y_f - B x|^2 = |z_f - U x|^2 + rest_f`` with ``z_f = Q' y_f`` for any x. Poles, residues, their structure and their
+covariance all follow from U and z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.numerics.partial_fractions import pair_columns, stacked
+
+WORST_PIVOT = 1e-6  # of a unit column: below, the normal equations lose too many digits and QR is taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Weighted:
+    """FRFs and weights in the form in which they are fitted.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        rad/s.
+    receptance : (n_lines, n_frfs) complex array
+        FRFs as receptances, m/N.
+    profile : (n_lines,) array
+        Weight of a line that all FRFs share.
+    gain : (n_frfs,) array
+        Weight of an FRF: one over the standard deviation of each part of its noise is profile times gain, N/m.
+    full : (n_lines, n_frfs) array or None
+        Weights where profile times gain is not good enough.
+    """
+
+    s: ComplexArray
+    receptance: ComplexArray
+    profile: FloatArray
+    gain: FloatArray
+    full: FloatArray | None = None
+
+    @property
+    def weight(self) -> FloatArray:
+        """Weight of each line and FRF, (n_lines, n_frfs) array."""
+        return self.profile[:, None] * self.gain if self.full is None else self.full
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Compressed:
+    """The triangular system around some poles.
+
+    Parameters
+    ----------
+    poles : (n_poles,) complex array
+        Where it was taken, rad/s.
+    n_smooth : int
+        Number of smooth columns; then come 2 n_poles of the residues and 2 n_poles of the poles' changes.
+    U : (n_systems, n, n) array
+        Upper triangular; one system for all FRFs, or one an FRF.
+    z : (n_frfs, n) array
+        Right-hand sides.
+    total : (n_frfs,) array
+        Weighted sum of squares of the data.
+    scale : (n_frfs,) array
+        The systems hold for the coefficients times this: the weight of an FRF, where one system serves all.
+    """
+
+    poles: ComplexArray
+    n_smooth: int
+    U: FloatArray
+    z: FloatArray
+    total: FloatArray
+    scale: FloatArray
+
+    @property
+    def n_poles(self) -> int:
+        """Number of poles, one a pair."""
+        return len(self.poles)
+
+    @property
+    def n_linear(self) -> int:
+        """Number of linear coefficients of an FRF."""
+        return self.n_smooth + 2 * self.n_poles
+
+    @property
+    def misfit(self) -> FloatArray:
+        """Weighted sum of squares that the linear coefficients leave, (n_frfs,) array."""
+        return np.asarray(self.total - np.sum(self.z[:, : self.n_linear] ** 2, axis=1))
+
+    def scaled_coefficients(self) -> FloatArray:
+        """Best linear coefficients at these poles, times `scale`.
+
+        Returns
+        -------
+        (n_frfs, n_linear) array
+            Smooth ones, real parts of the residues, imaginary parts.
+        """
+        n = self.n_linear
+        return solve_upper(self.U[:, :n, :n], self.z[:, :n])
+
+    def coefficients(self) -> FloatArray:
+        """Best linear coefficients at these poles.
+
+        Returns
+        -------
+        (n_frfs, n_linear) array
+            Smooth ones, real parts of the residues, imaginary parts.
+        """
+        return self.scaled_coefficients() / self.scale[:, None]
+
+    def residues(self) -> ComplexArray:
+        """Best residues at these poles.
+
+        Returns
+        -------
+        (n_poles, n_frfs) complex array
+            Of receptances, m/N rad/s.
+        """
+        parts = self.coefficients()[:, self.n_smooth :]
+        return np.asarray(parts[:, : self.n_poles] + 1j * parts[:, self.n_poles :]).T
+
+
+def compress(data: Weighted, poles: ComplexArray, smooth: FloatArray) -> Compressed:
+    """Compress the data around poles.
+
+    Parameters
+    ----------
+    data : Weighted
+        Lines and weights.
+    poles : (n_poles,) complex array
+        rad/s.
+    smooth : (2 n_lines, n_smooth) array
+        Stacked columns of what lies out of band.
+
+    Returns
+    -------
+    Compressed
+        The small system.
+    """
+    columns = np.concatenate([smooth, pair_columns(data.s, poles), pair_columns(data.s, poles, power=2)], axis=1)
+    if data.full is None:
+        rows = stacked(data.receptance * data.profile[:, None]) * data.gain
+        columns *= np.tile(data.profile, 2)[:, None]
+        U, z = _reduce(columns, rows)
+        systems, right = U[None], z.T
+        total = np.einsum("lf,lf->f", rows, rows)
+        scale = data.gain
+    else:
+        reduced = [
+            _reduce(columns * np.tile(weight, 2)[:, None], stacked(value * weight)[:, None])
+            for weight, value in zip(data.full.T, data.receptance.T, strict=True)
+        ]
+        systems = np.stack([U for U, _ in reduced])
+        right = np.stack([z[:, 0] for _, z in reduced])
+        total = np.sum(np.abs(data.receptance * data.full) ** 2, axis=0)
+        scale = np.ones(len(total))
+    return Compressed(poles=poles, n_smooth=smooth.shape[1], U=systems, z=right, total=total, scale=scale)
+
+
+def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
+    """Solve triangular systems, one for all right-hand sides or one for each.
+
+    Parameters
+    ----------
+    U : (n_systems, n, n) array
+        Upper triangular.
+    z : (n_sides, n) array
+        Right-hand sides.
+
+    Returns
+    -------
+    (n_sides, n) array
+        Solutions.
+    """
+    if len(U) == 1:
+        return np.asarray(linalg.solve_triangular(U[0], z.T, check_finite=False).T)
+    return np.stack(
+        [linalg.solve_triangular(one, side, check_finite=False) for one, side in zip(U, z, strict=True)]
+    )
+
+
+def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Triangular factor of the columns, and the rows in its orthonormal basis."""
+    length = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    columns = columns / length
+    try:
+        U = linalg.cholesky(columns.T @ columns, check_finite=False)
+        safe = bool(np.min(np.diag(U)) > WORST_PIVOT)
+    except linalg.LinAlgError:
+        safe = False
+    if safe:
+        return U * length, linalg.solve_triangular(U, columns.T @ rows, trans="T", check_finite=False)
+    Q, U = np.linalg.qr(columns)
+    return U * length, Q.T @ rows

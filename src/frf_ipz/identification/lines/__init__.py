@@ -1,0 +1,1 @@
+"""The measured lines as the fitter sees them: receptances, their noise, their weights."""

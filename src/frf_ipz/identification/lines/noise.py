@@ -1,0 +1,65 @@
+"""How strong the noise on measured FRFs is, where nobody has said so.
+
+Noise differs from line to line, a response does not: third differences leave the noise. Their median over some lines
+is not moved by the few lines on which a narrow peak does vary.
+"""
+
+from __future__ import annotations
+
+from math import comb, log
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+DIFFERENCE = 3  # order of the differences: what a parabola can follow over four lines is no noise
+BLOCK_LINES = 48  # lines behind one estimate: its scatter is then some 20 %
+TINY = 1e-300  # keeps the logarithm of a dead channel finite
+
+
+def rough_variance(values: ComplexArray) -> FloatArray:
+    """Estimate the variance of what differs from line to line.
+
+    Parameters
+    ----------
+    values : (n_lines, n_frfs) complex array
+        FRFs, or what a model leaves of them.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        E of the squared modulus of the noise, smooth over the lines.
+    """
+    return smooth_level(_squared_differences(values))
+
+
+def smooth_level(squares: FloatArray) -> FloatArray:
+    """Smooth level of exponentially distributed squares, by medians over blocks of lines.
+
+    Parameters
+    ----------
+    squares : (n_lines, n_frfs) array
+        Squared moduli of complex Gaussian numbers.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        Their expectation.
+    """
+    n_lines = len(squares)
+    edges = np.linspace(0, n_lines, max(1, n_lines // BLOCK_LINES) + 1).astype(int)
+    # the median of an exponential distribution is ln 2 times its mean
+    blocks = [np.median(squares[low:high], axis=0) / log(2) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    middles = (edges[:-1] + edges[1:] - 1) / 2
+    levels = np.log(np.maximum(blocks, TINY))
+    lines = np.arange(n_lines)
+    return np.exp(np.stack([np.interp(lines, middles, level) for level in levels.T], axis=1))
+
+
+def _squared_differences(values: ComplexArray) -> FloatArray:
+    weights = np.array([(-1) ** k * comb(DIFFERENCE, k) for k in range(DIFFERENCE + 1)])
+    weights = weights / np.linalg.norm(weights)
+    n_inner = len(values) - DIFFERENCE
+    inner = np.abs(sum(weight * values[k : k + n_inner] for k, weight in enumerate(weights))) ** 2
+    ahead = DIFFERENCE // 2
+    return np.pad(inner, ((ahead, DIFFERENCE - ahead), (0, 0)), mode="edge")

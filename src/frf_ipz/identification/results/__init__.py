@@ -1,0 +1,1 @@
+"""What is reported: zeros, tables of modes and misfit, bands of confidence."""

@@ -1,0 +1,140 @@
+"""Where modes are missing: peaks of the misfit that noise does not make.
+
+A mode that was left out leaves ``R / (i (omega - omega_0) + a)`` in the misfit of every FRF. In the time domain that is
+a decaying exponential; so the best match to it, at every frequency at once, is the spectrum of the misfit's time signal
+times ``exp(-a t)``. The energy of the match, summed over FRFs, is chi-square with two degrees of freedom an FRF where
+there is only noise, and a candidate is what exceeds the largest value that so many lines would show by chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft, stats
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+
+FALSE_ALARMS = 1e-3  # candidates that pure noise would give, per search
+NARROWEST, WIDENING = 0.4, 5.0  # half widths tried: the first in lines, and the factor to the next: 0.85 match at worst
+WIDEST_RATIO = 0.15  # damping ratio of the widest
+SHADOW = 3.0  # times the match that a stronger candidate itself would have there: a weaker one must exceed that
+TAILS = 40  # half widths of a mode that are matched
+PADDING = 4  # zeros behind the lines, one over: so that the two ends of the band are not neighbours
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidates:
+    """Poles that may be missing.
+
+    Parameters
+    ----------
+    poles : (n,) complex array
+        rad/s, the strongest first.
+    strength : (n,) array
+        Energy of the match over what chance would give at most.
+    """
+
+    poles: ComplexArray
+    strength: FloatArray
+
+
+def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -> Candidates:
+    """Find modes that are missing in a model.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Lines, Hz; gaps count as lines without data.
+    misfit : (n_lines, n_frfs) complex array
+        Measured minus model, in units where each part of the noise has variance one.
+    most : int
+        At most so many.
+
+    Returns
+    -------
+    Candidates
+        The strongest first; none where nothing exceeds chance.
+    """
+    line = float(np.median(np.diff(frequency_hz)))
+    place = _places(frequency_hz, line)
+    n_grid = int(place[-1]) + 1
+    size = fft.next_fast_len(n_grid + n_grid // PADDING)
+    spread = np.zeros((misfit.shape[1], n_grid), np.complex64)  # single precision: the misfit is of order one
+    spread[:, place] = misfit.T
+    signal = fft.ifft(spread, size, axis=1, norm="forward")
+    present = np.zeros(n_grid)
+    present[place] = 1.0
+    widths = _half_widths(frequency_hz, line)
+    limit = _chance_limit(misfit.shape[1], len(frequency_hz) * len(widths))
+    found: list[tuple[float, complex]] = []
+    for width in widths:
+        energy = _match(signal, width, n_grid)[place] / _template_energy(present, width)[place]
+        peaks = _peaks(energy / limit, width)
+        found += [
+            (float(energy[k] / limit), 2 * np.pi * complex(-width * line, frequency_hz[k])) for k in peaks[: 2 * most]
+        ]
+    return _separate(sorted(found, key=lambda item: -item[0]), most)
+
+
+def _places(frequency_hz: FloatArray, line: float) -> IntArray:
+    """Number of each line on a grid; a gap longer than the tails of the widest match is shortened."""
+    steps = np.clip(np.round(np.diff(frequency_hz) / line), 1, 10 * TAILS)
+    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
+
+
+def _half_widths(frequency_hz: FloatArray, line: float) -> FloatArray:
+    widest = WIDEST_RATIO * frequency_hz[-1] / line
+    widest = max(min(widest, len(frequency_hz) / 8), 2 * NARROWEST)
+    count = 1 + int(np.ceil(np.log(widest / NARROWEST) / np.log(WIDENING)))
+    return np.geomspace(NARROWEST, widest, count)
+
+
+def _match(signal: ComplexArray, width: float, n_grid: int) -> FloatArray:
+    """Energy of the match at every place of the grid, summed over FRFs."""
+    size = signal.shape[1]
+    # a broad match varies slowly: a part of the time signal is enough, and gives fewer points
+    length = min(size // 2, fft.next_fast_len(int(np.ceil(12 * size / (2 * np.pi * width)))))
+    time = np.arange(length) * (2 * np.pi / size)
+    points = size if length == size // 2 else length * 2
+    matched = fft.fft(signal[:, :length] * np.exp(-width * time).astype(np.float32), points, axis=1)
+    energy = np.sum(matched.real**2 + matched.imag**2, axis=0) * (2 * np.pi / size) ** 2
+    if points == size:
+        return np.asarray(energy[:n_grid])
+    return np.asarray(np.interp(np.arange(n_grid) / size, np.arange(points) / points, energy))
+
+
+def _template_energy(present: FloatArray, width: float) -> FloatArray:
+    """Sum over the lines present of 1 / (k^2 + width^2)."""
+    reach = int(min(len(present), max(TAILS * width, TAILS)))
+    k = np.arange(-reach, reach + 1)
+    size = fft.next_fast_len(len(present) + 2 * reach)
+    kernel = fft.rfft(1.0 / (k**2 + width**2), size)
+    return np.asarray(fft.irfft(fft.rfft(present, size) * kernel, size)[reach : reach + len(present)])
+
+
+def _chance_limit(n_frfs: int, n_places: int) -> float:
+    return float(stats.chi2.isf(FALSE_ALARMS / n_places, 2 * n_frfs))
+
+
+def _peaks(ratio: FloatArray, width: float) -> IntArray:
+    above = np.flatnonzero(ratio > 1)
+    inner = above[(above > 0) & (above < len(ratio) - 1)]
+    tops = inner[(ratio[inner] >= ratio[inner - 1]) & (ratio[inner] >= ratio[inner + 1])]
+    return np.asarray(tops[np.argsort(-ratio[tops])])
+
+
+def _separate(found: list[tuple[float, complex]], most: int) -> Candidates:
+    kept: list[tuple[float, complex]] = []
+    for strength, pole in found:
+        shadow = sum(stronger * _overlap(pole, other) for stronger, other in kept)
+        if len(kept) < most and strength > SHADOW * shadow:
+            kept.append((strength, pole))
+    return Candidates(
+        poles=np.array([pole for _, pole in kept], complex), strength=np.array([strength for strength, _ in kept])
+    )
+
+
+def _overlap(pole: complex, other: complex) -> float:
+    """Energy that one pole's match finds in the response of another, by its own."""
+    return 4 * pole.real * other.real / ((pole.real + other.real) ** 2 + (pole.imag - other.imag) ** 2)

@@ -1,0 +1,1 @@
+"""First poles, from a stabilisation diagram."""

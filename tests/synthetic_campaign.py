@@ -1,0 +1,106 @@
+"""Small campaigns of recordings with a known truth, written as a user would hand them in.
+
+The responses are transforms of the exact transfer function on a record eight times as long, so that nothing wraps
+around; the force is a smooth pulse, so that sampling changes nothing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+PAD = 8  # times the record: what the transform is made on
+AT_S = 0.03  # when the hammer touches
+PULSE_S = 0.8e-3  # standard deviation of the pulse: nothing is left of it at half of the sampling rate
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Accelerances of one input and a few outputs by modes."""
+
+    frequency_hz: tuple = (31.0, 88.0, 173.0)
+    damping_ratio: tuple = (0.02, 0.01, 0.012)
+    shapes: tuple = ((1.0, 0.7, -0.5), (0.6, -0.8, 0.9))  # residues, one row an output, 1/kg
+
+    def accelerance(self, s):
+        """Give the (n_lines, n_outputs) transfer function, m/s^2/N."""
+        omega = 2 * np.pi * np.array(self.frequency_hz)
+        ratio = np.array(self.damping_ratio)
+        s = np.asarray(s, complex)[:, None]
+        modes = s**2 / (s**2 + 2 * ratio * omega * s + omega**2)
+        return modes @ np.array(self.shapes).T
+
+    @property
+    def n_outputs(self):
+        return len(self.shapes)
+
+
+def respond(structure, force, step_s):
+    """Give the responses to a force from rest, one row an output."""
+    n = len(force)
+    omega = 2 * np.pi * np.fft.rfftfreq(PAD * n, step_s)
+    spectrum = np.fft.rfft(force, PAD * n)[:, None] * structure.accelerance(1j * omega)
+    return np.fft.irfft(spectrum, PAD * n, axis=0)[:n].T
+
+
+def pulse(n_samples, step_s, *, height=100.0, at_s=AT_S, length_s=PULSE_S):
+    """Give the force of one blow."""
+    time = np.arange(n_samples) * step_s
+    return height * np.exp(-0.5 * ((time - at_s) / length_s) ** 2)
+
+
+def blow(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, force=None, **of_pulse):
+    """Give force and responses of one blow, (1 + n_outputs, n_samples)."""
+    force = pulse(n_samples, step_s, **of_pulse) if force is None else force
+    signals = np.vstack([force, respond(structure, force, step_s)])
+    if noise:
+        signals += noise * rng.standard_normal(signals.shape)
+    return signals
+
+
+def write_csv(path, signals, step_s, *, columns=None, delimiter=",", decimal=".", units=None, digits=17, start_s=0.0):
+    """Write a recording."""
+    columns = columns or ["force", *(f"acc_{index + 1}" for index in range(len(signals) - 1))]
+    time = start_s + np.arange(signals.shape[1]) * step_s
+    rows = [delimiter.join(["time", *columns])]
+    if units:
+        rows.append(delimiter.join(units))
+    rows += [delimiter.join(f"{value:.{digits}g}" for value in row) for row in np.vstack([time, signals]).T]
+    text = "\n".join(rows) + "\n"
+    if decimal == ",":
+        text = text.replace(".", ",")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def channels_toml(n_outputs, *, force_unit="N", unit="m/s^2"):
+    """Give the channels of a test: the force and accelerometers at nodes 1, 2 and so on."""
+    text = f'[[channel]]\ncolumn = "force"\nrole = "input"\nquantity = "force"\nunit = "{force_unit}"\n'
+    for index in range(n_outputs):
+        text += (
+            f'[[channel]]\ncolumn = "acc_{index + 1}"\nrole = "output"\nquantity = "acceleration"\n'
+            f'unit = "{unit}"\ndof = "{index + 1}:+z"\n'
+        )
+    return text
+
+
+def write_test(folder, body, *, kind="hammer", n_outputs=2, head="", **of_channels):
+    """Write `test.toml`."""
+    channels = channels_toml(n_outputs, **of_channels) if kind != "frf" else ""
+    path = folder / "test.toml"
+    path.write_text(f'[test]\nkind = "{kind}"\n{head}\n{channels}\n{body}\n', encoding="utf-8")
+    return path
+
+
+HIT = '[[hit]]\ndof = "7:+z"\nfiles = ["hits/*.csv"]\n'
+
+
+def hammer_campaign(folder, *, structure=None, heights=(100.0, 60.0, 150.0), noise=0.0, seed=0, **of_blow):
+    """Write a hammer test with one blow a file, and return the path of `test.toml`."""
+    structure = structure or Structure()
+    rng = np.random.default_rng(seed)
+    step_s = of_blow.setdefault("step_s", 1 / 2048)
+    for number, height in enumerate(heights, start=1):
+        signals = blow(structure, height=height, noise=noise, rng=rng, **of_blow)
+        write_csv(folder / "hits" / f"p7_{number:02d}.csv", signals, step_s)
+    return write_test(folder, HIT, n_outputs=structure.n_outputs)

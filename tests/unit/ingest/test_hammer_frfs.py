@@ -1,0 +1,208 @@
+"""FRFs of hammer tests are the transfer function, at the complex frequency that they claim."""
+
+import numpy as np
+import pytest
+from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
+
+from frf_ipz.dofs import parse_dof
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+
+EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle
+RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode is left after 2 s
+BAND_HZ = (5.0, 400.0)
+
+
+def estimate(path, **options):
+    return estimate_frfs(read_test(path), IngestOptions(**options))
+
+
+def errors(result, structure, columns=slice(None)):
+    """Give the errors in the band over the largest value of each FRF."""
+    frfs = result.frfs
+    band = frfs.in_band(BAND_HZ)
+    truth = structure.accelerance(frfs.s[band])[:, columns]
+    return np.abs(frfs.values[band] - truth) / np.abs(truth).max(axis=0)
+
+
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+def test_frfs_without_noise_are_the_transfer_function(tmp_path, estimator):
+    structure = Structure()
+    result = estimate(hammer_campaign(tmp_path, structure=structure), estimator=estimator)
+    assert result.frfs.window_decay_1_s == 0.0
+    assert errors(result, structure).max() < EXACT
+    assert list(result.frfs.averages) == [3, 3]
+    assert [str(label) for label in result.frfs.labels] == ["1:+z / 7:+z", "2:+z / 7:+z"]
+    assert result.warnings == ()
+
+
+def test_an_exponential_window_is_taken_back_exactly(tmp_path):
+    structure = Structure()
+    result = estimate(hammer_campaign(tmp_path, structure=structure), exponential_window_s=0.25)
+    assert result.frfs.window_decay_1_s == pytest.approx(4.0)
+    assert errors(result, structure).max() < EXACT
+
+
+def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
+    path = hammer_campaign(tmp_path, structure=RINGING)
+    result = estimate(path)
+    truncated = estimate(path, exponential_window_s=0.0)
+    left = np.exp(-0.0006 * 2 * np.pi * 31.0 * (4096 / 2048 - 0.03))
+    assert result.blows.left_at_end.max() == pytest.approx(left, rel=0.05)
+    assert result.blows.marks.str.contains("cut-off decay").all()
+    assert result.blows.used.all()
+    assert errors(truncated, RINGING).max() > 0.5
+    assert errors(result, RINGING).max() < 1e-3  # 0.03 % of the slowest mode remain, spread over a wider peak
+    assert "exponential window" in result.choices[0]
+    assert any("is cut off" in warning for warning in truncated.warnings)
+
+
+def test_lines_that_a_window_correlates_are_thinned_out(tmp_path):
+    result = estimate(hammer_campaign(tmp_path, structure=RINGING))
+    decay = result.frfs.window_decay_1_s * 2.0
+    assert np.diff(result.frfs.frequency_hz) == pytest.approx(round(0.5 * decay / np.tanh(0.5 * decay)) / 2.0)
+
+
+def test_a_recording_that_starts_long_before_the_blow_is_cut_to_it(tmp_path):
+    structure = Structure()
+    path = hammer_campaign(tmp_path, structure=structure, at_s=0.7, n_samples=8192)
+    result = estimate(path)
+    assert errors(result, structure).max() < EXACT
+    assert result.blows.trigger_s.max() < 0.3
+    assert result.blows.samples.max() < 8192
+
+
+def test_the_force_window_takes_out_the_noise_of_the_force(tmp_path):
+    structure, rng = Structure(), np.random.default_rng(3)
+    for number in range(6):
+        signals = blow(structure)
+        signals[0] += 0.05 * rng.standard_normal(4096)
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
+    path = write_test(tmp_path, HIT)
+    with_window, without = estimate(path), estimate(path, force_window_s=0.0)
+    assert "force window" in with_window.choices[0]
+    assert without.choices == ()
+    rms = [np.sqrt(np.mean(errors(result, structure) ** 2)) for result in (with_window, without)]
+    assert rms[0] < 0.3 * rms[1]
+
+
+def test_nothing_is_windowed_where_the_force_is_silent(tmp_path):
+    assert estimate(hammer_campaign(tmp_path)).choices == ()
+
+
+def test_a_force_window_may_be_asked_for(tmp_path):
+    result = estimate(hammer_campaign(tmp_path), force_window_s=0.02)
+    assert "20 ms after it: as asked for" in result.choices[0]
+    assert errors(result, Structure()).max() < EXACT
+
+
+def test_several_blows_in_a_file_are_found_by_their_pulses(tmp_path):
+    structure, step_s = Structure(), 1 / 2048
+    heights = np.zeros(5 * 4096)
+    for start, height in zip((300, 4500, 8600, 12800, 17000), (100, 8.0, 70, 120, 90), strict=True):
+        heights += pulse(len(heights), step_s, height=height, at_s=start * step_s)
+    write_csv(tmp_path / "hits" / "all.csv", blow(structure, force=heights), step_s)
+    result = estimate(write_test(tmp_path, HIT))
+    assert list(result.blows.blow) == [f"hits/all.csv#{number}" for number in range(1, 6)]
+    assert result.blows.peak_force_N.to_numpy() == pytest.approx([100, 8, 70, 120, 90], rel=1e-3)
+    assert list(result.frfs.averages) == [5, 5]
+    assert errors(result, structure).max() < 2e-3  # what is left of the blow before
+
+
+def test_a_short_blow_is_filled_up_with_zeros(tmp_path):
+    path = hammer_campaign(tmp_path, structure=RINGING)
+    short = blow(RINGING, n_samples=2500)
+    write_csv(tmp_path / "hits" / "p7_02.csv", short, 1 / 2048)
+    result = estimate(path, keep=("p7_02.csv",))
+    assert list(result.blows.samples) == [4096, 2500, 4096]
+    assert errors(result, RINGING).max() < 1e-3
+
+
+def test_recordings_whose_lengths_differ_by_a_little_are_used(tmp_path):
+    path = hammer_campaign(tmp_path)
+    write_csv(tmp_path / "hits" / "p7_02.csv", blow(Structure(), n_samples=4090), 1 / 2048)
+    assert errors(estimate(path), Structure()).max() < 1e-5
+
+
+def test_offsets_are_taken_off(tmp_path):
+    structure = Structure()
+    for number in range(3):
+        signals = blow(structure, height=100.0 + 20 * number)
+        signals += np.array([[2.0], [5.0], [-3.0]])
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
+    result = estimate(write_test(tmp_path, HIT), exponential_window_s=0.3)
+    assert errors(result, structure).max() < EXACT
+    assert "DC offset of acc_1: 5 m/s^2, taken off" in result.blows.marks[0]
+    assert "DC offset of force: 2 N" in result.blows.marks[0]
+
+
+def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):
+    structure = Structure()
+    for number in range(2):
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", -blow(structure), 1 / 2048)
+    path = write_test(tmp_path, HIT.replace("7:+z", "7:-z"))
+    frfs = estimate(path).frfs
+    assert frfs.labels[0].input_dof == parse_dof("7:-z")
+    assert frfs.labels[0].sign == -1
+    assert errors(estimate(path), structure).max() < EXACT
+
+
+def test_a_roving_hammer_gives_a_column_for_every_struck_dof(tmp_path):
+    structure, other = Structure(), Structure(shapes=((0.2, 0.4, 0.8), (0.9, -0.3, 0.1)))
+    write_csv(tmp_path / "a" / "1.csv", blow(structure), 1 / 2048)
+    write_csv(tmp_path / "b" / "1.csv", blow(other), 1 / 2048)
+    body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "9:-x"\nfiles = ["b/*.csv"]\n'
+    result = estimate(write_test(tmp_path, body))
+    values, measured = result.frfs.matrix()
+    assert measured.all()
+    band = result.frfs.in_band(BAND_HZ)
+    for place, truth in enumerate((structure, other)):
+        expected = truth.accelerance(result.frfs.s[band])
+        assert np.abs(values[band, :, place] - expected).max() < EXACT * np.abs(expected).max()
+
+
+def test_a_roving_sensor_gives_its_frfs_and_the_reference_one(tmp_path):
+    first, second = Structure(), Structure(shapes=((1.0, 0.7, -0.5), (0.2, 0.9, 0.4)))
+    for folder, structure in (("a", first), ("b", second)):
+        for number in range(2):
+            write_csv(tmp_path / folder / f"{number}.csv", blow(structure, height=80.0 + 9 * number), 1 / 2048)
+    body = (
+        '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n'
+        '[[hit]]\ndof = "7:+z"\nfiles = ["b/*.csv"]\noutput_dofs = { acc_2 = "5:+z" }\n'
+    )
+    frfs = estimate(write_test(tmp_path, body)).frfs
+    assert [str(label) for label in frfs.labels] == ["1:+z / 7:+z", "2:+z / 7:+z", "5:+z / 7:+z"]
+    assert list(frfs.averages) == [4, 2, 2]
+    band = frfs.in_band(BAND_HZ)
+    s = frfs.s[band]
+    truth = np.column_stack([first.accelerance(s), second.accelerance(s)[:, 1]])
+    assert np.abs(frfs.values[band] - truth).max() < EXACT * np.abs(truth).max()
+
+
+def test_units_and_sensitivities_are_brought_to_si(tmp_path):
+    structure = Structure()
+    for number in range(2):
+        signals = blow(structure)
+        signals[0] /= 4.4482216152605  # in pounds-force
+        signals[1:] *= 10.2 / 9.80665  # in mV of a sensor of 10.2 mV/g
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
+    path = write_test(tmp_path, HIT, force_unit="lbf")
+    path.write_text(path.read_text().replace('unit = "m/s^2"', 'sensitivity = "10.2 mV/g_0"'))
+    assert errors(estimate(path), structure).max() < EXACT
+
+
+def test_a_response_may_be_a_velocity(tmp_path):
+    structure, step_s = Structure(), 1 / 2048
+    force = pulse(4096, step_s)
+    omega = 2 * np.pi * np.fft.rfftfreq(8 * 4096, step_s)
+    mobility = structure.accelerance(1j * omega)[:, 0] / np.where(omega > 0, 1j * omega, np.inf)
+    velocity = np.fft.irfft(np.fft.rfft(force, 8 * 4096) * mobility)[:4096] * 1e3
+    write_csv(tmp_path / "hits" / "1.csv", np.vstack([force, velocity]), step_s)
+    path = write_test(tmp_path, HIT, n_outputs=1)
+    path.write_text(path.read_text().replace("acceleration", "velocity").replace("m/s^2", "mm/s"))
+    frfs = estimate(path).frfs
+    assert frfs.labels[0].quantity.value == "mobility"
+    band = frfs.in_band(BAND_HZ)
+    truth = structure.accelerance(frfs.s[band])[:, :1] / frfs.s[band, None]
+    assert np.abs(frfs.values[band] - truth).max() < EXACT * np.abs(truth).max()
