@@ -1,4 +1,4 @@
-"""The errors and the warning of frf_ipz.
+"""The errors of frf_ipz.
 
 ::
 
@@ -86,10 +86,6 @@ class PairingError(NumericalError):
 
 class IllConditionedError(NumericalError):
     """A matrix is too close to singular to be used."""
-
-
-class FrfIpzWarning(UserWarning):
-    """The result stands, and something about it has to be known."""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline import stages
+from frf_ipz.pipeline.desk import Desk
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +40,7 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
     str
         The name of each stage when it is done.
     """
-    desk = stages.Desk(job=job, folder=folder, progress=progress)
+    desk = Desk(job=job, folder=folder, progress=progress)
     recordings = stages.ingest(desk)
     yield "ingest"
     fit = stages.fit(desk, recordings.frfs)

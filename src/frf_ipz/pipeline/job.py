@@ -36,6 +36,8 @@ class Job:
         Points of interest.
     inputs : mapping of str to str
         Digest of every file that the user handed in.
+    model_files : tuple of Path
+        Those that the model was read from.
     """
 
     pipeline: Pipeline
@@ -43,6 +45,13 @@ class Job:
     model: StructuralModel | None
     points: tuple[Dof, ...]
     inputs: Mapping[str, str]
+    model_files: tuple[Path, ...] = ()
+
+    @property
+    def model_key(self) -> list[object]:
+        """What the FE model was made from."""
+        files = [self.inputs[str(file)] for file in self.model_files]
+        return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
 
 
 def read_job(path: Path) -> Job:
@@ -73,15 +82,15 @@ def read_job(path: Path) -> Job:
             "points of interest need an FE model; name it as [pipeline] model",
             where="key 'predict.points'",
         )
-    files = [pipeline.path, pipeline.test_path, *test.files]
-    if pipeline.model_path is not None:
-        files += model_files(pipeline.model_path)
+    of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
+    files = [pipeline.path, pipeline.test_path, *test.files, *of_model]
     return Job(
         pipeline=pipeline,
         test=test,
         model=model,
         points=points,
         inputs={str(file): digest_file(file) for file in dict.fromkeys(files)},
+        model_files=of_model,
     )
 
 

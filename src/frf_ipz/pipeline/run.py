@@ -57,12 +57,9 @@ def run_pipeline(
         raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
     with open_run(out) as folder:
         folder.record.update(_provenance(job))
-        done: list[str] = []
         for stage in chain(job, folder, diagnosing=wanted, progress=progress):
-            done.append(stage)
             if stage == until:
                 break
-        _forget_what_is_stale(folder, done)
     return read_run(out)
 
 
@@ -77,15 +74,3 @@ def _provenance(job: Job) -> dict[str, Any]:
         "configuration": plain(job.pipeline.file),
         "inputs": dict(job.inputs),
     }
-
-
-def _forget_what_is_stale(folder: RunFolder, done: list[str]) -> None:
-    """Say which results of later stages were made from something else than what the folder holds now."""
-    if folder.computed:
-        for name, entry in folder.record["stages"].items():
-            if name not in folder.computed and STAGES.index(done[-1]) < _place(name):
-                entry["stale"] = True
-
-
-def _place(name: str) -> int:
-    return STAGES.index("pair" if name == "reduce" else name) if name in {*STAGES, "reduce"} else -1

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz import __version__
 from frf_ipz.arrays import ComplexArray
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.state_space import save_reduced_model, save_state_space, to_state_space
@@ -20,11 +19,10 @@ from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.pairing.assignment import pair as pair_roots
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.report.page import write_report
-from frf_ipz.runs.digests import digest
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
     from pathlib import Path
 
     import pyarrow as pa
@@ -33,117 +31,10 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.recordings import Recordings
     from frf_ipz.pairing.pairs import Pairs
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.desk import Desk
     from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.progress import Progress
-    from frf_ipz.runs.folder import RunFolder, Writers
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
-
-Result = TypeVar("Result")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Desk:
-    """What every stage needs: the job, the folder, and the keys of the stages before it.
-
-    Parameters
-    ----------
-    job : Job
-        What to work on.
-    folder : RunFolder
-        Where results are kept.
-    progress : Progress
-        Told how far the work is.
-    keys : dict of str to str
-        Key of each stage that is done.
-    """
-
-    job: Job
-    folder: RunFolder
-    progress: Progress
-    keys: dict[str, str] = field(default_factory=dict)
-
-    def stage(
-        self,
-        name: str,
-        depends: Mapping[str, object],
-        compute: Callable[[Progress], Result],
-        files: Callable[[Result], Writers] = lambda _: {},
-    ) -> Result:
-        """Run a stage, or take its result from the folder.
-
-        Parameters
-        ----------
-        name : str
-            The stage.
-        depends : mapping
-            What the result depends on.
-        compute : callable
-            Gives the result; takes a Progress.
-        files : callable
-            Gives what writes each file that users read, by name.
-
-        Returns
-        -------
-        object
-            The result.
-        """
-        key = self.sign(name, depends)
-        return self.folder.stage(name, key, lambda: compute(self.listener(name)), files)
-
-    def sign(self, name: str, depends: Mapping[str, object]) -> str:
-        """Make the key of a stage, and keep it for the stages after it.
-
-        Parameters
-        ----------
-        name : str
-            The stage.
-        depends : mapping
-            What its result depends on.
-
-        Returns
-        -------
-        str
-            The key.
-        """
-        self.keys[name] = digest({"stage": name, "version": __version__, **depends})
-        return self.keys[name]
-
-    def listener(self, name: str) -> Progress:
-        """Give the progress of one stage, with its name before what it says.
-
-        Parameters
-        ----------
-        name : str
-            The stage.
-
-        Returns
-        -------
-        Progress
-            To hand to the stage.
-        """
-
-        def tell(fraction: float, text: str) -> None:
-            self.progress(fraction, f"{name}: {text}" if text else name)
-
-        tell(0.0, "")
-        return tell
-
-    def after(self, *names: str) -> list[str]:
-        """Give the keys of earlier stages.
-
-        Parameters
-        ----------
-        *names : str
-            The stages.
-
-        Returns
-        -------
-        list of str
-            Their keys.
-        """
-        return [self.keys[name] for name in names]
 
 
 def ingest(desk: Desk) -> Recordings:
@@ -222,7 +113,7 @@ def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedMo
     options = job.pipeline.file.reduce
     return desk.stage(
         "reduce",
-        {"options": asdict(options), "model": desk.model_key(), "after": desk.after("fit"), "points": repr(job.points)},
+        {"options": asdict(options), "model": job.model_key, "after": desk.after("fit"), "points": repr(job.points)},
         lambda _: reduce_model(
             model,
             options,

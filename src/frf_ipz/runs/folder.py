@@ -20,7 +20,7 @@ from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.runs.codec import load_result, save_result
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 RECORD = "run.json"
 STAGES = "stages"
@@ -75,6 +75,7 @@ class RunFolder:
             except FileFormatError:
                 pass
             else:
+                self.record["stages"][name].pop("stale", None)
                 return result
         started = time.perf_counter()
         result = compute()
@@ -143,6 +144,18 @@ class RunFolder:
         """
         with self.writing(name) as target:
             target.write_text(text, encoding="utf-8", newline="\n")
+
+    def mark_stale(self, names: Iterable[str]) -> None:
+        """Note that results were made from something that has been computed anew since.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The stages; those that never ran are passed over.
+        """
+        for name in names:
+            if name in self.record.get("stages", {}):
+                self.record["stages"][name]["stale"] = True
 
     def is_stale(self, name: str) -> bool:
         """Tell whether a stage's result was made from something else than what the folder holds now.

@@ -1,0 +1,192 @@
+"""Starting files for a folder of recordings: what can be seen is filled in, what cannot is marked for the user."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.formats.text_layout import name_and_unit, sniff
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+# Quantity, unit where the file states none, and what a column of it is called.
+QUANTITIES = (
+    ("force", "N", re.compile(r"force|hammer|impact|load|(^|_)f\d*$", re.IGNORECASE)),
+    ("velocity", "m/s", re.compile(r"vel|ldv|vibrometer|(^|_)v\d*$", re.IGNORECASE)),
+    ("displacement", "m", re.compile(r"disp|gap|pos|(^|_)[xu]\d*$", re.IGNORECASE)),
+    ("acceleration", "m/s^2", re.compile(r"", re.IGNORECASE)),
+)
+TRAILING_NUMBER = re.compile(r"\d*$")
+NODE = re.compile(r"(\d+)")
+FRF_COLUMNS = ("frequency_hz", "output_dof", "input_dof")
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    name: str
+    unit: str
+    quantity: str
+
+
+def write_starting_files(folder: Path) -> dict[Path, bool]:
+    """Write ``test.toml`` and ``pipeline.toml`` for a folder of CSVs.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds the recordings, in itself or in folders below it.
+
+    Returns
+    -------
+    dict of Path to bool
+        Each file, and whether it was written; what was there is left alone.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no CSV, or their columns differ.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder; give the one that holds the recordings")
+    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".csv" and not _is_hidden(path, folder))
+    if not files:
+        raise InputError(f"{folder}: holds no .csv; put the recordings there, one file a blow, then run init again")
+    header = _header(files[0])
+    is_frf = set(FRF_COLUMNS) <= set(header)
+    test = _frf_test(folder, files) if is_frf else _hammer_test(folder, files, _columns(files, header))
+    pipeline = _pipeline(folder)
+    return {
+        path: _write(path, text) for path, text in ((folder / "test.toml", test), (folder / "pipeline.toml", pipeline))
+    }
+
+
+def _write(path: Path, text: str) -> bool:
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    return True
+
+
+def _is_hidden(path: Path, folder: Path) -> bool:
+    return any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+
+def _header(path: Path) -> tuple[str, ...]:
+    layout = sniff(path)
+    if layout.header:
+        return layout.header[0]
+    return tuple(str(index + 1) for index in range(layout.n_columns))
+
+
+def _columns(files: Sequence[Path], header: tuple[str, ...]) -> list[_Column]:
+    for path in files[1:]:
+        if _header(path) != header:
+            raise InputError(
+                f"{path}: has the columns {', '.join(_header(path))}, and {files[0]} has {', '.join(header)}; "
+                "put files with different columns into folders of their own and run init on each"
+            )
+    below = sniff(files[0]).header[1:2]
+    units = below[0] if below and len(below[0]) == len(header) else ("",) * len(header)
+    columns = []
+    for name, unit in list(zip(header, units, strict=True))[1:]:
+        quantity, default, _ = next(row for row in QUANTITIES if row[2].search(name_and_unit(name)[0]))
+        columns.append(_Column(name, "" if unit or name_and_unit(name)[1] else default, quantity))
+    if not any(column.quantity == "force" for column in columns):
+        columns[0] = _Column(columns[0].name, "N" if columns[0].unit else "", "force")
+    return columns
+
+
+def _hammer_test(folder: Path, files: Sequence[Path], columns: Sequence[_Column]) -> str:
+    force = next(column for column in columns if column.quantity == "force")
+    lines = [
+        "# Written by 'frf-ipz init'. Look at every line that says CHECK.",
+        "[test]",
+        f"name = {_quoted(folder.resolve().name)}",
+        _checked('kind = "hammer"', "hammer | random (shaker, long records)"),
+        "# nominal_damping_ratio = 0.001 # where the model states none",
+    ]
+    for column in (force, *(column for column in columns if column is not force)):
+        lines += _channel(column, is_input=column is force)
+    for name, pattern in _groups(folder, files).items():
+        numbers = NODE.findall(name)
+        node = numbers[-1] if numbers else "1"
+        lines += ["", "[[hit]]", _checked(f'dof = "{int(node)}:+z"', "where these blows hit")]
+        lines.append(f"files = [{_quoted(pattern)}]")
+    return "\n".join(lines) + "\n"
+
+
+def _channel(column: _Column, *, is_input: bool) -> list[str]:
+    lines = ["", "[[channel]]", f"column = {_quoted(column.name)}", f'role = "{"input" if is_input else "output"}"']
+    lines.append(_checked(f'quantity = "{column.quantity}"', "force | acceleration | velocity | displacement"))
+    if column.unit:
+        lines.append(_checked(f'unit = "{column.unit}"', 'or sensitivity = "10.2 mV/g_0"'))
+    if not is_input:
+        lines.append(_checked('dof = "1:+z"', "NODE:SIGN DIRECTION of the sensor, e.g. 18:+z"))
+        lines.append("# mass_kg = 0.004               # the sensor's own mass, where it is known")
+    return lines
+
+
+def _groups(folder: Path, files: Iterable[Path]) -> dict[str, str]:
+    """Files whose names differ in the last number only are blows at one DOF: name of the group and its glob."""
+    groups: dict[str, str] = {}
+    for path in files:
+        relative = path.relative_to(folder)
+        stem = TRAILING_NUMBER.sub("", relative.stem)
+        place = relative.parent / (f"{stem}*{relative.suffix}" if stem else f"*{relative.suffix}")
+        groups[str(relative.parent / stem) if stem else str(relative.parent)] = place.as_posix()
+    return groups
+
+
+def _frf_test(folder: Path, files: Sequence[Path]) -> str:
+    lines = [
+        "# Written by 'frf-ipz init'. Look at every line that says CHECK.",
+        "[test]",
+        f"name = {_quoted(folder.resolve().name)}",
+        'kind = "frf"',
+        "# nominal_damping_ratio = 0.001 # where the model states none",
+    ]
+    for path in files:
+        lines += ["", "[[frf]]", f"file = {_quoted(path.relative_to(folder).as_posix())}"]
+        lines.append(_checked('quantity = "accelerance"', "accelerance | mobility | receptance"))
+    return "\n".join(lines) + "\n"
+
+
+def _pipeline(folder: Path) -> str:
+    model = (
+        'model = "model.toml"'
+        if (folder / "model.toml").is_file()
+        else '# model = "model.toml"          # the FE model'
+    )
+    return f"""# Written by 'frf-ipz init'. Everything that is left out is chosen by the program, and said.
+[pipeline]
+name = {_quoted(folder.resolve().name)}
+test = "test.toml"
+{model}
+
+[fit]
+# band_hz = [10.0, 700.0]       # the band that carries signal where it is left out
+# exclude_hz = [[49.5, 50.5]]   # mains
+
+# [diagnose]                    # say what the model left out
+# apply = true                  # and let it flow on into updating and prediction
+
+[predict]
+points = []                     # points of interest, never measured, e.g. ["49:+z"]
+"""
+
+
+def _checked(key: str, comment: str) -> str:
+    return f"{key:<31} # {comment}   CHECK"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
