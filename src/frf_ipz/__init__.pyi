@@ -18,6 +18,9 @@ from .ingest.options import IngestOptions as IngestOptions
 from .ingest.test_file import read_test as read_test
 from .pairing.assignment import pair as pair
 from .pipeline.run import run_pipeline as run_pipeline
+from .pipeline.summary import summarise as summarise
+from .prediction.agreement import compare_frfs as compare_frfs
+from .prediction.agreement import with_measured_poles as with_measured_poles
 from .prediction.predict import predict_frfs as predict_frfs
 from .quantities import FrfQuantity as FrfQuantity
 from .runs.folder import read_run as read_run

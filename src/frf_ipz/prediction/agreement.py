@@ -1,0 +1,104 @@
+"""How well predicted FRFs agree with measured or true ones, and what merely shifting resonances would reach.
+
+[Grafe1998] H. Grafe, Model updating of large structural dynamics models using measured response functions, PhD thesis,
+Imperial College London, 1998.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import eigh
+
+from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+
+if TYPE_CHECKING:
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.structure import ReducedModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Agreement:
+    """Agreement of FRFs over a band, one number an FRF.
+
+    Parameters
+    ----------
+    shape : (n_frfs,) array
+        Shape correlation X_S [Grafe1998]: 1 if two FRFs differ by a factor only.
+    amplitude : (n_frfs,) array
+        Amplitude correlation X_A [Grafe1998]: 1 if they are the same. Both are dominated by the resonances.
+    median_db, largest_db : (n_frfs,) array
+        Median and largest difference of the magnitudes over the lines, dB.
+    """
+
+    shape: FloatArray
+    amplitude: FloatArray
+    median_db: FloatArray
+    largest_db: FloatArray
+
+
+def compare_frfs(first: ComplexArray, second: ComplexArray) -> Agreement:
+    """Compare FRFs line by line.
+
+    Parameters
+    ----------
+    first, second : (n_lines, n_frfs) complex array
+        In the same unit, on the same lines.
+
+    Returns
+    -------
+    Agreement
+        One number an FRF.
+
+    Raises
+    ------
+    ShapeError
+        If the shapes differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> frf = np.array([[1.0 + 1j], [2.0]])
+    >>> found = compare_frfs(frf, 10 * frf)
+    >>> float(found.shape[0]).__round__(12), float(found.median_db[0]).__round__(12)
+    (1.0, 20.0)
+    """
+    require_shape("the second FRFs", second, first.shape)
+    inner = np.abs(np.sum(first.conj() * second, axis=0))
+    one, two = np.sum(np.abs(first) ** 2, axis=0), np.sum(np.abs(second) ** 2, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0 on a line, or everywhere
+        difference = np.abs(20 * np.log10(np.abs(second) / np.abs(first)))
+        return Agreement(
+            shape=inner**2 / (one * two),
+            amplitude=2 * inner / (one + two),
+            median_db=np.asarray(np.nanmedian(difference, axis=0)),
+            largest_db=np.asarray(np.nanmax(difference, axis=0)),
+        )
+
+
+def with_measured_poles(nominal: ReducedModel, pairs: Pairs) -> ReducedModel:
+    """Give the nominal model the measured poles and leave its mode shapes: what an update has to beat.
+
+    Parameters
+    ----------
+    nominal : ReducedModel
+        Before updating.
+    pairs : Pairs
+        Which pole belongs to which.
+
+    Returns
+    -------
+    ReducedModel
+        With measured frequencies and damping ratios, and the nominal shapes.
+    """
+    squares, shapes = eigh(nominal.stiffness, nominal.mass)
+    frequency = np.sqrt(np.maximum(squares, 0.0))
+    rates = np.einsum("ik,ij,jk->k", shapes, nominal.damping, shapes)
+    for pair in pairs.targets:
+        if pair.kind == "pole":
+            mode = int(np.argmin(np.abs(frequency - abs(pair.computed_value))))
+            squares[mode], rates[mode] = abs(pair.measured_value) ** 2, -2 * pair.measured_value.real
+    back = nominal.mass @ shapes
+    return replace(nominal, damping=(back * rates) @ back.T, stiffness=(back * squares) @ back.T)
