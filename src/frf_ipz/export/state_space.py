@@ -1,10 +1,37 @@
-"""A state-space model with named and dimensioned inputs and outputs."""
+"""The controller-ready model: a state space with named and dimensioned inputs and outputs, and its files.
+
+Sits after updating. Actuators are inputs; sensors and points of interest are outputs.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.io import loadmat, savemat
 
 from frf_ipz.arrays import FloatArray, require_shape
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.export.options import ExportOptions
+from frf_ipz.export.ports import Ports, choose_ports
+from frf_ipz.export.realization import condensed, first_order, in_modes, sampled, with_delays
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    import control
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+SUFFIXES = (".json", ".mat")
+ARRAYS = ("A", "B", "C", "D")
+NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +63,252 @@ class StateSpaceModel:
 
     def __post_init__(self) -> None:
         states, inputs, outputs = len(self.state_names), len(self.input_names), len(self.output_names)
-        require_shape("A", self.A, (states, states))
-        require_shape("B", self.B, (states, inputs))
-        require_shape("C", self.C, (outputs, states))
-        require_shape("D", self.D, (outputs, inputs))
+        for name, shape in _shapes(states, inputs, outputs).items():
+            require_shape(name, getattr(self, name), shape)
+
+
+def to_state_space(
+    updated: UpdatedModel,
+    labels: Sequence[FrfLabel],
+    points: Sequence[Dof],
+    options: ExportOptions | None = None,
+    *,
+    delays_s: Mapping[str, float] | None = None,
+) -> StateSpaceModel:
+    """Turn an updated model into a state space.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The updated model.
+    labels : sequence of FrfLabel
+        What was measured: its blows are the inputs, its sensors the first outputs.
+    points : sequence of Dof
+        Points of interest: the further outputs, in the quantity of the first FRF unless the options say another.
+    options : ExportOptions, optional
+        What it looks like.
+    delays_s : mapping of str to float, optional
+        Known delay of each late output channel, by its column in the recordings.
+
+    Returns
+    -------
+    StateSpaceModel
+        Continuous, or sampled where the options say so.
+
+    Raises
+    ------
+    InputError
+        If nothing was measured, a channel or a point is not known, or residual flexibility is wanted as feedthrough of
+        a velocity or an acceleration.
+    """
+    chosen = options or ExportOptions()
+    return _realise(updated.model, choose_ports(labels, points, chosen, delays_s or {}), chosen)
+
+
+def to_ensemble(
+    updated: UpdatedModel,
+    labels: Sequence[FrfLabel],
+    points: Sequence[Dof],
+    options: ExportOptions | None = None,
+    *,
+    delays_s: Mapping[str, float] | None = None,
+) -> tuple[StateSpaceModel, ...]:
+    """Turn members of the posterior into state spaces, for robust design.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The updated model.
+    labels : sequence of FrfLabel
+        What was measured.
+    points : sequence of Dof
+        Points of interest.
+    options : ExportOptions, optional
+        What they look like; `ensemble` says how many.
+    delays_s : mapping of str to float, optional
+        Known delay of each late output channel.
+
+    Returns
+    -------
+    tuple of StateSpaceModel
+        Fewer than wanted where the update has drawn fewer, none where its method draws none.
+
+    Raises
+    ------
+    InputError
+        As for `to_state_space`.
+    """
+    chosen = options or ExportOptions()
+    ports = choose_ports(labels, points, chosen, delays_s or {})
+    members = updated.ensemble[: chosen.ensemble]
+    return tuple(
+        _realise(replace(updated.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
+        for mass, damping, stiffness in members
+    )
+
+
+def to_control(model: StateSpaceModel) -> control.StateSpace:
+    """Hand a state space to python-control.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+        The state space.
+
+    Returns
+    -------
+    control.StateSpace
+        With the names of inputs, outputs and states.
+    """
+    import control  # here, since it takes a second and loads pyplot
+
+    return control.ss(
+        *(np.array(getattr(model, name)) for name in ARRAYS),
+        model.dt,
+        inputs=list(model.input_names),
+        outputs=list(model.output_names),
+        states=list(model.state_names),
+    )
+
+
+def save_state_space(model: StateSpaceModel, path: Path) -> None:
+    """Write a state space as JSON or for MATLAB.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+        The state space.
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Raises
+    ------
+    InputError
+        If it ends in something else.
+    OSError
+        If it cannot be written.
+    """
+    values: dict[str, Any] = asdict(model)
+    if _suffix(path) == ".json":
+        plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
+        path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+    else:
+        texts = {name: np.array(values[name], dtype=object) for name in NAMES}
+        savemat(path, {**values, **texts}, appendmat=False)
+
+
+def read_state_space(path: Path) -> StateSpaceModel:
+    """Read what `save_state_space` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Returns
+    -------
+    StateSpaceModel
+        Equal to what was written, to the last bit.
+
+    Raises
+    ------
+    InputError
+        If the file is no such state space.
+    """
+    try:
+        if _suffix(path) == ".json":
+            values = json.loads(path.read_text(encoding="utf-8"))
+        else:
+            values = loadmat(path, appendmat=False)
+        names = {name: tuple(str(_text(text)) for text in np.ravel(values[name])) for name in NAMES}
+        sizes = [len(names[name]) for name in ("state_names", "input_names", "output_names")]
+        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in _shapes(*sizes).items()}
+        dt = float(np.squeeze(values["dt"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
+        ) from error
+    fields: dict[str, Any] = {**arrays, **names, "dt": dt}
+    return StateSpaceModel(**fields)
+
+
+def load_state_space(path: Path) -> control.StateSpace:
+    """Read a state space for python-control.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Returns
+    -------
+    control.StateSpace
+        With the names of inputs, outputs and states.
+
+    Raises
+    ------
+    InputError
+        If the file is no such state space.
+    """
+    return to_control(read_state_space(path))
+
+
+def save_reduced_model(model: ReducedModel, path: Path) -> None:
+    """Write the matrices of a reduced model.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    path : Path
+        An ``.npz`` file: ``M``, ``B``, ``K`` and ``dofs`` (labels of the rows).
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    names = np.array([dof.name for dof in model.dofs])
+    with path.open("wb") as stream:
+        np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
+
+
+def _shapes(states: int, inputs: int, outputs: int) -> dict[str, tuple[int, int]]:
+    return {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
+
+
+def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
+    outputs = ports.outputs
+    rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
+    system = in_modes(model, *rows)
+    if options.residual == "feedthrough":
+        system = condensed(system, model.n_modes)
+    matrices = first_order(system, [output.quantity.power for output in outputs])
+    names = [
+        f"mode {mode + 1} {what}" for mode in range(len(system.stiffness)) for what in ("displacement", "velocity")
+    ]
+    late = [output for output in outputs if output.delay_s > 0 and options.pade_order]
+    names += [f"delay of {output.dof} {order + 1}" for output in late for order in range(options.pade_order)]
+    matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
+    if options.sample_time_s > 0:
+        matrices = sampled(matrices, options.sample_time_s)
+    return StateSpaceModel(
+        **matrices._asdict(),
+        dt=options.sample_time_s,
+        input_names=tuple(str(dof) for dof in ports.inputs),
+        output_names=tuple(str(output.dof) for output in outputs),
+        state_names=tuple(names),
+        input_units=ports.input_units,
+        output_units=tuple(output.unit for output in outputs),
+    )
+
+
+def _suffix(path: Path) -> str:
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"{path}: a state space is written as .json or .mat; give one of these endings")
+    return path.suffix
+
+
+def _text(text: object) -> object:
+    """Take a text out of the cell that MATLAB files keep it in."""
+    return text.item() if isinstance(text, np.ndarray) and text.size else ("" if isinstance(text, np.ndarray) else text)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.dofs import Dof
+    from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 BAND = (0.05, 0.95)
@@ -71,8 +72,8 @@ def predict_frfs(
     return Prediction(
         frequency_hz=np.asarray(frequency_hz, float),
         labels=wanted,
-        values=model_frfs(updated.model, wanted, s),
-        nominal=model_frfs(updated.nominal, wanted, s),
+        values=_evaluated(updated.model, wanted, s),
+        nominal=_evaluated(updated.nominal, wanted, s),
         magnitude_low=low,
         magnitude_high=high,
         zeros=zeros,
@@ -81,8 +82,13 @@ def predict_frfs(
     )
 
 
+def _evaluated(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+    """FRFs of a model, (n_lines, n_frfs); there may be no point of interest."""
+    return model_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
+
+
 def _bands(
-    updated: UpdatedModel, members: Members, labels: Sequence[FrfLabel], s: np.ndarray
+    updated: UpdatedModel, members: Members, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
