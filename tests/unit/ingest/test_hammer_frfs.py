@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
 
 from frf_ipz.dofs import parse_dof
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.test_file import read_test
+from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
 
 EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle
 RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode is left after 2 s

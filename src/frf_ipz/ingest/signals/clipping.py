@@ -68,13 +68,15 @@ def digital_step(signal: FloatArray) -> float:
     return step if float(np.abs(multiples - np.round(multiples)).max()) < 0.05 else 0.0
 
 
-def share_a_rail(peaks: FloatArray) -> np.ndarray:
-    """Tell which of several peaks are equal to the last digit: they met the end of one range.
+def share_a_rail(peaks: FloatArray, widths: FloatArray) -> np.ndarray:
+    """Tell which of several pulses have equal peaks to the last digit: they met the end of one range.
 
     Parameters
     ----------
     peaks : (n,) array
         Extreme values of different blows, with signs.
+    widths : (n,) array
+        Their lengths. Pulses that are alike in both are copies of one blow, which says nothing about a range.
 
     Returns
     -------
@@ -85,7 +87,8 @@ def share_a_rail(peaks: FloatArray) -> np.ndarray:
         return np.zeros(peaks.size, bool)
     top = peaks[np.argmax(np.abs(peaks))]
     same = np.abs(peaks - top) <= EQUAL * abs(top)
-    return np.asarray(same & (same.sum() > 1))
+    differ = float(np.ptp(widths[same])) > EQUAL * float(widths[same].max())
+    return np.asarray(same & differ)
 
 
 def _is_cut(upward: FloatArray, step: float, height: float) -> bool:

@@ -165,7 +165,8 @@ def _mark_step(blow: BlowFacts, step_s: float) -> BlowFacts:
 def _mark_rails(blows: Sequence[BlowFacts]) -> list[BlowFacts]:
     """Mark blows whose peaks are equal to the last digit: they met the end of the force's range."""
     fine = [blow for blow in blows if not blow.digital_force]
-    equal = share_a_rail(np.array([blow.peak_force + blow.offsets[0] for blow in fine]))
+    peaks = np.array([blow.peak_force + blow.offsets[0] for blow in fine])
+    equal = share_a_rail(peaks, np.array([blow.pulse_s for blow in fine]))
     cut = {blow.name for blow, is_equal in zip(fine, equal, strict=True) if is_equal}
     return [
         replace(blow, faults=(*blow.faults, "clipping of the force: its peak equals another blow's to the last digit"))
