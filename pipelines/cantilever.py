@@ -15,29 +15,33 @@ HERE = Path(__file__).parent
 TRUTH = HERE.parent / "data" / "reference" / "cantilever_poi_frf.csv"
 
 
-def compare(run):
+def true_frfs(labels: tuple[frf_ipz.FrfLabel, ...], lines_hz: np.ndarray) -> np.ndarray:
+    """FRFs kept aside, in the order of the labels: (n_lines, n_frfs) complex array."""
+    table = pd.read_csv(TRUTH)
+    columns = []
+    for label in labels:
+        rows = table[(table["output_dof"] == str(label.output_dof)) & (table["input_dof"] == str(label.input_dof))]
+        rows = rows.set_index("frequency_hz").reindex(lines_hz)
+        columns.append(rows["real"].to_numpy() + 1j * rows["imag"].to_numpy())
+    return np.stack(columns, axis=1)
+
+
+def compare(run: frf_ipz.RunFolder) -> pd.DataFrame:
     """Agreement with the FRFs kept aside: nominal, with measured poles on nominal shapes, updated."""
     prediction, nominal = run.load("predict"), run.load("update").nominal
-    lines, labels = prediction.frequency_hz, prediction.labels
-    truth = pd.read_csv(TRUTH).set_index(["output_dof", "input_dof", "frequency_hz"])
-    truth = (truth["real"] + 1j * truth["imag"]).unstack(["output_dof", "input_dof"])
-    truth = truth.reindex(lines)[[(str(label.output_dof), str(label.input_dof)) for label in labels]].to_numpy()
+    s = 2j * np.pi * prediction.frequency_hz
     shifted = frf_ipz.with_measured_poles(nominal, run.load("pair"))
     models = {
         "before updating": prediction.nominal,
-        "measured poles, nominal shapes": frf_ipz.model_frfs(shifted, labels, 2j * np.pi * lines),
+        "measured poles, nominal shapes": frf_ipz.model_frfs(shifted, prediction.labels, s),
         "after updating": prediction.values,
     }
-    rows = []
-    for name, values in models.items():
-        found = frf_ipz.compare_frfs(truth, values)
-        for k, label in enumerate(labels):
-            row = {"model": name, "FRF": str(label), "X_S": found.shape[k], "X_A": found.amplitude[k]}
-            rows.append({**row, "median dB": found.median_db[k], "largest dB": found.largest_db[k]})
-    return pd.DataFrame(rows)
+    truth = true_frfs(prediction.labels, prediction.frequency_hz)
+    tables = [frf_ipz.compare_frfs(truth, values).to_frame(prediction.labels) for values in models.values()]
+    return pd.concat(dict(zip(models, tables, strict=True)), names=["model"]).reset_index(level=0)
 
 
-def main(out):
+def main(out: Path) -> None:
     """Run the chain and say how well the point of interest was predicted."""
     run = frf_ipz.run_pipeline(HERE / "cantilever.toml", out)
     print(frf_ipz.summarise(run))

@@ -10,6 +10,7 @@ from .fe.model_file import read_model as read_model
 from .fe.options import ReduceOptions as ReduceOptions
 from .fe.reduction import reduce_model as reduce_model
 from .fe.response import model_frfs as model_frfs
+from .frf import FrfLabel as FrfLabel
 from .frf import FrfSet as FrfSet
 from .identification.fit import fit_modes as fit_modes
 from .identification.options import FitOptions as FitOptions
@@ -23,6 +24,7 @@ from .prediction.agreement import compare_frfs as compare_frfs
 from .prediction.agreement import with_measured_poles as with_measured_poles
 from .prediction.predict import predict_frfs as predict_frfs
 from .quantities import FrfQuantity as FrfQuantity
+from .runs.folder import RunFolder as RunFolder
 from .runs.folder import read_run as read_run
 from .updating.options import UpdateOptions as UpdateOptions
 from .updating.update import update_model as update_model

@@ -10,11 +10,15 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import eigh
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.structure import ReducedModel
 
@@ -37,6 +41,22 @@ class Agreement:
     amplitude: FloatArray
     median_db: FloatArray
     largest_db: FloatArray
+
+    def to_frame(self, labels: Sequence[FrfLabel]) -> pd.DataFrame:
+        """Give a table.
+
+        Parameters
+        ----------
+        labels : sequence of FrfLabel
+            What each FRF connects.
+
+        Returns
+        -------
+        DataFrame
+            One row an FRF: ``FRF, X_S, X_A, median dB, largest dB``.
+        """
+        columns = {"X_S": self.shape, "X_A": self.amplitude, "median dB": self.median_db, "largest dB": self.largest_db}
+        return pd.DataFrame({"FRF": [str(label) for label in labels], **columns})
 
 
 def compare_frfs(first: ComplexArray, second: ComplexArray) -> Agreement:
