@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from frf_ipz.errors import InputError
 from frf_ipz.toml_files import STRICT
 
 
@@ -46,6 +47,11 @@ class FitOptions:
         Highest model order of the start; chosen from band and lines where it is left out.
     delay : bool
         Fit a pure delay for each output channel too.
+
+    Raises
+    ------
+    InputError
+        If a band ends below its start.
     """
 
     __pydantic_config__ = STRICT
@@ -57,3 +63,9 @@ class FitOptions:
     modes: Literal["complex", "real"] = "complex"
     max_order: int | None = None
     delay: bool = False
+
+    def __post_init__(self) -> None:
+        bands = [] if self.band_hz is None else [("band_hz", self.band_hz)]
+        for key, (low, high) in (*bands, *(("exclude_hz", pair) for pair in self.exclude_hz)):
+            if not 0 <= low < high:
+                raise InputError(f"{key} = [{low:g}, {high:g}] is no band; give the lower frequency first")
