@@ -129,7 +129,7 @@ def force_of(drive: Drive, set_up: SetUp, grid: LaplaceGrid) -> FloatArray:
     return drive.rms_n * random_force(rng, time, band, taper_s=0.01 * time[-1], burst=set_up.burst)
 
 
-def swing(world: World, drives: tuple[Drive, ...], motion: Pair) -> tuple[float, float]:
+def swing(world: World, drives: tuple[Drive, ...], motion: Pair, *, drifting: bool = True) -> tuple[float, float]:
     """Largest motion and velocity of a place over all blows of a linear world.
 
     Parameters
@@ -140,6 +140,8 @@ def swing(world: World, drives: tuple[Drive, ...], motion: Pair) -> tuple[float,
         Blows or records.
     motion : Pair
         The place.
+    drifting : bool
+        With the motion of a free structure as a whole, in its cords.
 
     Returns
     -------
@@ -149,6 +151,8 @@ def swing(world: World, drives: tuple[Drive, ...], motion: Pair) -> tuple[float,
     grid = replace(make_grid(world), oversampling=4)
     row = world.structure.row(motion[0]) - (0 if motion[1] is None else world.structure.row(motion[1]))
     there = row @ world.modes.shapes[:, : world.receptance.omega_rad_s.size]
+    if not drifting:
+        there[: world.structure.n_rigid] = 0.0
     at_blows = world.receptance.shapes[world.struck_rows]
     omega, ratio = world.receptance.omega_rad_s, world.receptance.damping_ratio
     s = grid.s

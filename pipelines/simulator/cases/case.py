@@ -177,6 +177,7 @@ def _prepare(rng: np.random.Generator, kind: str, wanted: tuple[str, ...]) -> _R
         nodes=tuple(moving_nodes(drawn, modes, set_up.band_hz, MARGIN)),
         mass_kg=specimen.mass_kg,
         swing=lambda motion: swing(ideal, drives, motion),
+        vibration=lambda motion: swing(ideal, drives, motion, drifting=False)[0],
     )
     return _Ready(
         specimen=specimen,

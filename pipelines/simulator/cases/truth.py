@@ -19,7 +19,7 @@ from simulator.structures.nominal import NominalModel
 
 FloatArray = NDArray[np.float64]
 
-GENERATOR = "frf_ipz simulator 1"
+GENERATOR = "frf_ipz simulator 2"
 
 
 def visibility(lines: Lines, ideal: World, world: World) -> dict[str, Any]:

@@ -97,13 +97,14 @@ def draw_effects(rng: np.random.Generator, names: tuple[str, ...], bench: Bench)
     Returns
     -------
     tuple of Effect, or None
-        None where the specimen cannot have one of them, or where two would sit on the same channel.
+        None where the specimen cannot have one of them, where two would sit on the same channel, or where a nonlinear
+        law would feel little but the drift of a free structure.
     """
     effects: list[Effect] = []
     for name in names:
         outside_kind = name.removeprefix("unknown:")
         effect = (OUTSIDE[outside_kind] if name.startswith("unknown:") else CONTRACT[name])(rng, bench)
-        if effect is None:
+        if effect is None or (effect.law_motion is not None and not bench.is_vibration(effect.law_motion)):
             return None
         effects.append(effect)
     channels = [channel for effect in effects for channel in {*effect.gains, *effect.moved}]

@@ -21,6 +21,8 @@ ComplexArray = NDArray[np.complex128]
 Gain = Callable[[ComplexArray], ComplexArray]
 Pair = tuple[Point, Point | None]  # a motion: of one point, or of the first minus the second
 
+LEAST_VIBRATION = 0.5  # of the motion at a nonlinear law: nobody puts a stop a hand's breadth from a hanging plate
+
 
 def unchanged(reality: Reality) -> Reality:
     """Leave a structure as it is."""
@@ -107,6 +109,8 @@ class Bench:
         Of all that moves.
     swing : callable
         Largest motion and velocity at a motion `Pair` over all blows, m and m/s: scales of nonlinear effects.
+    vibration : callable
+        Largest motion at a `Pair` without that of a free structure as a whole, m.
     """
 
     specimen: Specimen
@@ -116,6 +120,7 @@ class Bench:
     nodes: tuple[int, ...]
     mass_kg: float
     swing: Callable[[Pair], tuple[float, float]]
+    vibration: Callable[[Pair], float]
 
     @property
     def in_band(self) -> NDArray[np.bool_]:
@@ -136,6 +141,10 @@ class Bench:
         """(n_modes,) mass-normalised shapes at a motion."""
         row = self.structure.row(motion[0]) - (0 if motion[1] is None else self.structure.row(motion[1]))
         return row @ self.modes.shapes
+
+    def is_vibration(self, motion: Pair) -> bool:
+        """Whether a motion is mostly vibration, and not the drift of a free structure in its cords."""
+        return not self.structure.n_rigid or self.vibration(motion) > LEAST_VIBRATION * self.swing(motion)[0]
 
     def stiffness(self, motion: Pair) -> float:
         """Stiffness against a motion by the modes of the band, N/m: a scale for springs."""

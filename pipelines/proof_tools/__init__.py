@@ -1,0 +1,1 @@
+"""The blind proof of the diagnosis: cases are made, sealed, diagnosed, opened and scored."""
