@@ -7,11 +7,12 @@ Poles and zeros are kept once per conjugate pair, with the imaginary part that i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, require_shape
+from frf_ipz.frf import FrfSet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -191,8 +192,33 @@ def poles_from(natural_frequency: FloatArray, damping: FloatArray) -> ComplexArr
     Examples
     --------
     >>> p = poles_from(np.array([10.0]), np.array([0.01]))
-    >>> float(natural_frequency_hz(p)[0]), float(damping_ratio(p)[0])
+    >>> round(float(natural_frequency_hz(p)[0]), 9), round(float(damping_ratio(p)[0]), 9)
     (10.0, 0.01)
     """
     omega = 2 * np.pi * natural_frequency
     return omega * (-damping + 1j * np.sqrt(1 - damping**2))
+
+
+def without_window(frfs: FrfSet, model: PoleResidueModel) -> FrfSet:
+    """Carry FRFs that were measured under an exponential window over to the imaginary axis.
+
+    The windowed values are exact at s = sigma + i omega. What the fitted model changes between there and i omega is
+    added to them: noise and whatever the model left out stay as they were measured.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Measured, with a window or without.
+    model : PoleResidueModel
+        Fitted to them.
+
+    Returns
+    -------
+    FrfSet
+        Without a window.
+    """
+    if not frfs.window_decay_1_s:
+        return frfs
+    s = np.where(frfs.frequency_hz > 0, 2j * np.pi * frfs.frequency_hz, 2j * np.pi * frfs.frequency_hz[1])
+    carried = np.where(frfs.frequency_hz[:, None] > 0, model(s) - model(frfs.s), 0.0)
+    return replace(frfs, values=frfs.values + carried, window_decay_1_s=0.0)
