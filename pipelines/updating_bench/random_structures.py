@@ -5,14 +5,20 @@ a true factor on the stiffness of each of them (up to 20 % off: all alike, in so
 it is struck and measured, and points that nobody measures.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.structure import Geometry, Part, StructuralModel
 
+Element: TypeAlias = tuple[tuple[int, ...], FloatArray, FloatArray]  # nodes, stiffness, mass
 ERROR = 0.2  # largest relative error of stiffness
 
 
@@ -27,10 +33,10 @@ class Case:
     sensors: tuple[Dof, ...]
     points: tuple[Dof, ...]
     n_modes: int
-    damping: np.ndarray
+    damping: FloatArray
 
 
-def random_case(seed):
+def random_case(seed: int) -> Case:
     """One structure out of the family that a seed stands for."""
     rng = np.random.default_rng(seed)
     kind = ("beam", "frame", "plate")[rng.integers(3)]
@@ -56,13 +62,13 @@ def random_case(seed):
     )
 
 
-def scaled(model, factors):
-    """The model with the stiffness of every part multiplied by its factor."""
+def scaled(model: StructuralModel, factors: FloatArray) -> StructuralModel:
+    """Give the model with the stiffness of every part multiplied by its factor."""
     parts = tuple(replace(part, stiffness=f * part.stiffness) for part, f in zip(model.parts, factors, strict=True))
     return replace(model, parts=parts, stiffness_all=assembled(parts, len(model.all_dofs), "stiffness"))
 
 
-def stiffness_errors(model, rng):
+def stiffness_errors(model: StructuralModel, rng: np.random.Generator) -> tuple[FloatArray, str]:
     """Factors on the stiffness of all elements, and in words what they are."""
     where = {int(node): place for place, node in enumerate(model.geometry.nodes)}
     rows = [[where[node] for node in part.nodes] for part in model.parts]
@@ -80,7 +86,7 @@ def stiffness_errors(model, rng):
     return factors, what
 
 
-def transverse(model, dof):
+def transverse(model: StructuralModel, dof: Dof) -> str:
     """Direction in which a node of a frame, beam or plate bends."""
     if model.name != "frame":
         return "z"
@@ -89,8 +95,8 @@ def transverse(model, dof):
     return "x" if x[place] in {x.min(), x.max()} else "z"
 
 
-def random_beam(rng):
-    """A straight beam on random supports."""
+def random_beam(rng: np.random.Generator) -> StructuralModel:
+    """Build a straight beam on random supports."""
     count = int(rng.integers(20, 41))
     length = rng.uniform(0.3, 1.5)
     thickness = length * rng.uniform(0.008, 0.02)
@@ -108,8 +114,8 @@ def random_beam(rng):
     return assemble("beam", nodes, coordinates, ("z", "ry"), fixed, elements)
 
 
-def random_frame(rng):
-    """A plane portal frame of one or two storeys, clamped to the ground."""
+def random_frame(rng: np.random.Generator) -> StructuralModel:
+    """Build a plane portal frame of one or two storeys, clamped to the ground."""
     height, width, storeys, count = rng.uniform(0.4, 1), rng.uniform(0.4, 1.2), int(rng.integers(1, 3)), 8
     breadth, thickness = 0.03, rng.uniform(0.006, 0.012)
     beam = thickness * rng.uniform(0.8, 1.6)
@@ -123,15 +129,15 @@ def random_frame(rng):
         path = np.linspace(start, end, count + 1)
         ids = [numbers.setdefault((round(x, 9), round(z, 9)), len(numbers) + 1) for x, z in path]
         matrices = framed(210e9, 7850.0, breadth, section, path[1] - path[0])
-        elements += [((a, b), *matrices) for a, b in zip(ids[:-1], ids[1:], strict=True)]
+        elements += [((a, b), *matrices) for a, b in pairwise(ids)]
     coordinates = np.array([(x, 0.0, z) for x, z in numbers])
     nodes = np.arange(1, len(numbers) + 1)
     fixed = {(int(n), d) for n in nodes[coordinates[:, 2] == 0] for d in ("x", "z", "ry")}
     return assemble("frame", nodes, coordinates, ("x", "z", "ry"), fixed, elements)
 
 
-def random_plate(rng):
-    """A rectangular plate of thin elements, cantilevered, on simple supports, clamped on three sides, or free."""
+def random_plate(rng: np.random.Generator) -> StructuralModel:
+    """Build a rectangular plate of thin elements, cantilevered, on simple supports, clamped on three sides, or free."""
     nx, ny = int(rng.integers(7, 11)), int(rng.integers(5, 9))
     length = rng.uniform(0.3, 0.8)
     width, thickness = length * rng.uniform(0.5, 0.9), rng.uniform(0.002, 0.005)
@@ -160,8 +166,15 @@ def random_plate(rng):
     return assemble("plate", number.ravel(), coordinates, ("z", "rx", "ry"), fixed, elements)
 
 
-def assemble(name, nodes, coordinates, directions, fixed, elements):
-    """A model out of elements: nodes, stiffness, mass; the DOFs of a node are in the order of the directions."""
+def assemble(
+    name: str,
+    nodes: IntArray,
+    coordinates: FloatArray,
+    directions: tuple[str, ...],
+    fixed: set[tuple[int, str]],
+    elements: list[Element],
+) -> StructuralModel:
+    """Build a model out of elements: nodes, stiffness, mass; the DOFs of a node are in the order of the directions."""
     dofs = tuple(Dof(int(node), direction) for node in nodes for direction in directions)
     first = {int(node): len(directions) * place for place, node in enumerate(nodes)}
     parts = tuple(
@@ -189,15 +202,15 @@ def assemble(name, nodes, coordinates, directions, fixed, elements):
     )
 
 
-def assembled(parts, n_all, what):
-    """Sum of the parts' matrices."""
+def assembled(parts: tuple[Part, ...], n_all: int, what: str) -> sparse.csr_array:
+    """Give the sum of the parts' matrices."""
     total = np.zeros((n_all, n_all))
     for part in parts:
         total[np.ix_(part.indices, part.indices)] += getattr(part, what)
     return sparse.csr_array(total)
 
 
-def bending(stiffness, line_density, length):
+def bending(stiffness: float, line_density: float, length: float) -> tuple[FloatArray, FloatArray]:
     """Euler-Bernoulli element, (4, 4) stiffness and mass; DOFs w and ry = -dw/dx of both nodes."""
     L = length
     k = np.array([[12, -6 * L, -12, -6 * L], [0, 4 * L**2, 6 * L, 2 * L**2], [0, 0, 12, 6 * L], [0, 0, 0, 4 * L**2]])
@@ -207,7 +220,9 @@ def bending(stiffness, line_density, length):
     return stiffness / L**3 * symmetric(k), line_density * L / 420 * symmetric(m)
 
 
-def framed(modulus, density, breadth, thickness, step):
+def framed(
+    modulus: float, density: float, breadth: float, thickness: float, step: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Plane frame element in the x-z plane, (6, 6); DOFs x, z, ry of both nodes."""
     length = float(np.hypot(*step))
     c, s = step / length
@@ -221,12 +236,12 @@ def framed(modulus, density, breadth, thickness, step):
     return turn.T @ k @ turn, turn.T @ m @ turn
 
 
-def bent_plate(stiffness, area_density, a, b):
+def bent_plate(stiffness: float, area_density: float, a: float, b: float) -> tuple[FloatArray, FloatArray]:
     """Thin rectangular plate element of twelve terms, (12, 12); DOFs z, rx, ry of four nodes, by integration."""
     powers = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (3, 1), (1, 3)]
 
-    def row(x, y, dx=0, dy=0):
-        def term(u, p, d):
+    def row(x: float, y: float, dx: int = 0, dy: int = 0) -> FloatArray:
+        def term(u: float, p: int, d: int) -> float:
             return np.prod(np.arange(p, p - d, -1)) * u ** max(p - d, 0) if p >= d else 0.0
 
         return np.array([term(x, p, dx) * term(y, q, dy) for p, q in powers])
@@ -247,6 +262,6 @@ def bent_plate(stiffness, area_density, a, b):
     return symmetric(np.triu(k)), symmetric(np.triu(m))
 
 
-def symmetric(upper):
-    """The symmetric matrix with this upper triangle."""
+def symmetric(upper: FloatArray) -> FloatArray:
+    """Give the symmetric matrix with this upper triangle."""
     return np.triu(upper) + np.triu(upper, 1).T

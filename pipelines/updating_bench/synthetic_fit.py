@@ -4,16 +4,28 @@ The covariance is the smallest that unbiased estimates from noisy lines can have
 reported is the truth plus one draw from it.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
 
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet, poles_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.structure import StructuralModel
+    from updating_bench.random_structures import Case
 
 N_LINES = 800
 SEEN = 0.5  # real part over modulus above which a zero has no antiresonance
@@ -25,7 +37,7 @@ FAR = 60  # modes of the true structure that are used; those beyond hardly reach
 class Truth:
     """Modes of a structure at all its free DOFs."""
 
-    def __init__(self, model, damping):
+    def __init__(self, model: StructuralModel, damping: FloatArray) -> None:
         values, shapes = eigh(model.stiffness.toarray(), model.mass.toarray())
         values[np.abs(values) < 1e-9 * values[-1] / len(values)] = 0
         self.omega = np.sqrt(np.maximum(values, 0))[:FAR]
@@ -33,31 +45,42 @@ class Truth:
         self.shapes = shapes[:, : len(self.omega)]
         self.model = model
 
-    def row(self, dof):
+    def row(self, dof: Dof) -> FloatArray:
+        """Motion of a DOF in every mode, (n,), 1/sqrt(kg)."""
         return dof.sign * self.shapes[self.model.index(dof)]
 
-    def receptance(self, s, label):
+    def receptance(self, s: ComplexArray, label: FrfLabel) -> ComplexArray:
+        """Give the receptance, whatever the label's quantity, (n_lines,), m/N."""
         products = self.row(label.output_dof) * self.row(label.input_dof)
         return (products / (s[:, None] ** 2 + 2 * self.damping * self.omega * s[:, None] + self.omega**2)).sum(1)
 
-    def zeros(self, label):
+    def zeros(self, label: FrfLabel) -> ComplexArray:
+        """Give the zeros of an FRF by ascending modulus, imaginary part > 0, rad/s."""
         dynamic = np.eye(len(self.omega)), np.diag(2 * self.damping * self.omega), np.diag(self.omega**2)
         values = damped_zeros(*dynamic, self.row(label.output_dof), self.row(label.input_dof)).values
         values = values[values.imag > 1e-3 * np.abs(values)]
         return values[np.argsort(np.abs(values))]
 
-    def flexible(self):
+    def flexible(self) -> BoolArray:
+        """Tell which modes are no rigid-body motion."""
         return self.omega > 1e-3 * self.omega[self.omega > 0].max() / len(self.omega)
 
 
-def band_of(truth, n_modes):
-    """From half the first flexible mode to half way between the last one wanted and the next, Hz."""
+def band_of(truth: Truth, n_modes: int) -> tuple[float, float]:
+    """Choose a band: from half the first flexible mode to half way between the last one wanted and the next, Hz."""
     omega = truth.omega[truth.flexible()]
     return omega[0] / 4 / np.pi, (omega[n_modes - 1] + omega[n_modes]) / 4 / np.pi
 
 
-def synthetic_fit(truth, labels, band_hz, *, noise=0.002, rng=None):
-    """The fit of all FRFs; `noise` is the standard deviation of a line over the root mean square of its FRF."""
+def synthetic_fit(
+    truth: Truth,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    *,
+    noise: float = 0.002,
+    rng: np.random.Generator | None = None,
+) -> ModalFit:
+    """Give the fit of all FRFs; `noise` is the standard deviation of a line over the root mean square of its FRF."""
     inside = truth.flexible() & (truth.omega > 2 * np.pi * band_hz[0]) & (truth.omega < 2 * np.pi * band_hz[1])
     while True:
         fit = fit_of_modes(truth, labels, band_hz, noise, rng, inside)
@@ -67,8 +90,15 @@ def synthetic_fit(truth, labels, band_hz, *, noise=0.002, rng=None):
         inside[np.flatnonzero(inside)[np.argmax(spread)]] = False  # nobody would find this mode in these data
 
 
-def fit_of_modes(truth, labels, band_hz, noise, rng, inside):
-    """The fit with some of the modes only."""
+def fit_of_modes(
+    truth: Truth,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    noise: float,
+    rng: np.random.Generator | None,
+    inside: BoolArray,
+) -> ModalFit:
+    """Give the fit with some of the modes only."""
     s = 2j * np.pi * np.linspace(*band_hz, N_LINES)
     poles = poles_from(truth.omega[inside] / 2 / np.pi, truth.damping[inside])
     powers = (-2, 0, 2)
@@ -112,8 +142,15 @@ def fit_of_modes(truth, labels, band_hz, noise, rng, inside):
     return as_fit(model, labels, band_hz, zeros, where, kinds, root @ root.T, residue_covariance)
 
 
-def fit_of_targets(poles, zeros, label, band_hz, *, relative_std=0.0):
-    """A fit that holds given poles and zeros of one FRF and nothing else: residues are 0."""
+def fit_of_targets(
+    poles: ComplexArray,
+    zeros: ComplexArray,
+    label: FrfLabel,
+    band_hz: tuple[float, float],
+    *,
+    relative_std: float = 0.0,
+) -> ModalFit:
+    """Give a fit that holds given poles and zeros of one FRF and nothing else: residues are 0."""
     values = np.concatenate([poles, zeros])
     model = PoleResidueModel(
         poles=np.asarray(poles),
@@ -130,8 +167,8 @@ def fit_of_targets(poles, zeros, label, band_hz, *, relative_std=0.0):
     return as_fit(model, (label,), band_hz, np.asarray(zeros), where, kinds, covariance, nothing)
 
 
-def in_order(fit, computed_poles, computed_zeros):
-    """Pairs of a fit of one FRF, the k-th with the k-th."""
+def in_order(fit: ModalFit, computed_poles: ComplexArray, computed_zeros: ComplexArray) -> Pairs:
+    """Pair a fit of one FRF, the k-th with the k-th."""
     rows = []
     for kind, frf, measured, computed in (
         ("pole", -1, fit.model.poles, computed_poles),
@@ -154,8 +191,8 @@ def in_order(fit, computed_poles, computed_zeros):
     return Pairs(rows=tuple(rows))
 
 
-def zeros_in_band(values, band_hz):
-    """Those that a fitter would list, once a conjugate pair or quadruple, and their kinds."""
+def zeros_in_band(values: ComplexArray, band_hz: tuple[float, float]) -> tuple[list[complex], list[str]]:
+    """Keep those that a fitter would list, once a conjugate pair or quadruple, and their kinds."""
     found, kinds = [], []
     for z in values:
         mirrored = np.abs(values + z.conj()).min() < 0.5 * abs(z.real)
@@ -165,8 +202,17 @@ def zeros_in_band(values, band_hz):
     return found, kinds
 
 
-def as_fit(model, labels, band_hz, zeros, where, kinds, covariance, residue_covariance):
-    """A ModalFit that carries what pairing and updating read."""
+def as_fit(
+    model: PoleResidueModel,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    zeros: ComplexArray,
+    where: IntArray,
+    kinds: Sequence[str],
+    covariance: FloatArray,
+    residue_covariance: FloatArray,
+) -> ModalFit:
+    """Build a ModalFit that carries what pairing and updating read."""
     n_modes = len(model.poles)
     sharp = np.sqrt(np.diagonal(covariance)[2 * n_modes + 1 :: 2]) < ROUGH * np.abs(zeros)
     return ModalFit(
@@ -193,8 +239,10 @@ def as_fit(model, labels, band_hz, zeros, where, kinds, covariance, residue_cova
     )
 
 
-def joint_root(model, s, zeros, where, noise):
-    """A root of the covariance of poles and zeros, and the covariance of residues, by linearised least squares."""
+def joint_root(
+    model: PoleResidueModel, s: ComplexArray, zeros: ComplexArray, where: IntArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Give a root of the covariance of poles and zeros, and the covariance of residues, by linearised least squares."""
     n, n_frfs = len(model.poles), model.residues.shape[1]
     rows, size = [], 2 * n + n_frfs * (2 * n + len(model.powers))
     for frf in range(n_frfs):
@@ -229,20 +277,20 @@ def joint_root(model, s, zeros, where, noise):
     return take @ root, residue_covariance
 
 
-def pole_slopes(model, s, frf):
-    """Derivatives of one FRF by real and imaginary part of every pole in turn."""
+def pole_slopes(model: PoleResidueModel, s: ComplexArray, frf: int) -> ComplexArray:
+    """Differentiate one FRF by real and imaginary part of every pole in turn."""
     direct = model.residues[:, frf] / (s[:, None] - model.poles) ** 2
     mirrored = model.residues[:, frf].conj() / (s[:, None] - model.poles.conj()) ** 2
     return np.stack([direct + mirrored, 1j * (direct - mirrored)], axis=2).reshape(len(s), -1)
 
 
-def linear_slopes(model, s):
-    """Derivatives by real and imaginary part of every residue in turn, then by the residual terms."""
+def linear_slopes(model: PoleResidueModel, s: ComplexArray) -> ComplexArray:
+    """Differentiate by real and imaginary part of every residue in turn, then by the residual terms."""
     direct, mirrored = 1 / (s[:, None] - model.poles), 1 / (s[:, None] - model.poles.conj())
     pairs = np.stack([direct + mirrored, 1j * (direct - mirrored)], axis=2).reshape(len(s), -1)
     return np.hstack([pairs, (s[:, None] / model.scale_rad_s) ** np.array(model.powers)])
 
 
-def labels_of(case):
-    """Every blow with every sensor, as receptances."""
+def labels_of(case: Case) -> tuple[FrfLabel, ...]:
+    """Name every blow with every sensor, as receptances."""
     return tuple(FrfLabel(sensor, blow, FrfQuantity.RECEPTANCE) for blow in case.blows for sensor in case.sensors)
