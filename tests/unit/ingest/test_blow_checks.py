@@ -1,0 +1,272 @@
+"""What is wrong with a blow is said; double hits, clipping, overload and a wrong step are left out, others stay in."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
+
+STEP_S = 1 / 2048
+N_SAMPLES = 4096
+NOISE = 0.02
+
+
+def estimate(path, **options):
+    return estimate_frfs(read_test(path), IngestOptions(**options))
+
+
+def noisy(rng, **of_blow):
+    return blow(Structure(), noise=NOISE, rng=rng, **of_blow)
+
+
+def twice(rng):
+    force = pulse(N_SAMPLES, STEP_S) + pulse(N_SAMPLES, STEP_S, height=30.0, at_s=0.05)
+    return noisy(rng, force=force)
+
+
+def clipped(rng):
+    signals = noisy(rng, height=140.0)
+    signals[0] = np.minimum(signals[0], 90.0)
+    return signals
+
+
+def overloaded(rng):
+    signals = noisy(rng)
+    limit = 0.5 * np.abs(signals[1]).max()
+    signals[1] = np.clip(signals[1], -limit, limit)
+    return signals
+
+
+def cut_off(rng):
+    ringing = Structure(damping_ratio=(0.004, 0.02, 0.012))
+    return blow(ringing, noise=NOISE, rng=rng)
+
+
+def weak(rng):
+    return noisy(rng, height=0.17)
+
+
+def unheard(rng):
+    signals = blow(Structure(), height=30.0)
+    signals[1:] += np.abs(signals[1:]).max() * rng.standard_normal(signals[1:].shape)
+    return signals
+
+
+def restless(rng):
+    signals = noisy(rng)
+    time = np.arange(N_SAMPLES) * STEP_S
+    before = np.exp(-time / 0.2) * np.sin(2 * np.pi * 88.0 * time)
+    signals[1] += 0.1 * np.abs(signals[1]).max() * before
+    return signals
+
+
+def fine(rng):
+    return noisy(rng, height=90.0)
+
+
+def campaign(folder, third, *, step_s=STEP_S, others=2):
+    """Write blows of which the last is something special."""
+    rng = np.random.default_rng(5)
+    for number in range(others):
+        write_csv(folder / "hits" / f"p7_{number + 1}.csv", noisy(rng, height=100.0 + 20 * number), STEP_S)
+    write_csv(folder / "hits" / "p7_bad.csv", third(rng), step_s)
+    return write_test(folder, HIT)
+
+
+@pytest.mark.parametrize(
+    ("third", "mark"),
+    [
+        (twice, "double hit: 30 % of the pulse 20 ms after it"),
+        (clipped, "clipping of force"),
+        (overloaded, "overload of acc_1"),
+    ],
+)
+def test_bad_blows_are_left_out_and_said(tmp_path, third, mark):
+    result = estimate(campaign(tmp_path, third))
+    assert list(result.blows.used) == [True, True, False]
+    assert mark in result.blows.marks[2]
+    assert list(result.blows.marks[:2]) == ["", ""]
+    assert list(result.frfs.averages) == [2, 2]
+    assert list(result.blows.weight[2:]) == [0.0]
+    assert any("hits/p7_bad.csv is left out" in text and mark in text for text in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("third", "mark"),
+    [
+        (cut_off, "cut-off decay"),
+        (weak, "weak blow: its peak is"),
+        (unheard, "weak blow: its response is"),
+        (restless, "not at rest before the blow"),
+    ],
+)
+def test_blows_that_can_be_lived_with_are_marked_and_stay(tmp_path, third, mark):
+    result = estimate(campaign(tmp_path, third))
+    assert mark in result.blows.marks[2]
+    assert list(result.blows.marks[:2]) == ["", ""]
+    assert result.blows.used.all()
+    assert list(result.frfs.averages) == [3, 3]
+
+
+def test_a_weak_blow_hardly_counts(tmp_path):
+    weights = estimate(campaign(tmp_path, weak)).blows.weight
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights[2] < 0.01 * weights[0]
+
+
+def test_a_blow_with_nothing_wrong_has_no_mark(tmp_path):
+    result = estimate(campaign(tmp_path, fine))
+    assert list(result.blows.marks) == ["", "", ""]
+    assert result.warnings == ()
+
+
+def test_weak_means_below_the_noise_and_not_weaker_than_others(tmp_path):
+    result = estimate(campaign(tmp_path, lambda rng: noisy(rng, height=4.0)))
+    assert result.blows.marks[2] == ""
+
+
+def test_a_wrong_time_step_is_left_out_and_said(tmp_path):
+    result = estimate(campaign(tmp_path, fine, step_s=1.3 * STEP_S))
+    assert list(result.blows.used) == [True, True, False]
+    assert "wrong sampling step: 0.000634766 s where the others have 0.000488281 s" in result.blows.marks[2]
+
+
+def test_steps_that_differ_in_their_last_digits_are_one_step(tmp_path):
+    result = estimate(campaign(tmp_path, fine, step_s=STEP_S * (1 + 1e-5)))
+    assert result.blows.used.all()
+
+
+@pytest.mark.parametrize("only", [twice, clipped, overloaded])
+def test_the_last_blow_of_a_dof_is_used_with_a_warning(tmp_path, only):
+    result = estimate(campaign(tmp_path, only, others=0))
+    assert list(result.blows.used) == [True]
+    assert any("is used although it is bad" in text and "7:+z" in text for text in result.warnings)
+    assert not any("is left out" in text for text in result.warnings)
+
+
+def test_of_bad_blows_only_the_least_bad_is_used(tmp_path):
+    rng = np.random.default_rng(6)
+    harder = pulse(N_SAMPLES, STEP_S) + pulse(N_SAMPLES, STEP_S, height=60.0, at_s=0.05)
+    write_csv(tmp_path / "hits" / "1.csv", noisy(rng, force=harder), STEP_S)
+    write_csv(tmp_path / "hits" / "2.csv", twice(rng), STEP_S)
+    both = twice(rng)
+    both[0] = np.minimum(both[0], 70.0)
+    write_csv(tmp_path / "hits" / "3.csv", both, STEP_S)
+    result = estimate(write_test(tmp_path, HIT))
+    assert list(result.blows.used) == [False, True, False]
+
+
+def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
+    rng = np.random.default_rng(7)
+    for name, make in (("a/1", fine), ("a/2", twice), ("b/1", clipped), ("b/2", twice)):
+        write_csv(tmp_path / f"{name}.csv", make(rng), STEP_S)
+    body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "8:+z"\nfiles = ["b/*.csv"]\n'
+    result = estimate(write_test(tmp_path, body))
+    assert list(result.blows.groupby("input_dof").used.sum()) == [1, 1]
+    assert list(result.frfs.averages) == [1, 1, 1, 1]
+
+
+def test_a_double_hit_that_is_kept_gives_the_right_frf(tmp_path):
+    """Both pulses are in the force, so that nothing is wrong with the FRF when the window keeps them."""
+    result = estimate(campaign(tmp_path, twice, others=0))
+    band = result.frfs.in_band((20.0, 250.0))
+    truth = Structure().accelerance(result.frfs.s[band])
+    assert np.abs(result.frfs.values[band] - truth).max() < 0.02 * np.abs(truth).max()
+
+
+def test_the_user_overrules_the_checks(tmp_path):
+    path = campaign(tmp_path, twice)
+    kept = estimate(path, keep=("p7_bad.csv",))
+    assert kept.blows.used.all()
+    assert kept.blows.marks[2].endswith("kept by the user")
+    assert kept.warnings == ()
+    dropped = estimate(path, drop=("hits/p7_1.csv",))
+    assert list(dropped.blows.used) == [False, True, False]
+    assert dropped.blows.marks[0] == "dropped by the user"
+
+
+def test_one_blow_of_a_file_may_be_dropped(tmp_path):
+    force = np.zeros(3 * N_SAMPLES)
+    for start, height in ((300, 100.0), (4400, 80.0), (8500, 110.0)):
+        force += pulse(len(force), STEP_S, height=height, at_s=start * STEP_S)
+    write_csv(tmp_path / "hits" / "all.csv", blow(Structure(), force=force), STEP_S)
+    result = estimate(write_test(tmp_path, HIT), drop=("hits/all.csv#2",))
+    assert list(result.blows.used) == [True, False, True]
+
+
+def test_a_file_that_cannot_be_read_may_be_dropped(tmp_path):
+    path = hammer_campaign(tmp_path)
+    (tmp_path / "hits" / "p7_02.csv").write_text("rubbish\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"p7_02\.csv"):
+        estimate(path)
+    assert list(estimate(path, drop=("p7_02.csv",)).frfs.averages) == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"keep": ("p7_11.csv",)}, "keep: there is no blow or file 'p7_11.csv'"),
+        ({"drop": ("p7_01.csv#2",)}, "drop: there is no blow or file 'p7_01.csv#2'"),
+        ({"keep": ("p7_01.csv",), "drop": ("p7_01.csv",)}, "named by both keep and drop"),
+        ({"drop": ("p7_01.csv", "p7_02.csv", "p7_03.csv")}, "drop leaves no blow at 7:\\+z"),
+        ({"exponential_window_s": -1.0}, "exponential_window_s is -1"),
+        ({"force_window_s": -1.0}, "force_window_s is -1"),
+    ],
+)
+def test_choices_that_make_no_sense_are_refused(tmp_path, options, says):
+    with pytest.raises(InputError, match=says):
+        estimate(hammer_campaign(tmp_path), **options)
+
+
+def test_copies_of_one_blow_are_not_taken_for_clipped_ones(tmp_path):
+    assert list(estimate(hammer_campaign(tmp_path, heights=(100.0, 100.0))).blows.marks) == ["", ""]
+
+
+def test_pulses_that_all_end_at_one_force_are_clipped(tmp_path):
+    """A rail that cuts a single sample shows no plateau, but two blows that meet it are equal to the last digit."""
+    rng = np.random.default_rng(9)
+    for number, late in enumerate((0.0, 0.05, -0.08)):
+        signals = noisy(rng, height=110.0 + number, at_s=(61 + late) * STEP_S)
+        signals[0] = np.minimum(signals[0], 100.0)
+        assert np.sum(signals[0] == 100.0) == 1
+        write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
+    write_csv(tmp_path / "hits" / "9.csv", noisy(rng, height=80.0), STEP_S)
+    result = estimate(write_test(tmp_path, HIT))
+    assert list(result.blows.used) == [False, False, False, True]
+    assert "equals another blow's to the last digit" in result.blows.marks[0]
+
+
+def test_forces_in_coarse_digital_steps_are_not_clipped(tmp_path):
+    rng = np.random.default_rng(10)
+    for number, height in enumerate((100.0, 101.0, 99.0)):
+        signals = noisy(rng, height=height, at_s=0.03 + 1e-4 * number, length_s=1.5e-3)
+        write_csv(tmp_path / "hits" / f"{number}.csv", 0.5 * np.round(signals / 0.5), STEP_S)
+    result = estimate(write_test(tmp_path, HIT))
+    assert result.blows.used.all()
+
+
+def test_all_blows_can_be_read_the_bad_ones_flagged(tmp_path):
+    test = read_test(campaign(tmp_path, clipped))
+    every = list(read_blows(test, IngestOptions(), used_only=False))
+    used = list(read_blows(test, IngestOptions()))
+    assert [one.used for one in every] == [True, True, False]
+    assert [one.name for one in used] == [one.name for one in every[:2]]
+    assert "clipping" in every[2].marks[0]
+    assert every[2].force.max() == pytest.approx(90.0, abs=0.1)
+    assert [str(label.output_dof) for label in every[0].labels] == ["1:+z", "2:+z"]
+    assert every[0].labels[0].input_channel == "force"
+    assert every[0].responses.shape == (2, every[0].n_samples)
+    assert not every[0].force.flags.writeable
+
+
+def test_frfs_of_others_have_no_blows(tmp_path):
+    (tmp_path / "frf.csv").write_text(
+        "frequency_hz,output_dof,input_dof,real,imag\n1,1:z,2:z,1,0\n2,1:z,2:z,1,0\n", encoding="utf-8"
+    )
+    path = write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
+    with pytest.raises(InputError, match="has no recordings"):
+        list(read_blows(read_test(path), IngestOptions()))
