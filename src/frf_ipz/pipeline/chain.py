@@ -43,20 +43,25 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
     desk = Desk(job=job, folder=folder, progress=progress)
     recordings = stages.ingest(desk)
     yield "ingest"
-    fit = stages.fit(desk, recordings.frfs)
+    frfs, model = recordings.frfs, job.model
+    options = job.pipeline.file.diagnose
+    diagnosis = None
+    if model is not None and diagnosing and options is not None and options.apply:
+        diagnosis = stages.diagnose(desk, model, frfs)
+        model, frfs = stages.apply_diagnosis(model, frfs, diagnosis)
+    fit = stages.fit(desk, frfs, corrected_by=diagnosis)
     yield "fit"
-    if job.model is not None:
-        model = job.model
+    if model is not None:
         if diagnosing:
-            diagnosis = stages.diagnose(desk, model, recordings.frfs, fit)
-            model, fit = stages.apply_diagnosis(desk, model, diagnosis, fit)
+            if diagnosis is None:
+                stages.diagnose(desk, model, frfs)
             yield "diagnose"
-        reduced = stages.reduce(desk, model, fit)
+        reduced = stages.reduce(desk, model, fit, corrected_by=diagnosis)
         pairs = stages.pair(desk, fit, reduced)
         yield "pair"
         updated = stages.update(desk, reduced, fit, pairs)
         yield "update"
-        stages.predict(desk, updated, fit, recordings.frfs)
+        stages.predict(desk, updated, fit, frfs)
         yield "predict"
         stages.export(desk, updated, fit)
         yield "export"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING
@@ -9,6 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray
+from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
+from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.state_space import save_reduced_model, save_state_space, to_state_space
 from frf_ipz.export.tables import write_table
@@ -18,21 +23,25 @@ from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.pairing.assignment import pair as pair_roots
 from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.rational import without_window
 from frf_ipz.report.page import write_report
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     import pyarrow as pa
 
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.dofs import Dof
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.recordings import Recordings
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.desk import Desk
     from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -57,13 +66,68 @@ def ingest(desk: Desk) -> Recordings:
         {"options": asdict(options), "test": repr(desk.job.test), "files": files},
         lambda progress: estimate_frfs(desk.job.test, options, progress=progress),
         lambda result: {
-            "frf.parquet": parquet(tables.frf_table(result.frfs)),
-            "blows.parquet": parquet(tables.frame_table(result.blows, {}, meaning="quality of a blow")),
+            "frf.parquet": _parquet(tables.frf_table(result.frfs)),
+            "blows.parquet": _parquet(tables.frame_table(result.blows, {}, meaning="quality of a blow")),
         },
     )
 
 
-def fit(desk: Desk, frfs: FrfSet) -> ModalFit:
+def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
+    """Say what the model left out.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model.
+    frfs : FrfSet
+        The measured FRFs.
+
+    Returns
+    -------
+    Diagnosis
+        The verdict and what it rests on.
+    """
+    job = desk.job
+    options = job.pipeline.file.diagnose or DiagnoseOptions()
+    ingest_options = job.pipeline.file.ingest
+    band = {"fit": [job.pipeline.file.fit.band_hz, job.pipeline.file.fit.exclude_hz]}
+
+    def compute(progress: Progress) -> Diagnosis:
+        return find_mismatch(model, observe(job.test, ingest_options, frfs), options, progress=progress)
+
+    return desk.stage(
+        "diagnose",
+        {"options": asdict(options), "model": job.model_key, "after": desk.after("ingest"), **band},
+        compute,
+        lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
+    )
+
+
+def apply_diagnosis(model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis) -> tuple[StructuralModel, FrfSet]:
+    """Put what was found missing into the model, and take what was wrong in the measuring chain off the FRFs.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    frfs : FrfSet
+        The measured FRFs.
+    diagnosis : Diagnosis
+        What was found.
+
+    Returns
+    -------
+    model : StructuralModel
+        The corrected model.
+    frfs : FrfSet
+        The corrected FRFs.
+    """
+    return apply_to_model(model, diagnosis), apply_to_frfs(frfs, diagnosis)
+
+
+def fit(desk: Desk, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
     """Turn FRFs into poles, residues and zeros.
 
     Parameters
@@ -72,6 +136,8 @@ def fit(desk: Desk, frfs: FrfSet) -> ModalFit:
         The work.
     frfs : FrfSet
         The measured FRFs.
+    corrected_by : Diagnosis, optional
+        What they were corrected by, if they were.
 
     Returns
     -------
@@ -81,18 +147,21 @@ def fit(desk: Desk, frfs: FrfSet) -> ModalFit:
     options = desk.job.pipeline.file.fit
     return desk.stage(
         "fit",
-        {"options": asdict(options), "after": desk.after("ingest")},
+        {"options": asdict(options), "after": desk.after("ingest"), "corrected": _corrections(corrected_by)},
         lambda progress: fit_modes(frfs, options, progress=progress),
         lambda result: {
-            "poles.parquet": parquet(tables.pole_table(result)),
-            "zeros.parquet": parquet(tables.zero_table(result)),
-            "fit.parquet": parquet(tables.frame_table(result.misfit, {}, meaning="misfit against noise")),
-            "modes.parquet": parquet(tables.mode_table(result)),
+            "frf.parquet": _parquet(tables.frf_table(without_window(frfs, result.model))),
+            "poles.parquet": _parquet(tables.pole_table(result)),
+            "zeros.parquet": _parquet(tables.zero_table(result)),
+            "fit.parquet": _parquet(tables.frame_table(result.misfit, {}, meaning="misfit against noise")),
+            "modes.parquet": _parquet(tables.mode_table(result)),
         },
     )
 
 
-def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedModel:
+def reduce(
+    desk: Desk, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+) -> ReducedModel:
     """Turn the FE model into a reduced model in physical DOFs.
 
     Parameters
@@ -103,6 +172,8 @@ def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedMo
         The FE model.
     modal_fit : ModalFit
         Says which band was fitted.
+    corrected_by : Diagnosis, optional
+        What the model was corrected by, if it was.
 
     Returns
     -------
@@ -113,12 +184,18 @@ def reduce(desk: Desk, model: StructuralModel, modal_fit: ModalFit) -> ReducedMo
     options = job.pipeline.file.reduce
     return desk.stage(
         "reduce",
-        {"options": asdict(options), "model": job.model_key, "after": desk.after("fit"), "points": repr(job.points)},
+        {
+            "options": asdict(options),
+            "model": job.model_key,
+            "corrected": _corrections(corrected_by),
+            "after": desk.after("fit"),
+            "points": repr(job.points),
+        },
         lambda _: reduce_model(
             model,
             options,
-            actuators=job.test.input_dofs,
-            sensors=job.test.output_dofs,
+            actuators=_once(label.input_dof for label in modal_fit.labels),
+            sensors=_once(label.output_dof for label in modal_fit.labels),
             points=job.points,
             band_hz=modal_fit.band_hz,
         ),
@@ -147,7 +224,7 @@ def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
         {"after": desk.after("fit", "reduce")},
         lambda _: pair_roots(modal_fit, reduced),
         lambda result: {
-            "pairs.parquet": parquet(tables.pair_table(result, modal_fit.labels, unknown_roots(len(result.targets))))
+            "pairs.parquet": _parquet(tables.pair_table(result, modal_fit.labels, _unknown_roots(len(result.targets))))
         },
     )
 
@@ -177,8 +254,8 @@ def update(desk: Desk, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs)
         {"options": asdict(options), "after": desk.after("pair")},
         lambda progress: update_model(reduced, modal_fit, pairs, options, progress=progress),
         lambda result: {
-            "pairs.parquet": parquet(tables.pair_table(pairs, modal_fit.labels, result.after)),
-            "parameters.parquet": parquet(tables.history_table(result)),
+            "pairs.parquet": _parquet(tables.pair_table(pairs, modal_fit.labels, result.after)),
+            "parameters.parquet": _parquet(tables.history_table(result)),
             "updated_model.npz": partial(save_reduced_model, result.model),
         },
     )
@@ -209,7 +286,7 @@ def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet
         "predict",
         {"points": repr(job.points), "after": desk.after("update")},
         lambda _: predict_frfs(updated, job.points, modal_fit.labels, lines),
-        lambda result: {"poi_frf.parquet": parquet(tables.prediction_table(result))},
+        lambda result: {"poi_frf.parquet": _parquet(tables.prediction_table(result))},
     )
 
 
@@ -253,33 +330,22 @@ def report(desk: Desk) -> None:
     desk.folder.page("report", key, {"report.html": lambda path: write_report(desk.folder, path, progress=tell)})
 
 
-def parquet(table: pa.Table) -> Callable[[Path], None]:
-    """Give what writes a table.
+def _once(dofs: Iterable[Dof]) -> tuple[Dof, ...]:
+    return tuple(dict.fromkeys(dofs))
 
-    Parameters
-    ----------
-    table : pyarrow.Table
-        The table.
 
-    Returns
-    -------
-    callable
-        Takes the path.
-    """
+def _corrections(diagnosis: Diagnosis | None) -> str:
+    return "" if diagnosis is None else repr(diagnosis.findings)
+
+
+def _parquet(table: pa.Table) -> Callable[[Path], None]:
     return partial(write_table, table)
 
 
-def unknown_roots(count: int) -> ComplexArray:
-    """Roots that are not known yet.
-
-    Parameters
-    ----------
-    count : int
-        How many.
-
-    Returns
-    -------
-    (count,) complex array
-        NaN.
-    """
+def _unknown_roots(count: int) -> ComplexArray:
+    """Roots that are not known yet."""
     return np.full(count, complex(np.nan, np.nan))
+
+
+def _write_json(table: dict[str, object], path: Path) -> None:
+    path.write_text(json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")

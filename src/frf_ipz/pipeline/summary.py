@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,8 +10,9 @@ from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.recordings import Recordings
     from frf_ipz.pairing.pairs import Pairs
@@ -36,9 +37,10 @@ def summarise(run: RunFolder) -> str:
     str
         At most a screen of text.
     """
-    writers = {
+    writers: dict[str, Callable[[Any], list[tuple[str, str]]]] = {
         "ingest": recordings_lines,
         "fit": fit_lines,
+        "diagnose": diagnosis_lines,
         "reduce": reduced_lines,
         "pair": pairs_lines,
         "update": update_lines,
@@ -103,6 +105,23 @@ def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
         ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
         *_warnings(fit.warnings),
     ]
+
+
+def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Sum up the diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What is missing from the model.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    findings = [("", finding.statement) for finding in diagnosis.findings]
+    return [("diagnosis", diagnosis.statement), *findings, *_warnings(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:
