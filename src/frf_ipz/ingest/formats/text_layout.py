@@ -89,10 +89,8 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
         If the file is missing, empty, no text, or holds no line of numbers.
     """
     head = read_head(path)
-    text = head.removeprefix(BOM).decode("utf-8", errors="replace")
-    lines = text.splitlines()
-    if len(head) == HEAD:
-        lines = lines[:-1]
+    whole = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
+    lines = decode(whole.removeprefix(BOM)).splitlines()
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
     delimiter = _delimiter([line for _, line in rows])
     first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
@@ -144,6 +142,25 @@ def read_head(path: Path) -> bytes:
     if b"\0" in head:
         raise FileFormatError(path, "is no text in UTF-8 or Latin-1 (it holds zero bytes); export it as CSV")
     return head
+
+
+def decode(data: bytes) -> str:
+    """Read bytes as text: UTF-8, else Latin-1, in which any bytes are text.
+
+    Parameters
+    ----------
+    data : bytes
+        Whole lines.
+
+    Returns
+    -------
+    str
+        The text.
+    """
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
 
 
 def is_number(field: str) -> bool:

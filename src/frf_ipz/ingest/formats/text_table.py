@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.ingest.formats.text_layout import BOM, is_number, name_and_unit
+from frf_ipz.ingest.formats.text_layout import BOM, decode, is_number, name_and_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -188,7 +188,7 @@ def _rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
     with layout.path.open("rb") as stream:
         for number, line in enumerate(stream, start=1):
             if number > layout.n_before and line.strip():
-                yield number, line.decode("utf-8", errors="replace").rstrip("\r\n")
+                yield number, decode(line).rstrip("\r\n")
 
 
 def _arrow_delimiter(layout: TextLayout) -> str:
