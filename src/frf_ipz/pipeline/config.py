@@ -72,6 +72,8 @@ class Pipeline:
         The pipeline file, and the test it names.
     model_path : Path, optional
         None where the run ends with the fit.
+    reference_path : Path, optional
+        FRFs that a prediction is judged by.
     file : PipelineFile
         What it says.
     """
@@ -79,6 +81,7 @@ class Pipeline:
     path: Path
     test_path: Path
     model_path: Path | None
+    reference_path: Path | None
     file: PipelineFile
 
     @property
@@ -107,10 +110,11 @@ def read_pipeline(path: Path) -> Pipeline:
     """
     file = read_toml(path, PipelineFile, required="pipeline")
     folder = path.resolve().parent
-    model = file.pipeline.model
+    model, reference = file.pipeline.model, file.predict.reference
     return Pipeline(
         path=path.resolve(),
         test_path=folder / file.pipeline.test,
         model_path=None if model is None else folder / model,
+        reference_path=None if reference is None else folder / reference,
         file=file,
     )

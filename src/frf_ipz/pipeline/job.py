@@ -11,12 +11,14 @@ from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.test_file import Test, read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
+from frf_ipz.pipeline.reference import read_reference
 from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from frf_ipz.frf import FrfSet
     from frf_ipz.structure import StructuralModel
 
 
@@ -38,6 +40,8 @@ class Job:
         Digest of every file that the user handed in.
     model_files : tuple of Path
         Those that the model was read from.
+    reference : FrfSet, optional
+        FRFs that a prediction is judged by.
     """
 
     pipeline: Pipeline
@@ -46,6 +50,7 @@ class Job:
     points: tuple[Dof, ...]
     inputs: Mapping[str, str]
     model_files: tuple[Path, ...] = ()
+    reference: FrfSet | None = None
 
     @property
     def model_key(self) -> list[object]:
@@ -83,7 +88,9 @@ def read_job(path: Path) -> Job:
             where="key 'predict.points'",
         )
     of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
-    files = [pipeline.path, pipeline.test_path, *test.files, *of_model]
+    aside = pipeline.reference_path
+    reference = None if aside is None else read_reference(aside, test.labels[0].quantity)
+    files = [pipeline.path, pipeline.test_path, *test.files, *of_model, *([] if aside is None else [aside])]
     return Job(
         pipeline=pipeline,
         test=test,
@@ -91,6 +98,7 @@ def read_job(path: Path) -> Job:
         points=points,
         inputs={str(file): digest_file(file) for file in dict.fromkeys(files)},
         model_files=of_model,
+        reference=reference,
     )
 
 

@@ -182,6 +182,7 @@ def reduce(
     """
     job = desk.job
     options = job.pipeline.file.reduce
+    desk.stage("model", {"model": job.model_key, "corrected": _corrections(corrected_by)}, lambda _: model.geometry)
     return desk.stage(
         "reduce",
         {
@@ -281,6 +282,8 @@ def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet
         With bands.
     """
     job = desk.job
+    if job.reference is not None:
+        desk.stage("reference", {"file": job.inputs[str(job.pipeline.reference_path)]}, lambda _: job.reference)
     lines = frfs.frequency_hz[frfs.in_band(modal_fit.band_hz)]
     return desk.stage(
         "predict",

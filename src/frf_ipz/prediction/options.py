@@ -15,8 +15,12 @@ class PredictOptions:
     ----------
     points : tuple of str
         Points of interest as DOF labels: never measured; may be empty.
+    reference : str, optional
+        File of FRFs at the points of interest that were kept aside: the report sets the prediction against them, and
+        nothing else uses them.
     """
 
     __pydantic_config__ = STRICT
 
     points: tuple[str, ...] = ()
+    reference: str | None = None
