@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.frf import FrfLabel
+from frf_ipz.ingest.file_patterns import expand_pattern
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.registry import read_frfs
 from frf_ipz.ingest.test_keys import ChannelKeys, FrfKeys, RunKeys, TestFileKeys
@@ -343,7 +344,8 @@ def _read_run(path: Path, keys: RunKeys, channels: tuple[Channel, ...], where: s
     if missing:
         problem = f"the output '{missing[0]}' has no DOF: give its channel a 'dof', or name it in 'output_dofs'"
         raise FileFormatError(path, problem, where=where)
-    files = [file for pattern in keys.files for file in _expand(path, pattern, where)]
+    _check_places(path, channels[1:], tuple(dof for dof in outputs.values() if dof is not None), where)
+    files = [file for pattern in keys.files for file in expand_pattern(path, pattern, where=where)]
     if not files:
         raise FileFormatError(path, "'files' is empty; name at least one recording", where=where)
     return Run(
@@ -353,17 +355,14 @@ def _read_run(path: Path, keys: RunKeys, channels: tuple[Channel, ...], where: s
     )
 
 
-def _expand(path: Path, pattern: str, where: str) -> list[Path]:
-    folder, relative = path.parent, Path(pattern)
-    if relative.is_absolute():
-        folder, relative = Path(relative.anchor), relative.relative_to(relative.anchor)
-    try:
-        files = sorted(file for file in folder.glob(str(relative)) if file.is_file())
-    except (ValueError, NotImplementedError, OSError) as error:
-        raise FileFormatError(path, f"'{pattern}' is no valid pattern of files: {error}", where=where) from None
-    if not files:
-        raise FileFormatError(path, f"no file fits '{pattern}' in {folder}; correct 'files'", where=where)
-    return files
+def _check_places(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...], where: str) -> None:
+    """Refuse two outputs that would measure the same motion: FRFs are told apart by DOFs and quantity."""
+    owners: dict[tuple[int, str, str], Channel] = {}
+    for channel, dof in zip(outputs, dofs, strict=True):
+        other = owners.setdefault((dof.node, dof.direction, channel.quantity), channel)
+        if other is not channel:
+            problem = f"'{other.column}' and '{channel.column}' both measure the {channel.quantity} at {dof}"
+            raise FileFormatError(path, f"{problem}; correct a 'dof', or take one channel out", where=where)
 
 
 def _check_files_once(path: Path, runs: tuple[Run, ...]) -> None:

@@ -90,7 +90,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
     """
     head = read_head(path)
     whole = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
-    lines = decode(whole.removeprefix(BOM)).splitlines()
+    lines = [line.rstrip("\r") for line in decode(whole.removeprefix(BOM)).split("\n")]
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
     delimiter = _delimiter([line for _, line in rows])
     first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
