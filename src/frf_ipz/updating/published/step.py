@@ -15,6 +15,7 @@ sensitivity approach, Control Engineering Practice 71, 2018, 164-174, doi:10.101
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import cast
 
 import numpy as np
@@ -114,6 +115,11 @@ class PublishedStep:
         -------
         float
             epsilon, eq. (6), with the weights of eq. (7).
+
+        Raises
+        ------
+        NumericalError
+            If a target has lost its counterpart.
         """
         matrix.take(self.forward, out=self.changed)
         for pencil in self.pencils:
@@ -124,7 +130,10 @@ class PublishedStep:
         self.weights = np.sqrt(modulus.max() / modulus)
         error *= self.weights
         self.error = error.reshape(-1)
-        return float(self.error @ self.error)
+        misfit = float(self.error @ self.error)
+        if not isfinite(misfit):
+            raise NumericalError("a pole or zero that is to be updated is no longer there")
+        return misfit
 
     def step(self) -> FloatArray:
         """Make the step of eqs. (18) and (19), and put the substructure back, steps 2j to 2l.
@@ -133,6 +142,11 @@ class PublishedStep:
         -------
         (r, r) array
             The next matrix.
+
+        Raises
+        ------
+        NumericalError
+            If the step has no solution.
         """
         poles, size = self.n_poles, self.order - 1
         self._eigenvectors()
@@ -145,7 +159,7 @@ class PublishedStep:
             inverse = 1 / diagonal
             normal.flat[:: len(normal) + 1] += self.settings.alpha**2 * (diagonal.sum() / inverse.sum()) * inverse
         _, change, info = lapack.dposv(normal, weighted @ self.error)
-        if info:
+        if info or not isfinite(float(change @ change)):
             raise NumericalError("the equations of the step are singular: no parameter moves one of the targets")
         change *= self.settings.beta
         self.change, self.promised = change, change @ weighted
