@@ -37,7 +37,7 @@ class Finding:
     parameters : mapping of str to Estimate or str
         By their names in the contract.
     probability : float
-        Of this effect at this place, among all that were tried.
+        Of this effect, wherever it is, among all that were tried.
     log_evidence_gain : float
         Natural logarithm of the evidence over that without this effect, nats.
     statement : str
@@ -46,6 +46,10 @@ class Finding:
         All places that hold 95 % of the effect's probability, the most probable first.
     is_significant : bool
         False where it was detected and lies within the user's tolerances.
+    key : tuple
+        The place as the effect itself knows it.
+    values : tuple of float
+        Values of the parameters as the effect itself knows them, in its own order.
     """
 
     effect: str
@@ -56,3 +60,5 @@ class Finding:
     statement: str = ""
     location_set: tuple[Mapping[str, object], ...] = ()
     is_significant: bool = True
+    key: tuple[object, ...] = ()
+    values: tuple[float, ...] = ()

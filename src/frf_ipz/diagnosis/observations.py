@@ -9,6 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.dofs import Dof
+from frf_ipz.frf import FrfSet
 from frf_ipz.quantities import FrfQuantity
 
 BLOCK = 128  # samples
@@ -100,11 +101,14 @@ class Observations:
         In the order of the test.
     band_hz : pair of float
         Band that is looked at, Hz.
+    frfs : FrfSet, optional
+        FRFs on lines: what is looked at where there are no blows.
     """
 
     kind: str
     blows: tuple[Blow, ...]
     band_hz: tuple[float, float]
+    frfs: FrfSet | None = None
 
     @property
     def input_dofs(self) -> tuple[Dof, ...]:

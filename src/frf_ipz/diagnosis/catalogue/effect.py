@@ -128,6 +128,11 @@ class Effect(ABC):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Give what changes the model or the measuring chain, for values of the parameters."""
 
+    def chain(self, place: Place) -> Builder | None:
+        """Give what changes the measuring chain, if that is all that changes: it needs no structure."""
+        del place
+        return None
+
     @abstractmethod
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say to the user what it is and where, in one sentence."""

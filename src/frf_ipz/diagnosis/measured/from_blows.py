@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -20,6 +20,8 @@ ENOUGH = 8.0  # decays within a record: of a mode 3e-4 is left
 FINER = 4  # lines between those of the record: peaks are seen at their tops
 SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
 LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
+UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
+BEFORE = 32  # samples before a blow that tell the noise
 COMMON_PART = 1e-2  # of the largest: shared errors below are left out
 
 
@@ -65,8 +67,7 @@ def survey(observations: Observations) -> Survey:
         What `measure` needs.
     """
     is_hammer = observations.kind == "hammer"
-    pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in _groups(observations)) if is_hammer else ()
-    groups = tuple(tuple(p.blow for p in group) for group in pulses) if is_hammer else _groups(observations)
+    groups, pulses = _prepared(observations)
     noise = Noise(white=0.0)
     if is_hammer:
         flat = tuple(p for group in pulses for p in group)
@@ -83,6 +84,36 @@ def survey(observations: Observations) -> Survey:
         resonances=resonances,
         least_decay_1_s=_least_decay(decay, resonances) if is_hammer else decay,
     )
+
+
+def like(found: Survey, observations: Observations) -> Survey:
+    """Give further blows the noise and the resonances of a survey.
+
+    Parameters
+    ----------
+    found : Survey
+        Of other blows of the same test.
+    observations : Observations
+        The further blows, at the same places.
+
+    Returns
+    -------
+    Survey
+        Of these.
+    """
+    groups, pulses = _prepared(observations)
+    return replace(found, groups=groups, pulses=pulses)
+
+
+def _prepared(
+    observations: Observations,
+) -> tuple[tuple[tuple[Blow, ...], ...], tuple[tuple[Pulse, ...], ...]]:
+    """Blows of each place, and the pulses of hammers."""
+    groups = _groups(observations)
+    if observations.kind != "hammer":
+        return groups, ()
+    pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
+    return tuple(tuple(pulse.blow for pulse in group) for group in pulses), pulses
 
 
 def _groups(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
@@ -157,8 +188,31 @@ def _response_noise(
             rate = 2 * lines.s.real
             gain = (1 - np.exp(-rate * _duration_s(group))) / rate
             stacks.append((lines.frequency_hz, energy, gain, known))
-        found[channel] = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
+        if stacks:
+            found[channel] = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
+        else:
+            found[channel] = _noise_of_single(groups, pulses, line_sets, channel)
     return found
+
+
+def _noise_of_single(
+    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[_Lines], channel: str
+) -> Noise:
+    """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
+    white = 0.0
+    for place, (group, lines) in enumerate(zip(groups, line_sets, strict=True)):
+        names = [sensor.channel for sensor in group[0].sensors]
+        if channel not in names:
+            continue
+        sensor = names.index(channel)
+        rate = 2 * lines.s.real
+        gain = (1 - np.exp(-rate * _duration_s(group))) / rate
+        energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / gain
+        white = max(white, UNREPEATED**2 * float(np.median(energy)))
+        before = group[0].responses[sensor, : pulses[place][0].start] if pulses else np.zeros(0)
+        if len(before) >= BEFORE:
+            white = max(white, float(np.var(before)) * group[0].step_s)
+    return Noise(white=white)
 
 
 def _duration_s(group: tuple[Blow, ...]) -> float:

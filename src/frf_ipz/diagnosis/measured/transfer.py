@@ -13,6 +13,7 @@ from frf_ipz.frf import FrfLabel
 SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that varies slowly along the band
 SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
 ROUGH_PART = 0.15  # of the tolerance: the same from point to point
+FREE = 30.0  # relative standard deviation of a gain that nobody knows: as good as none
 NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
 
 
@@ -97,7 +98,9 @@ def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     return np.concatenate([white.real, white.imag], axis=1)
 
 
-def whiten(measured: Measured, *, tolerance: float, gain_std: float, floor: float = 1.0) -> Whitening:
+def whiten(
+    measured: Measured, *, tolerance: float, gain_std: float, floor: float = 1.0, free_gains: str = "none"
+) -> Whitening:
     """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
 
     Parameters
@@ -110,6 +113,8 @@ def whiten(measured: Measured, *, tolerance: float, gain_std: float, floor: floa
         Standard deviation of the gains of all channels.
     floor : float
         Factor of the model's errors: large ones let a search see past narrow peaks.
+    free_gains : str
+        ``none``, ``common`` or ``per_channel``: gains that nobody knows; their directions are taken out.
 
     Returns
     -------
@@ -127,11 +132,11 @@ def whiten(measured: Measured, *, tolerance: float, gain_std: float, floor: floa
         inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True, check_finite=False)
         factors.append(np.asarray(inverse, np.complex128))
     found = np.array(factors, np.complex128)
-    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, gain_std)))
+    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, gain_std, free_gains)))
 
 
 def _blocks(
-    measured: Measured, factors: ComplexArray, gain_std: float
+    measured: Measured, factors: ComplexArray, gain_std: float, free_gains: str
 ) -> list[tuple[IntArray, FloatArray, FloatArray]]:
     """Noise of the force for each blow's place; then gains of all channels."""
     blocks = []
@@ -141,6 +146,10 @@ def _blocks(
             blocks.append(_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
     every = np.arange(len(measured.labels))
     gains = _gain_columns(measured) * gain_std
+    if free_gains == "per_channel":
+        gains = np.eye(len(every))[None] * FREE
+    elif free_gains == "common":
+        gains = np.concatenate([gains, np.full((1, len(every), 1), FREE)], axis=2)
     errors = measured.values[:, :, None] * gains
     found = _separately(factors, errors).reshape(-1, gains.shape[2])
     for frfs, directions, shrink in blocks:

@@ -27,10 +27,14 @@ class Attachment:
         Each column is a motion: weights of all DOFs of the model.
     stiffness : callable
         Dynamic stiffness against each of the motions, N/m or N m/rad.
+    matrices : tuple of (1 + n, 1 + n) arrays, optional
+        The same as mass, damping and stiffness between one motion and n motions of its own: what brings it into a model
+        that has matrices only. Without them it cannot be brought there.
     """
 
     motions: FloatArray
     stiffness: Transfer
+    matrices: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

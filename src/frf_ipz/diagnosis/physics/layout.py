@@ -33,8 +33,8 @@ class Layout:
         Channel and DOF of each sensor position; one channel may have several.
     inputs : tuple of Dof
         Struck DOFs.
-    input_channel : str
-        Column of the force.
+    input_channels : tuple of str
+        Column of the force at each of them; the same for all, but for FRFs that were estimated elsewhere.
     output_of, input_of : (n_frfs,) int array
         Which of them each FRF connects.
     power : (n_frfs,) int array
@@ -43,7 +43,7 @@ class Layout:
 
     outputs: tuple[tuple[str, Dof], ...]
     inputs: tuple[Dof, ...]
-    input_channel: str
+    input_channels: tuple[str, ...]
     output_of: IntArray
     input_of: IntArray
     power: IntArray
@@ -51,7 +51,7 @@ class Layout:
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels, the force first."""
-        return (self.input_channel, *dict.fromkeys(channel for channel, _ in self.outputs))
+        return tuple(dict.fromkeys((*self.input_channels, *(channel for channel, _ in self.outputs))))
 
 
 def lay_out(labels: Sequence[FrfLabel]) -> Layout:
@@ -68,11 +68,13 @@ def lay_out(labels: Sequence[FrfLabel]) -> Layout:
         Each sensor position and each struck DOF once.
     """
     named = [(label.output_channel or f"output {label.output_dof}", label.output_dof) for label in labels]
-    outputs, inputs = tuple(dict.fromkeys(named)), tuple(dict.fromkeys(label.input_dof for label in labels))
+    outputs = tuple(dict.fromkeys(named))
+    struck = {label.input_dof: label.input_channel or f"input {label.input_dof}" for label in labels}
+    inputs = tuple(struck)
     return Layout(
         outputs=outputs,
         inputs=inputs,
-        input_channel=labels[0].input_channel or f"input {labels[0].input_dof}",
+        input_channels=tuple(struck.values()),
         output_of=np.array([outputs.index(name) for name in named]),
         input_of=np.array([inputs.index(label.input_dof) for label in labels]),
         power=np.array([label.quantity.power for label in labels]),

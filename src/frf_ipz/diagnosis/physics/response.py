@@ -303,8 +303,9 @@ def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:
     factors = np.ones((len(s), len(layout.output_of)), complex)
     for channel, transfer in change.channels.items():
         gain = transfer(s)
-        if channel == layout.input_channel:
-            factors /= gain[:, None]
+        for index, name in enumerate(layout.input_channels):
+            if name == channel:
+                factors[:, layout.input_of == index] /= gain[:, None]
         for index, (name, _) in enumerate(layout.outputs):
             if name == channel:
                 factors[:, layout.output_of == index] *= gain[:, None]

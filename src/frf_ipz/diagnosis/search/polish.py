@@ -80,14 +80,30 @@ class Data:
         Transfer functions.
     whitening : Whitening
         Of their errors.
+    free_gains : str
+        ``none``, ``common`` or ``per_channel``: gains that nobody knows; the model's FRFs are scaled to the measured
+        ones.
     """
 
     measured: Measured
     whitening: Whitening
+    free_gains: str = "none"
+
+    def gains(self, response: Response) -> FloatArray:
+        """Real factors that bring the model's FRFs to the measured ones where scales are unknown, (n_frfs,) array."""
+        n_frfs = len(self.measured.labels)
+        if self.free_gains == "none":
+            return np.ones(n_frfs)
+        weight = 1 / self.measured.size**2
+        across = np.sum(weight * (response.values.conj() * self.measured.values).real, 0)
+        own = np.sum(weight * np.abs(response.values) ** 2, 0)
+        if self.free_gains == "common":
+            return np.full(n_frfs, across.sum() / own.sum())
+        return np.asarray(across / own)
 
     def misfit(self, response: Response) -> FloatArray:
         """Whitened difference of measurement and model, (n_data,) array."""
-        return self.whitening(self.measured.values - response.values)
+        return self.whitening(self.measured.values - self.gains(response) * response.values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -181,17 +197,18 @@ def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: Float
 def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
     m = hypothesis.nuisance.n_modes
     columns, squares, ratios = [], [], []
+    gains = data.gains(point.response)
     for index in range(len(hypothesis.parameters)):
         moved = point.searched.copy()
         step = STEP if moved[index] + STEP <= hypothesis.high[index] else -STEP
         moved[index] += step
         response = hypothesis.respond(hypothesis.physical(moved), point.unknown, data.measured.s)
-        columns.append(data.whitening((response.values - point.response.values) / step)[:, None])
+        columns.append(data.whitening(gains * (response.values - point.response.values) / step)[:, None])
         here, there = point.response.modes, response.modes
         squares.append((there.omega[:m] ** 2 - here.omega[:m] ** 2) / step)
         ratios.append((there.stated_ratio[:m] - here.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
-    white = data.whitening(by_unknown)
+    white = data.whitening(gains[:, None] * by_unknown)
     used = np.sum(white**2, 0) > MATTERS
     return _Slope(
         jacobian=np.hstack([*columns, white[:, used]]),

@@ -181,3 +181,29 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     start = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
     values, _ = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
     return bench.fit(causes, values)
+
+
+def search_second(bench: Bench, first: Ranking) -> Ranking:
+    """Search for two causes: one more beside the best, then that one's best companion.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    first : Ranking
+        Of one cause.
+
+    Returns
+    -------
+    Ranking
+        Its base has one cause, its fits have two.
+    """
+    beside = search(bench, first.best)
+    if not beside.fits:
+        return beside
+    newest = beside.best.hypothesis.causes[-1]
+    count = beside.best.hypothesis.counts[-1]
+    values = beside.best.values[len(beside.best.values) - count :]
+    alone = bench.fit((newest,), values)
+    exchanged = search(bench, alone)
+    return exchanged if exchanged.best.log_evidence > beside.best.log_evidence + GAIN else beside

@@ -43,6 +43,10 @@ class SensorDynamics(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Filter the channel."""
         del specimen
+        return self.chain(place)
+
+    def chain(self, place: Place) -> Builder:
+        """Do the same for any structure."""
         channel, kind = str(place.key[0]), str(place.key[1])
         return lambda values: Change(channels={channel: lambda s: first_order(s, kind, values[0])})
 

@@ -44,6 +44,10 @@ class SensorGain(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Multiply the channel."""
         del specimen
+        return self.chain(place)
+
+    def chain(self, place: Place) -> Builder:
+        """Do the same for any structure."""
         channel, sign = str(place.key[0]), float(str(place.key[1]))
         return lambda values: Change(channels={channel: lambda s: np.full(len(s), sign * values[0] + 0j)})
 

@@ -38,6 +38,10 @@ class SensorMisplaced(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Move the sensor."""
         del specimen
+        return self.chain(place)
+
+    def chain(self, place: Place) -> Builder:
+        """Do the same for any structure."""
         change = Change(moved={str(place.key[0]): int(str(place.key[1]))})
         return lambda _: change
 

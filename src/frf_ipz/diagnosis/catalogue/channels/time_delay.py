@@ -38,6 +38,10 @@ class TimeDelay(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Turn the channel's phase."""
         del specimen
+        return self.chain(place)
+
+    def chain(self, place: Place) -> Builder:
+        """Do the same for any structure."""
         channel = str(place.key[0])
         return lambda values: Change(channels={channel: lambda s: np.exp(-s * values[0])})
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 
@@ -35,7 +36,15 @@ class LocalDamper(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Attach it."""
         motion = _motion(specimen, place)[:, None]
-        return lambda values: Change(attachments=(Attachment(motions=motion, stiffness=lambda s: values[0] * s),))
+        none = np.zeros((1, 1))
+
+        def change(values: FloatArray) -> Change:
+            matrices = none, values[:1, None], none
+            return Change(
+                attachments=(Attachment(motions=motion, stiffness=lambda s: values[0] * s, matrices=matrices),)
+            )
+
+        return change
 
     def sketch(self, specimen: Specimen, place: Place) -> Sketch:
         """Proportional to s."""

@@ -49,11 +49,14 @@ class AttachedResonator(Effect):
 
         def change(values: np.ndarray) -> Change:
             mass, frequency_hz, ratio = values
-            return Change(
-                attachments=(
-                    Attachment(motions=motion, stiffness=lambda s: mass * dynamic_mass(s, frequency_hz, ratio)),
-                )
+            omega = 2 * np.pi * frequency_hz
+            own, across = np.diag([0.0, mass]), np.array([[1.0, -1.0], [-1.0, 1.0]])
+            attachment = Attachment(
+                motions=motion,
+                stiffness=lambda s: mass * dynamic_mass(s, frequency_hz, ratio),
+                matrices=(own, 2 * ratio * omega * mass * across, omega**2 * mass * across),
             )
+            return Change(attachments=(attachment,))
 
         return change
 

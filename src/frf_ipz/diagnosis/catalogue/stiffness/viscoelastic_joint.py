@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 SOFTEST, STIFFEST = 1e-5, 1e2  # of the structure's own stiffness there
 SLOWEST, FASTEST = 0.15, 6.0  # relaxation rate over the edges of the band: beyond, it is a spring or a damper
 N_TIMES = 9
+LIGHT = 30.0  # frequency of the point between spring and damper over the band's upper edge: its mass is felt by nobody
 
 
 class ViscoelasticJoint(Effect):
@@ -55,10 +56,21 @@ class ViscoelasticJoint(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Attach its dynamic stiffness."""
         motion = _motion(specimen, place)[:, None]
+        light = 1 / (LIGHT * 2 * np.pi * specimen.band_hz[1]) ** 2
 
         def change(values: FloatArray) -> Change:
             stiffness, time = values
-            return Change(attachments=(Attachment(motions=motion, stiffness=lambda s: stiffness * relaxing(s, time)),))
+            between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+            attachment = Attachment(
+                motions=motion,
+                stiffness=lambda s: stiffness * relaxing(s, time),
+                matrices=(
+                    np.diag([0.0, stiffness * light]),
+                    np.diag([0.0, stiffness * time]),
+                    stiffness * between,
+                ),
+            )
+            return Change(attachments=(attachment,))
 
         return change
 

@@ -1,0 +1,133 @@
+"""What a diagnosis found, put into the model and taken out of the FRFs: the rest of the chain goes on from there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.physics.basis import make_basis
+from frf_ipz.diagnosis.physics.change import NOTHING, Change
+from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.dofs import Dof
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis
+    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.frf import FrfLabel, FrfSet
+    from frf_ipz.structure import StructuralModel
+
+
+def apply_to_model(
+    model: StructuralModel, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None
+) -> StructuralModel:
+    """Put the findings into the model.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The nominal model that was diagnosed.
+    diagnosis : Diagnosis
+        Of it.
+    effects : mapping of str to Effect, optional
+        Those that were looked for; the shipped ones where it is left out. Needed for users' own effects.
+
+    Returns
+    -------
+    StructuralModel
+        The model with what it lacked; the same model where findings are in the measuring chain only, or none.
+    """
+    known = effects or shipped_effects()
+    found = [(known[one.effect], one) for one in diagnosis.findings if one.effect in known]
+    structural = [(effect, one) for effect, one in found if effect.chain(_place(one)) is None]
+    if not structural or diagnosis.curves is None:
+        return model
+    specimen = _specimen(model, diagnosis.curves)
+    total = NOTHING
+    for effect, finding in structural:
+        total = total + effect.build(specimen, _place(finding))(np.array(finding.values))
+    return with_change(model, total)
+
+
+def _specimen(model: StructuralModel, curves: Curves) -> Specimen:
+    """Gather what effects may know, as it was when they were searched for."""
+    layout = lay_out(curves.labels)
+    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    highest = float(curves.s.imag.max())
+    return Specimen(
+        basis=make_basis(model, highest, places),
+        layout=layout,
+        band_hz=(float(curves.s.imag.min()) / (2 * np.pi), highest / (2 * np.pi)),
+        contour=curves.s,
+        options=DiagnoseOptions(),
+    )
+
+
+def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None) -> FrfSet:
+    """Take the findings in the measuring chain out of FRFs.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        As measured.
+    diagnosis : Diagnosis
+        Of them.
+    effects : mapping of str to Effect, optional
+        As for `apply_to_model`.
+
+    Returns
+    -------
+    FrfSet
+        What a faultless measuring chain would have shown, its sensors where they really are.
+    """
+    change = _chain(diagnosis, effects or shipped_effects())
+    if not (change.channels or change.moved):
+        return frfs
+    factors = np.ones(frfs.values.shape, np.complex128)
+    for index, label in enumerate(frfs.labels):
+        output, struck = _channels(label)
+        if output in change.channels:
+            factors[:, index] /= change.channels[output](frfs.s)
+        if struck in change.channels:
+            factors[:, index] *= change.channels[struck](frfs.s)
+    return replace(
+        frfs,
+        values=frfs.values * factors,
+        variance=frfs.variance * np.abs(factors) ** 2,
+        labels=tuple(_where_it_is(label, change.moved) for label in frfs.labels),
+    )
+
+
+def _chain(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Change:
+    """Everything that the findings change in the measuring chain."""
+    total = NOTHING
+    for finding in diagnosis.findings:
+        build = known[finding.effect].chain(_place(finding)) if finding.effect in known else None
+        if build is not None:
+            total = total + build(np.array(finding.values))
+    return total
+
+
+def _place(finding: Finding) -> Place:
+    text = {name: value for name, value in finding.parameters.items() if isinstance(value, str)}
+    return Place(key=finding.key, location=finding.location, text=text)
+
+
+def _channels(label: FrfLabel) -> tuple[str, str]:
+    return label.output_channel or f"output {label.output_dof}", label.input_channel or f"input {label.input_dof}"
+
+
+def _where_it_is(label: FrfLabel, moved: Mapping[str, int]) -> FrfLabel:
+    node = moved.get(_channels(label)[0])
+    if node is None:
+        return label
+    return replace(label, output_dof=Dof(node, label.output_dof.direction, label.output_dof.sign))

@@ -1,0 +1,248 @@
+"""What a diagnosis says: verdict, findings with their certainty, and the figures and curves that prove it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.frf import FrfLabel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gate:
+    """A check of the measurement that needs no model.
+
+    Parameters
+    ----------
+    name : str
+        ``homogeneity``, ``reciprocity`` or ``coherence``.
+    value : float
+        Mean squared difference over its expected square; NaN where it could not be checked.
+    limit : float
+        What it stays below where nothing is wrong.
+    statement : str
+        A sentence for the user.
+    """
+
+    name: str
+    value: float
+    limit: float
+    statement: str
+
+    @property
+    def passed(self) -> bool:
+        """True where nothing is wrong, or nothing could be checked."""
+        return not self.value > self.limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """How far a model is from a measurement.
+
+    Parameters
+    ----------
+    training, held_out : float
+        Norm of measured minus model over the norm of measured, on what was fitted and on what was not.
+    training_noise, held_out_noise : float
+        The same norms over what noise and tolerances make one expect.
+    """
+
+    training: float
+    held_out: float
+    training_noise: float
+    held_out_noise: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ambiguity:
+    """Explanations that these data cannot tell apart.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Names, the most probable first.
+    separation_nats : float
+        How much more probable the first is than the last.
+    resolve_by : str
+        The blow or sensor that would tell them apart.
+    """
+
+    effects: tuple[str, ...]
+    separation_nats: float
+    resolve_by: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curves:
+    """FRFs beside the imaginary axis, to be drawn.
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    labels : tuple of FrfLabel
+        One an FRF.
+    measured, nominal, updated, explained : (n_points, n_frfs) complex array
+        As measured; of the model as it is, with what its tolerances allow, and with the findings.
+    expected : (n_points, n_frfs) array
+        Standard deviation of noise and of what no parameter of the model stands for.
+    """
+
+    s: ComplexArray
+    labels: tuple[FrfLabel, ...]
+    measured: ComplexArray
+    nominal: ComplexArray
+    updated: ComplexArray
+    explained: ComplexArray
+    expected: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Diagnosis:
+    """What is missing from a nominal model, if anything.
+
+    Parameters
+    ----------
+    verdict : str
+        ``consistent``, ``explained`` or ``unexplained``.
+    findings : tuple of Finding
+        What is missing, the heaviest first; with ``unexplained``, the part that is explained.
+    alternatives : tuple of Finding
+        Other explanations, the most probable first.
+    mismatch_hz : (n,) array
+        Frequencies at which the nominal model disagrees with the measurement, Hz.
+    mismatch_where : str
+        Which FRFs, bands and DOFs disagree, and by how much.
+    mismatch : DataFrame
+        One row an FRF and band: ``frf``, ``low_hz``, ``high_hz``, ``before``, ``after``: rms misfit over what noise and
+        tolerances explain.
+    before, updated, after : Misfit
+        Of the model as it is, with what its tolerances allow, and with the findings.
+    held : str
+        What was not shown to the fit: ``blows`` or ``lines``.
+    ambiguity : tuple of Ambiguity
+        What cannot be told apart.
+    gates : tuple of Gate
+        Checks of the measurement alone.
+    detectability : mapping of str to mapping
+        Smallest detectable size of each effect, by parameter, where it shows best.
+    statement : str
+        The verdict in a few sentences.
+    curves : Curves, optional
+        FRFs to draw.
+    numbers : mapping of str to float
+        What the verdict rests on: evidence, misfits, pulls, hypotheses tried.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    alternatives: tuple[Finding, ...]
+    mismatch_hz: FloatArray
+    mismatch_where: str
+    mismatch: pd.DataFrame
+    before: Misfit
+    updated: Misfit
+    after: Misfit
+    held: str
+    ambiguity: tuple[Ambiguity, ...] = ()
+    gates: tuple[Gate, ...] = ()
+    detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    statement: str = ""
+    curves: Curves | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the content of ``diagnosis.json``.
+
+        Returns
+        -------
+        dict
+            Plain values.
+        """
+        return {
+            "verdict": self.verdict,
+            "statement": self.statement,
+            "findings": [_finding(finding) for finding in self.findings],
+            "alternatives": [_finding(finding) for finding in self.alternatives],
+            "mismatch": {
+                "frequency_hz": [round(float(value), 6) for value in self.mismatch_hz],
+                "where": self.mismatch_where,
+            },
+            "fit": {
+                "before": _misfit(self.before),
+                "updated_without_findings": _misfit(self.updated),
+                "after": _misfit(self.after),
+                "held_out_is": self.held,
+            },
+            "ambiguity": [
+                {
+                    "effects": list(one.effects),
+                    "separation_nats": _plain(one.separation_nats),
+                    "resolve_by": one.resolve_by,
+                }
+                for one in self.ambiguity
+            ],
+            "gates": [
+                {
+                    "name": gate.name,
+                    "value": _plain(gate.value),
+                    "limit": gate.limit,
+                    "passed": gate.passed,
+                    "statement": gate.statement,
+                }
+                for gate in self.gates
+            ],
+            "detectability": {name: _all_plain(sizes) for name, sizes in self.detectability.items()},
+            "numbers": _all_plain(self.numbers),
+            "warnings": list(self.warnings),
+        }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {
+        "effect": finding.effect,
+        "location": _location(finding.location),
+        "parameters": {name: _parameter(value) for name, value in finding.parameters.items()},
+        "probability": _plain(finding.probability),
+        "log_evidence_gain": _plain(finding.log_evidence_gain),
+        "statement": finding.statement,
+        "location_set": [_location(location) for location in finding.location_set],
+        "significant": finding.is_significant,
+    }
+
+
+def _location(location: Mapping[str, object]) -> dict[str, object]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
+
+
+def _parameter(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name
+    if isinstance(value, str):
+        return value
+    return {"value": _plain(value.value), "std": _plain(value.std), "ci95": [_plain(value.low), _plain(value.high)]}
+
+
+def _misfit(misfit: Misfit) -> dict[str, float | None]:
+    return {
+        "training": _plain(misfit.training),
+        "held_out": _plain(misfit.held_out),
+        "training_over_noise": _plain(misfit.training_noise),
+        "held_out_over_noise": _plain(misfit.held_out_noise),
+    }
+
+
+def _all_plain(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: _plain(value) for name, value in values.items()}
+
+
+def _plain(value: float) -> float | None:
+    """JSON knows no NaN and no infinity."""
+    number = float(value)
+    return number if abs(number) < float("inf") else None

@@ -1,0 +1,1 @@
+"""From fits to what is said: gates, figures, verdict, probabilities, ambiguities."""

@@ -1,0 +1,163 @@
+"""Transfer functions away from the axis, and their errors, from FRFs on lines.
+
+What is analytic in the right half of the s-plane follows there from its values along a line, by Cauchy's integral. A
+factor that falls with the distance makes the integral forget what is far from the piece of the band that is looked at:
+``H(s) = 1 / (2 pi) int H(s') (2 d)^2 / ((d + i x)^2 (d - i x)) d omega'`` with ``x = omega' - omega`` and d the
+distance from the line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.measured.contour import COARSE_WIDTH, Resonances, find_resonances
+from frf_ipz.diagnosis.measured.transfer import Measured
+from frf_ipz.errors import InputError
+from frf_ipz.frf import FrfSet
+
+SPACINGS = 1.5  # of the lines: nearer to them, the sum is no integral any more
+OF_THE_WAY = 0.3  # to the nearer end of the lines: farther from them, what lies beyond is missed
+BEYOND = 3.0  # times an FRF's size: what may lie beyond the ends of the band
+FEWEST_LINES = 16
+STRETCH = 51  # lines over which unknown noise is taken as even
+MEDIAN_OF_NOISE = 0.69  # of its mean: the median of a squared modulus
+UNKNOWN_PART = 0.003  # of an FRF's size: error that nobody stated
+SECOND_DIFFERENCE = 6.0  # variance of H(-1) - 2 H(0) + H(1) over that of H
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrfSurvey:
+    """FRFs, ready to be taken off their lines.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        In the band.
+    variance : (n_lines, n_frfs) array
+        Of their errors; estimated from line to line where it was not stated.
+    resonances : Resonances
+        Peaks of all FRFs.
+    least_decay_1_s : float
+        Smallest sigma that lines so far apart allow.
+    """
+
+    frfs: FrfSet
+    variance: FloatArray
+    resonances: Resonances
+    least_decay_1_s: float
+
+
+def survey_frfs(frfs: FrfSet, band_hz: tuple[float, float]) -> FrfSurvey:
+    """Find resonances and errors of FRFs.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        On lines.
+    band_hz : pair of float
+        Hz.
+
+    Returns
+    -------
+    FrfSurvey
+        What `measure_frfs` needs.
+
+    Raises
+    ------
+    InputError
+        If the band has too few lines.
+    """
+    inside = frfs.lines(frfs.in_band(band_hz) & (frfs.frequency_hz > 0))
+    if inside.n_lines < FEWEST_LINES:
+        raise InputError(
+            f"the band {band_hz[0]:g} to {band_hz[1]:g} Hz has {inside.n_lines} lines; a diagnosis needs at least "
+            f"{FEWEST_LINES}, so widen [fit] band_hz or measure finer lines"
+        )
+    omega = 2 * np.pi * inside.frequency_hz
+    size = np.abs(inside.values) ** 2
+    level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
+    spacing = float(np.median(np.diff(omega)))
+    return FrfSurvey(
+        frfs=inside,
+        variance=_variance(inside),
+        resonances=find_resonances(omega, level, inside.window_decay_1_s),
+        least_decay_1_s=inside.window_decay_1_s + SPACINGS * spacing,
+    )
+
+
+def _variance(frfs: FrfSet) -> FloatArray:
+    second = np.zeros_like(frfs.values)
+    second[1:-1] = frfs.values[:-2] - 2 * frfs.values[1:-1] + frfs.values[2:]
+    second[[0, -1]] = second[[1, -2]]
+    rough = np.abs(second) ** 2 / SECOND_DIFFERENCE
+    even = median_filter(rough, size=(min(STRETCH, frfs.n_lines), 1), mode="nearest") / MEDIAN_OF_NOISE
+    guessed = even + (UNKNOWN_PART * np.abs(frfs.values)) ** 2
+    return np.where(np.isfinite(frfs.variance) & (frfs.variance > 0), frfs.variance, guessed)
+
+
+def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
+    """Evaluate transfer functions on a contour.
+
+    Parameters
+    ----------
+    found : FrfSurvey
+        Of the FRFs.
+    s : (n_points,) complex array
+        rad/s; where it goes too far from the lines it is brought nearer.
+
+    Returns
+    -------
+    Measured
+        With the covariance of their errors.
+    """
+    frfs = found.frfs
+    placed = _within_reach(found, s)
+    weights = _weights(frfs, placed)
+    values = weights @ frfs.values
+    wide = _within_reach(found, np.maximum(placed.real, COARSE_WIDTH * placed.imag) + 1j * placed.imag, keep=True)
+    size = np.maximum(np.abs(values), np.abs(_weights(frfs, wide) @ frfs.values))
+    inputs = list(frfs.input_dofs)
+    missed = (_missed(found, placed)[:, None] * size) ** 2
+    noise = [(weights * column) @ weights.conj().T for column in found.variance.T]
+    return Measured(
+        s=placed,
+        labels=frfs.labels,
+        values=values,
+        size=size,
+        covariance=np.array([own + np.diag(lost) for own, lost in zip(noise, missed.T, strict=True)]),
+        common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
+        input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
+    )
+
+
+def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> ComplexArray:
+    """Bring points near enough to the lines; leave out those at the ends of the band, unless all are wanted."""
+    frfs = found.frfs
+    omega = 2 * np.pi * frfs.frequency_hz
+    reach = OF_THE_WAY * np.minimum(s.imag - omega[0], omega[-1] - s.imag)
+    farthest = frfs.window_decay_1_s + np.maximum(reach, 0.0)
+    kept = np.full(len(s), fill_value=True) if keep else farthest >= found.least_decay_1_s
+    sigma = np.maximum(np.minimum(s.real, farthest), found.least_decay_1_s)
+    return np.asarray(sigma[kept] + 1j * s.imag[kept])
+
+
+def _missed(found: FrfSurvey, s: ComplexArray) -> FloatArray:
+    """Relative error by what lies beyond the ends of the band."""
+    omega = 2 * np.pi * found.frfs.frequency_hz
+    ends = np.minimum(s.imag - omega[0], omega[-1] - s.imag)
+    distance = s.real - found.frfs.window_decay_1_s
+    return np.asarray(BEYOND * (2 * distance) ** 2 / (4 * np.pi * np.maximum(ends, distance) ** 2))
+
+
+def _weights(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
+    """Give what each line contributes to each point, (n_points, n_lines)."""
+    omega = 2 * np.pi * frfs.frequency_hz
+    share = np.gradient(omega) / (2 * np.pi)
+    distance = (s.real - frfs.window_decay_1_s)[:, None]
+    along = omega[None] - s.imag[:, None]
+    kernel = (2 * distance) ** 2 / ((distance + 1j * along) ** 2 * (distance - 1j * along)) * share
+    return np.asarray(kernel / kernel.sum(1, keepdims=True))

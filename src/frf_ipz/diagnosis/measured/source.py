@@ -1,0 +1,139 @@
+"""One door to transfer functions on contours, from blows or from FRFs; and what of them is kept for a check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour
+from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
+from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, measure_frfs, survey_frfs
+from frf_ipz.errors import InputError
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, IntArray
+    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+ENOUGH_BLOWS = 3  # at a place: one of them can be kept for the check, the rest still tell the noise
+EVERY = 4  # points of the contour: one is kept for the check where blows are too few
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Source:
+    """What is measured, divided into what is fitted and what is kept for the check.
+
+    Parameters
+    ----------
+    coarse, training, held_out : Measured
+        Far from the axis; near it; near it and never fitted.
+    survey : Survey or FrfSurvey
+        Noise and resonances of what is fitted.
+    held : str
+        What was kept for the check: ``blows`` or ``lines``.
+    held_names : tuple of str
+        The blows that were kept.
+    """
+
+    coarse: Measured
+    training: Measured
+    held_out: Measured
+    survey: Survey | FrfSurvey
+    held: str
+    held_names: tuple[str, ...] = ()
+
+
+def divide(observations: Observations) -> Source:
+    """Measure, and keep something for the check.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows, records or FRFs.
+
+    Returns
+    -------
+    Source
+        Transfer functions.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to look at.
+    """
+    if not observations.blows:
+        return _of_frfs(observations)
+    kept = _kept_blows(observations)
+    names = {blow.name for blow in kept}
+    fitted = tuple(blow for blow in observations.blows if blow.name not in names)
+    found = survey(replace(observations, blows=fitted))
+    coarse = measure(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
+    s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
+    near = measure(found, s)
+    if not kept:
+        return _by_points(coarse, near, found)
+    held = measure(like(found, replace(observations, blows=kept)), s)
+    return Source(
+        coarse=coarse, training=near, held_out=held, survey=found, held="blows", held_names=tuple(sorted(names))
+    )
+
+
+def _kept_blows(observations: Observations) -> tuple[Blow, ...]:
+    """One of the stronger blows of every place and layout of sensors, if each has enough of them."""
+    groups: dict[tuple[object, ...], list[Blow]] = {}
+    for dof in observations.input_dofs:
+        for blow in observations.at(dof):
+            key = (blow.input_dof, *((sensor.channel, sensor.dof) for sensor in blow.sensors))
+            groups.setdefault(key, []).append(blow)
+    if observations.kind != "hammer" or min(len(group) for group in groups.values()) < ENOUGH_BLOWS:
+        return ()
+    return tuple(group[1] for group in groups.values())
+
+
+def _of_frfs(observations: Observations) -> Source:
+    if observations.frfs is None:
+        raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
+    found = survey_frfs(observations.frfs, observations.band_hz)
+    coarse = measure_frfs(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
+    near = measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
+    return _by_points(coarse, near, found)
+
+
+def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey) -> Source:
+    number = np.arange(len(near.s))
+    held = number % EVERY == EVERY // 2
+    return Source(
+        coarse=coarse,
+        training=points_of(near, np.flatnonzero(~held)),
+        held_out=points_of(near, np.flatnonzero(held)),
+        survey=found,
+        held="lines",
+    )
+
+
+def points_of(measured: Measured, kept: IntArray) -> Measured:
+    """Keep some points of a contour.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions.
+    kept : (n,) int array
+        Which points.
+
+    Returns
+    -------
+    Measured
+        Those points.
+    """
+    s: ComplexArray = measured.s[kept]
+    return replace(
+        measured,
+        s=s,
+        values=measured.values[kept],
+        size=measured.size[kept],
+        covariance=measured.covariance[:, kept[:, None], kept],
+        common=tuple(shared[kept] for shared in measured.common),
+    )

@@ -1,0 +1,129 @@
+"""Lays out everything that a search works with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.measured.transfer import Whitening, whiten
+from frf_ipz.diagnosis.physics.basis import make_basis
+from frf_ipz.diagnosis.physics.change import NOTHING
+from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.diagnosis.physics.nuisance import UNIFORM, make_nuisance
+from frf_ipz.diagnosis.physics.response import modify, respond, rows_of
+from frf_ipz.diagnosis.search.bench import Bench
+from frf_ipz.diagnosis.search.polish import Data
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.measured.source import Source
+    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.options import DiagnoseOptions
+    from frf_ipz.diagnosis.physics.basis import Basis
+    from frf_ipz.diagnosis.physics.layout import Layout
+    from frf_ipz.diagnosis.physics.nuisance import Nuisance
+    from frf_ipz.structure import StructuralModel
+
+EARLY_FLOOR = 8.0  # times the model's errors: first steps see past narrow peaks
+
+
+def set_up(
+    model: StructuralModel,
+    source: Source,
+    band_hz: tuple[float, float],
+    options: DiagnoseOptions,
+    effects: Mapping[str, Effect],
+    *,
+    free_gains: str = "none",
+) -> Bench:
+    """Bring model and measurement together.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The nominal model.
+    source : Source
+        What was measured.
+    band_hz : pair of float
+        Hz.
+    options : DiagnoseOptions
+        Tolerances.
+    effects : mapping of str to Effect
+        What is looked for.
+    free_gains : str
+        ``none``, ``common`` or ``per_channel``: gains that nobody knows.
+
+    Returns
+    -------
+    Bench
+        Ready for a search.
+
+    Raises
+    ------
+    InputError
+        If the model lacks a DOF that was measured.
+    """
+    layout = lay_out(source.training.labels)
+    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    basis = make_basis(model, 2 * np.pi * band_hz[1], places)
+    nuisance = make_nuisance(basis, layout, options)
+    coarse = source.coarse if free_gains == "none" else _scaled(source.coarse, basis, layout, nuisance, free_gains)
+    specimen = Specimen(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
+    return Bench(
+        specimen=specimen,
+        nuisance=nuisance,
+        effects=effects,
+        coarse=coarse,
+        data=with_errors(source.training, options, free_gains=free_gains),
+        early=with_errors(source.training, options, free_gains=free_gains, floor=EARLY_FLOOR),
+    )
+
+
+def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str = "none", floor: float = 1.0) -> Data:
+    """Put tolerances beside measurements.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions.
+    options : DiagnoseOptions
+        Tolerances.
+    free_gains : str
+        As for `set_up`.
+    floor : float
+        Factor of the model's errors.
+
+    Returns
+    -------
+    Data
+        To fit to.
+    """
+    whitening = whiten(
+        measured,
+        tolerance=options.stiffness_tolerance,
+        gain_std=options.gain_tolerance * UNIFORM,
+        floor=floor,
+        free_gains=free_gains,
+    )
+    return Data(measured=measured, whitening=whitening, free_gains=free_gains)
+
+
+def _scaled(measured: Measured, basis: Basis, layout: Layout, nuisance: Nuisance, free_gains: str) -> Measured:
+    """Bring measured FRFs of unknown scale to the scale of the nominal model."""
+    unknowns = nuisance.unpack(np.zeros(nuisance.size))
+    modes = modify(basis, NOTHING, rows_of(basis, layout, NOTHING, nuisance), unknowns)
+    nominal = respond(modes, NOTHING, layout, unknowns, measured.s, basis)
+    whitening = Whitening(factors=np.zeros((0, 0, 0), complex), blocks=())
+    gains = Data(measured=measured, whitening=whitening, free_gains=free_gains).gains(nominal)
+    size = np.abs(gains)
+    return replace(
+        measured,
+        values=measured.values / gains,
+        size=measured.size / size,
+        covariance=measured.covariance / size[:, None, None] ** 2,
+    )
