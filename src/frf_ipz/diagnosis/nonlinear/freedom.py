@@ -113,7 +113,7 @@ class Freedom:
         return np.asarray(np.einsum("cbm,cml->bl", self._starts(unknowns), free))
 
     def sensor_starts(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
-        """What sensors show of how stretches start.
+        """Give what sensors show of how stretches start.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Freedom:
 
 
 def _free_motion(response: PlantResponse, modes: IntArray, power: int) -> ComplexArray:
-    """Transforms of free vibrations, (2, n_free, n_lines), s / omega and s^2 / omega, as displacements.
+    """Transform free vibrations, (2, n_free, n_lines), s / omega and s^2 / omega, as displacements.
 
     They start with a modal displacement of 1 / omega, or with a velocity of 1. What is measured as velocity or
     acceleration and divided by s or s^2 lacks the polynomial in t that integration from rest leaves out.

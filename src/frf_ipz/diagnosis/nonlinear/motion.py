@@ -53,7 +53,7 @@ class Clock:
 
     def window(self) -> FloatArray:
         """(n_times,) exp(-sigma t), faded out at the end."""
-        return np.exp(-self.stretches.sigma_1_s * self.step_s * np.arange(self.n_times)) * self._fade()
+        return np.asarray(np.exp(-self.stretches.sigma_1_s * self.step_s * np.arange(self.n_times)) * self._fade())
 
     def at_times(self, lines: ComplexArray) -> FloatArray:
         """Signals, (n_blows, n_times), from their transforms, (n_blows, n_lines).
@@ -75,14 +75,14 @@ class Clock:
         return np.asarray(np.fft.irfft(padded, self.n_times, axis=-1) * (growth / self.step_s))
 
     def at_lines(self, signals: FloatArray) -> ComplexArray:
-        """Transforms, (..., n_lines), of signals, (..., n_times)."""
+        """Transform signals, (..., n_times), to (..., n_lines)."""
         window = self.window() * self.step_s
         window[0] /= 2  # a jump at the start counts by half; from rest there is nothing
         lines = np.fft.rfft(signals * window, axis=-1)
         return np.asarray(lines[..., : len(self.stretches.s)])
 
     def velocity(self, signals: FloatArray) -> FloatArray:
-        """Derivative of signals to the fourth order, (..., n_times)."""
+        """Derive signals, (..., n_times), to the fourth order."""
         ahead, back = np.roll(signals, -1, -1), np.roll(signals, 1, -1)
         far = np.roll(signals, -2, -1) - np.roll(signals, 2, -1)
         slope = (8 * (ahead - back) - far) / (12 * self.step_s)

@@ -1,6 +1,6 @@
-"""The linear part of a structure with a force law: modes, what lies above them, and all places a law could sit at.
+"""The linear part of a structure with a force law: modes, what lies above, and the places a law could sit at.
 
-Transfer functions join three kinds of points: struck ones, sensors, and places. Each is a sum over the modes up to a few
+Transfer functions join three kinds of points: struck ones, sensors, and places. Each is a sum over modes up to a few
 times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`Deviations`) moves
 frequencies, damping and the shapes at sensors and blows.
 """
@@ -21,7 +21,6 @@ from frf_ipz.fe.eigen import ModalBasis, damping_ratios, solve_basis
 from frf_ipz.fe.factorization import DENSE_ORDER
 
 if TYPE_CHECKING:
-
     from frf_ipz.diagnosis.observations import Observations, Sensor
     from frf_ipz.structure import StructuralModel
 

@@ -26,6 +26,7 @@ SETTLED = 1e-3  # relative change of the cost between turns
 DIFFERENCE = 1e-4  # of the shape: its derivative; kinks average out over many samples
 RIDGE = 1e-8  # of a column's own square: strength and shape may be one and the same where nothing is touched
 LARGEST_STEP = 0.3  # of the shape, a turn
+LEAST_COLUMN = 1e-100  # norm of a column: nothing is touched
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,56 +153,18 @@ def _motion(
 def _turn(
     stretches: Stretches, freedom: Freedom, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[LawFit, Start, ComplexArray]:
-    used, law = stretches.used, start.law
+    law = start.law
     response, w, v = _motion(stretches, freedom, start, clock, force)
-    unit = clock.at_lines(law.unit_force(w, v, start.shape))
-    on_used = PlantResponse(
-        plant=freedom.plant, s=stretches.s[used], deviations=response.deviations, modes=response.modes[:, used]
-    )
-    weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    to_sensors = response.to_sensors(start.place)[:, used]
-
-    def seen(lines: ComplexArray) -> FloatArray:
-        return as_real(-to_sensors * lines[:, None, used] * weight)
-
-    linear = linear_motion(stretches, freedom, response)
-    linear[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
-    misfit = as_real((stretches.motion - linear)[:, :, used] * weight)
-    shapes = freedom.plant.at_places.shapes[start.place]
-    columns = [as_real(freedom.columns(stretches, on_used, -start.strength * unit[:, used], shapes))]
-    columns.append(seen(unit)[None])
-    way = DIFFERENCE * start.shape
-    if law.shape_name:
-        bent = clock.at_lines(law.unit_force(w, v, start.shape + way) - law.unit_force(w, v, start.shape - way))
-        columns.append(seen(start.strength * bent / (2 * way))[None])
-    rows = np.concatenate(columns)
+    rows, misfit = _rows(stretches, freedom, start, response, _unit_forces(start, clock, w, v))
+    step, covariance = _solve(rows, misfit, start.unknowns)
     n = freedom.n_unknowns
-    sizes = np.ones(len(rows))
-    sizes[n:] = np.maximum(np.linalg.norm(rows[n:], axis=1), 1e-300)
-    rows /= sizes[:, None]
-    prior = np.zeros(len(rows))
-    prior[:n] = 1.0
-    prior[n:] = RIDGE
-    normal = rows @ rows.T + np.diag(prior)
-    # the law's force is in `rows` as a whole, not as a change: only the unknowns are counted from where they are
-    right = rows @ misfit
-    right[:n] -= start.unknowns
-    factor = linalg.cho_factor(normal, lower=True)
-    step = linalg.cho_solve(factor, right)
-    left = misfit - step @ rows
-    unknowns = start.unknowns + step[:n]
-    strength = float(step[n] / sizes[n])
-    if not law.strength_can_be_negative:
-        strength = max(strength, 0.0)
+    strength = float(step[n]) if law.strength_can_be_negative else max(float(step[n]), 0.0)
     shape = start.shape
     if law.shape_name:
-        shape *= 1 + float(np.clip(step[n + 1] / sizes[n + 1] / shape, -LARGEST_STEP, LARGEST_STEP))
-    covariance = np.zeros((2, 2))
-    count = len(rows) - n
-    inverse = linalg.cho_solve(factor, np.eye(len(rows))[:, n:])[n:]
-    covariance[:count, :count] = inverse / np.outer(sizes[n:], sizes[n:])
+        shape *= 1 + float(np.clip(step[n + 1] / shape, -LARGEST_STEP, LARGEST_STEP))
+    unknowns = start.unknowns + step[:n]
+    left = misfit - step @ rows
     following = replace(start, strength=strength, shape=shape, unknowns=unknowns)
-    force = strength * clock.at_lines(law.unit_force(w, v, shape))
     fit = LawFit(
         law=law,
         place=start.place,
@@ -213,7 +176,52 @@ def _turn(
         covariance=covariance,
         motion=w,
         velocity=v,
-        force=force,
+        force=strength * clock.at_lines(law.unit_force(w, v, shape)),
         misfit=left,
     )
-    return fit, following, force
+    return fit, following, fit.force
+
+
+def _unit_forces(start: Start, clock: Clock, w: FloatArray, v: FloatArray) -> list[ComplexArray]:
+    """Transform the force for a strength of 1, and its change by the shape."""
+    law, way = start.law, DIFFERENCE * start.shape
+    forces = [clock.at_lines(law.unit_force(w, v, start.shape))]
+    if law.shape_name:
+        bent = law.unit_force(w, v, start.shape + way) - law.unit_force(w, v, start.shape - way)
+        forces.append(clock.at_lines(bent * (start.strength / (2 * way))))
+    return forces
+
+
+def _rows(
+    stretches: Stretches, freedom: Freedom, start: Start, response: PlantResponse, forces: list[ComplexArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Give derivatives by unknowns, strength and shape, and the misfit without the law; weighted, (.., n_rows)."""
+    used = stretches.used
+    on_used = replace(response, s=stretches.s[used], modes=response.modes[:, used])
+    weight = 1 / np.sqrt(stretches.variance[:, :, used])
+    to_sensors = response.to_sensors(start.place)[:, used]
+    linear = linear_motion(stretches, freedom, response)
+    linear[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+    misfit = as_real((stretches.motion - linear)[:, :, used] * weight)
+    shapes = freedom.plant.at_places.shapes[start.place]
+    by_law = [as_real(-to_sensors * force[:, None, used] * weight)[None] for force in forces]
+    rows = [as_real(freedom.columns(stretches, on_used, -start.strength * forces[0][:, used], shapes)), *by_law]
+    return np.concatenate(rows), misfit
+
+
+def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Step of the unknowns, new strength and step of the shape; covariance of the last two, (2, 2)."""
+    n = len(unknowns)
+    sizes = np.ones(len(rows))
+    sizes[n:] = np.maximum(np.linalg.norm(rows[n:], axis=1), LEAST_COLUMN)
+    scaled = rows / sizes[:, None]
+    prior = np.full(len(rows), RIDGE)
+    prior[:n] = 1.0
+    # the law's force is in `rows` as a whole, not as a change: only the unknowns are counted from where they are
+    right = scaled @ misfit
+    right[:n] -= unknowns
+    factor = linalg.cho_factor(scaled @ scaled.T + np.diag(prior), lower=True)
+    covariance, count = np.zeros((2, 2)), len(rows) - n
+    inverse = linalg.cho_solve(factor, np.eye(len(rows))[:, n:])[n:]
+    covariance[:count, :count] = inverse / sizes[n:] / sizes[n:, None]
+    return np.asarray(linalg.cho_solve(factor, right)) / sizes, covariance

@@ -161,7 +161,7 @@ def screen(
 
 
 def linear_motion(stretches: Stretches, freedom: Freedom, response: PlantResponse) -> ComplexArray:
-    """What sensors show of the force, without unknown starts.
+    """Give what sensors show of the force, without unknown starts.
 
     Where a stretch starts in motion, modes above the free ones follow the force as if at rest; the force's own start
     is then missing in a velocity or an acceleration that is integrated from rest.
@@ -250,7 +250,9 @@ def _at_place(
     strength = slope / np.maximum(norm, 1e-300)
     guesses = []
     for law in laws:
-        mine = [i for i, (other, _) in enumerate(tried) if other is law and (law.strength_can_be_negative or slope[i] > 0)]
+        mine = [
+            i for i, (other, _) in enumerate(tried) if other is law and (law.strength_can_be_negative or slope[i] > 0)
+        ]
         if mine:
             best = max(mine, key=lambda i: slope[i] * strength[i])
             cost = fit.cost - float(slope[best] * strength[best])

@@ -7,7 +7,7 @@ at its start besides, which is unknown (`moving`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,8 +20,9 @@ from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.noise import ChannelNoise
     from frf_ipz.diagnosis.nonlinear.plant import Plant
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 
 DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
 THIN = 2  # lines are closer than the window resolves: every second one is independent enough
@@ -30,8 +31,6 @@ FINER = 8  # times as many samples, where a stretch starts with a jump
 BEFORE = 4  # samples before the pulse
 AROUND = 5  # lines over which a response's size is averaged
 OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
-QUIET_PART = 0.3  # quantile of a band of lines that holds noise, between resonances
-QUIET_MEDIAN = 0.42  # that quantile of the mean of a few exponential variables over their mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,7 +111,7 @@ class Window:
     floor: float = 0.01
 
 
-def transform(observations: Observations, plant: Plant, noise: FloatArray, window: Window) -> Stretches:
+def transform(observations: Observations, plant: Plant, noise: ChannelNoise, window: Window) -> Stretches:
     """Cut stretches and transform them.
 
     Parameters
@@ -121,8 +120,8 @@ def transform(observations: Observations, plant: Plant, noise: FloatArray, windo
         Blows or records.
     plant : Plant
         Names the sensors and blows.
-    noise : (n_sensors, 2) array
-        White and 1/f part of the density of each channel, see `channel_noise`.
+    noise : ChannelNoise
+        Of these observations.
     window : Window
         Which part.
 
@@ -151,13 +150,15 @@ def transform(observations: Observations, plant: Plant, noise: FloatArray, windo
         force[number], motion[number, rows] = lines[0], lines[1:]
         present[number, rows] = True
     motion /= s ** powers[:, None]
-    frequency = s.imag / (2 * np.pi)
-    density = noise[:, :1] + noise[:, 1:] / np.maximum(frequency, frequency[1])
-    known = density * (1 - np.exp(-2 * DECAYS)) / (2 * sigma) / np.abs(s) ** (2 * powers[:, None])
+    frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
+    energy = (1 - np.exp(-2 * DECAYS)) / (2 * sigma)
+    own = [noise.response_energy(_noise_row(noise, sensor), frequency, energy) for sensor in plant.sensors]
+    known = np.array(own) / np.abs(s) ** (2 * powers[:, None])
     low, high = observations.band_hz
     floor = np.where(frequency <= high, window.floor, OUTSIDE)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
-    variance = known + floor**2 * size
+    of_force = noise.force_energy(frequency, energy) / np.maximum(np.abs(force) ** 2, 1e-300)
+    variance = known + (floor**2 + np.minimum(of_force, 1.0)[:, None]) * size
     variance[~present] = np.inf
     return Stretches(
         s=s,
@@ -180,6 +181,7 @@ class _Cut:
     number: int
     blow: Blow
     start: int
+    _: KW_ONLY
     is_moving: bool
 
 
@@ -190,21 +192,22 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
         pulses = [isolate_pulse(blow) for blow in blows]
         starts = [max(int(np.argmax(np.abs(pulse.blow.force) > 0)) - BEFORE, 0) for pulse in pulses]
         n = min(wanted, *(blow.n_samples - start for blow, start in zip(blows, starts, strict=True)))
-        return [_Cut(i, pulse.blow, start, False) for i, (pulse, start) in enumerate(zip(pulses, starts, strict=True))], (
-            _fast_length(n)
-        )
+        return [
+            _Cut(i, pulse.blow, start, is_moving=False)
+            for i, (pulse, start) in enumerate(zip(pulses, starts, strict=True))
+        ], (_fast_length(n))
     shortest = min(blow.n_samples for blow in blows)
     n = _fast_length(min(wanted, shortest - 2 * EDGE))
     if observations.kind == "hammer":
         start = min(EDGE + round(window.start_s / step), shortest - n - EDGE)
-        return [_Cut(i, isolate_pulse(blow).blow, start, True) for i, blow in enumerate(blows)], n
+        return [_Cut(i, isolate_pulse(blow).blow, start, is_moving=True) for i, blow in enumerate(blows)], n
     room, count = shortest - n - 2 * EDGE, window.per_record
     parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
-    return [_Cut(i, blow, start, True) for i, blow in enumerate(blows) for start in parts], n
+    return [_Cut(i, blow, start, is_moving=True) for i, blow in enumerate(blows) for start in parts], n
 
 
 def _lines(cut: _Cut, n: int, sigma: float) -> tuple[ComplexArray, FloatArray]:
-    """Transforms of force and responses, and the force and its slope at the start.
+    """Transform force and responses, and read the force and its slope at the start.
 
     A signal that jumps at the start is not band-limited: the sum over samples is off by half the first one, and, on
     finer samples, by little more.
@@ -260,52 +263,12 @@ def common_step(observations: Observations) -> float:
     return float(steps.mean())
 
 
-def channel_noise(observations: Observations, plant: Plant) -> FloatArray:
-    """Read the noise of the response channels between the resonances of the records' second halves.
-
-    Parameters
-    ----------
-    observations : Observations
-        Blows or records.
-    plant : Plant
-        Names the sensors.
-
-    Returns
-    -------
-    (n_sensors, 2) array
-        White part, unit^2 s, and what is divided by the frequency in Hz, unit^2: two-sided densities. Of a shaker's
-        records, whose responses never end, only a trace.
-    """
-    found = np.zeros((len(plant.sensors), 2))
-    for row, sensor in enumerate(plant.sensors):
-        tails = []
-        for blow in observations.blows:
-            mine = [i for i, s in enumerate(blow.sensors) if (s.channel, s.dof) == (sensor.channel, sensor.dof)]
-            tails += [blow.responses[i, blow.n_samples // 2 :] for i in mine]
-        step = observations.blows[0].step_s
-        if observations.kind == "hammer":
-            found[row] = _quiet_density(tails, step)
-        else:
-            found[row, 0] = 1e-6 * step * np.mean([np.var(tail) for tail in tails])
-    return found
-
-
-def _quiet_density(tails: list[FloatArray], step_s: float) -> FloatArray:
-    n = min(len(tail) for tail in tails)
-    hann = np.hanning(n)
-    energy = np.mean([np.abs(np.fft.rfft((tail[:n] - tail[:n].mean()) * hann)) ** 2 for tail in tails], 0)
-    energy *= step_s / np.sum(hann**2)
-    edges = np.unique(np.geomspace(3, len(energy), 25).astype(int))
-    frequency = np.array([(a + b - 1) / 2 / (n * step_s) for a, b in zip(edges[:-1], edges[1:], strict=True)])
-    quiet = np.array([np.quantile(energy[a:b], QUIET_PART) for a, b in zip(edges[:-1], edges[1:], strict=True)])
-    quiet /= QUIET_MEDIAN ** (1 / len(tails))
-    white = float(np.median(np.sort(quiet)[: max(len(quiet) // 3, 1)]))
-    pink = float(np.quantile(np.maximum(quiet - white, 0.0) * frequency, 0.4))
-    return np.array([white, pink])
-
-
 def _fast_length(n: int) -> int:
     return int(prev_fast_len(n, real=True)) if n > 64 else int(next_fast_len(n, real=True))
+
+
+def _noise_row(noise: ChannelNoise, sensor: Sensor) -> int:
+    return noise.sensors.index((sensor.channel, sensor.dof))
 
 
 def _row(plant: Plant, channel: str, dof: object) -> int:

@@ -19,7 +19,7 @@ class CubicStiffness(Law):
     phrase = "a cubic spring of {} N/m^3"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
-        """The cube of the motion."""
+        """Cube the motion."""
         del v, shape
         return np.asarray(w**3)
 

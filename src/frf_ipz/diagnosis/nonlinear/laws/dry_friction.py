@@ -22,7 +22,7 @@ class DryFriction(Law):
     phrase = "dry friction of {} N"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
-        """The direction of the velocity."""
+        """Give the direction of the velocity."""
         del w
         return np.asarray(np.tanh(v / shape)) if shape > 0 else np.sign(v)
 
@@ -32,6 +32,6 @@ class DryFriction(Law):
         return PARTS * largest_v
 
     def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
-        """The force that stops the motion, or F_c where that is not enough."""
+        """Stop the motion, or slow it by F_c where that is not enough."""
         del w
         return np.clip(v / step.velocity, -step.strength, step.strength)

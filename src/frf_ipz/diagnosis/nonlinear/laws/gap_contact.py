@@ -19,7 +19,7 @@ class GapContact(Law):
     phrase = "a stop with a contact stiffness of {} N/m"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
-        """How far the motion goes beyond the gap."""
+        """Say how far the motion goes beyond the gap."""
         del v
         return np.maximum(w - shape, 0.0)
 

@@ -1,7 +1,7 @@
 """What a module of `laws` has to say about its force law.
 
-A law is one module with one class that derives from `Law`: the force for motion and velocity at its place, linear in one
-number (its strength), and perhaps bent by a second one (its shape). Search, fit, simulation and verdict follow from
+A law is one module with one class that derives from `Law`: the force for motion and velocity at its place, linear in
+one number (its strength), and perhaps bent by a second one (its shape). Search, fit, simulation and verdict follow from
 that. A class in a user's own file does the same::
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
@@ -17,6 +17,7 @@ that. A class in a user's own file does the same::
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -53,13 +54,12 @@ class Law(ABC):
     def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
         """Force at the end of a time step, where w and v are those without it and it gives way by the compliance.
 
-        The default is Newton's method on the force itself; a law with a kink or a jump had better say it in closed form.
+        The default is Newton's method on the force itself; a law with a kink or a jump is better off in closed form.
         """
         force = np.zeros_like(w)
         for _ in range(NEWTON_STEPS):
             here = step.strength * self.unit_force(w - step.motion * force, v - step.velocity * force, step.shape)
-            way = DIFFERENCE * np.maximum(np.abs(w), LEAST_WAY)
-            more = way / np.maximum(step.motion, LEAST_WAY)
+            more = DIFFERENCE * np.maximum(np.abs(w), LEAST_WAY) / max(step.motion, LEAST_WAY)
             there = step.strength * self.unit_force(
                 w - step.motion * (force + more), v - step.velocity * (force + more), step.shape
             )
@@ -67,18 +67,19 @@ class Law(ABC):
         return force
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class StepCompliance:
     """What a force at the end of a time step does to its own place, and the law's numbers.
 
     Parameters
     ----------
-    motion, velocity : array or float
+    motion, velocity : float
         Motion and velocity that a unit force takes away, m/N and m/s/N.
-    strength, shape : array or float
+    strength, shape : float
         Of the law.
     """
 
-    __slots__ = ("motion", "shape", "strength", "velocity")
-
-    def __init__(self, motion: FloatArray, velocity: FloatArray, strength: FloatArray, shape: FloatArray) -> None:
-        self.motion, self.velocity, self.strength, self.shape = motion, velocity, strength, shape
+    motion: float
+    velocity: float
+    strength: float
+    shape: float

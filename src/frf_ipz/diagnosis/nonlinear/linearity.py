@@ -1,0 +1,153 @@
+"""Does one linear system explain all blows of all levels? Asked of the recordings alone, without any model.
+
+Blows of a hammer start at rest: damped by exp(-sigma t) until nothing is left at their end, the responses over the
+forces must agree line by line. A shaker may have been running before: within a few neighbouring lines every linear
+system is a quotient of two short polynomials, the same for all records, and what a record starts and ends with is
+another one over the same denominator, of each record its own (the local rational method of [McKelveyGuerin2012]). What
+is left is compared with the noise of the channels and with a small part of the response.
+
+[McKelveyGuerin2012] T. McKelvey and G. Guerin, Non-parametric frequency response estimation using a local rational
+model, IFAC Proceedings 45(16), 2012, doi:10.3182/20120711-3-BE-2027.00299.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.nonlinear.noise import ChannelNoise, read_noise
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.dofs import Dof
+
+WIDTH = 24  # lines that are looked at together
+POLES, ZEROS, TRANSIENT = 2, 2, 2  # degrees of the local polynomials
+ROUNDS = 4  # of weights
+DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e-4
+BEFORE = 2  # samples before the pulse
+UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
+LEAST_RECORDS = 2
+LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearity:
+    """How far recordings of different levels disagree with any linear system.
+
+    Parameters
+    ----------
+    score : float
+        Largest misfit of all groups of lines over what noise explains; about 1 or less for a linear system.
+    limit : float
+        Above it, the system is not linear, or was not the same in all blows.
+    frequency_hz : (n_groups,) array
+        Middle of the groups of lines, of all struck places in turn.
+    misfit : (n_groups, n_sensors) array
+        Over what noise explains.
+    """
+
+    score: float
+    limit: float
+    frequency_hz: FloatArray
+    misfit: FloatArray
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """No linear system explains the recordings."""
+        return self.score > self.limit
+
+
+def assess_linearity(observations: Observations) -> Linearity:
+    """Compare all blows or records at each place with the best linear system.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records; places with a single one say nothing.
+
+    Returns
+    -------
+    Linearity
+        The verdict and where in the band it comes from.
+    """
+    noise = read_noise(observations)
+    parts = [_at_place(observations, dof, noise) for dof in observations.input_dofs]
+    frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
+    return Linearity(
+        score=float(misfit.max(initial=0.0)),
+        limit=LIMIT_HAMMER if noise.is_hammer else LIMIT_SHAKER,
+        frequency_hz=frequency,
+        misfit=misfit,
+    )
+
+
+def _at_place(observations: Observations, dof: Dof, noise: ChannelNoise) -> tuple[FloatArray, FloatArray]:
+    """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
+    blows = observations.at(dof)
+    chains = {tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) for blow in blows}
+    n, step = min(blow.n_samples for blow in blows), blows[0].step_s
+    low, high = observations.band_hz
+    frequency = np.asarray(np.fft.rfftfreq(n, step), float)
+    used = np.flatnonzero((frequency >= low) & (frequency <= high))
+    n_groups = len(used) // WIDTH if len(blows) >= LEAST_RECORDS and len(chains) == 1 else 0
+    used = used[: n_groups * WIDTH]
+    middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
+    misfit = np.zeros((n_groups, len(noise.sensors)))
+    if not n_groups:
+        return middle, misfit
+    sigma = DECAYS / (n * step) if noise.is_hammer else 0.0
+    lines = [_lines(blow, noise, n, sigma)[:, used] for blow in blows]
+    length = (1 - np.exp(-2 * DECAYS)) / (2 * sigma) if sigma else n * step
+    of_force = noise.force_energy(frequency[used], n * step)
+    for row, sensor in enumerate(blows[0].sensors):
+        column = noise.sensors.index((sensor.channel, sensor.dof))
+        energies = np.array([of_force, noise.response_energy(column, frequency[used], length)])
+        for group in range(n_groups):
+            here = slice(group * WIDTH, (group + 1) * WIDTH)
+            force, motion = (np.array([line[i, here] for line in lines]) for i in (0, 1 + row))
+            left = _apart if noise.is_hammer else _left
+            misfit[group, column] = left(force, motion, energies[:, here])
+    return middle, misfit
+
+
+def _lines(blow: Blow, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:
+    """Transform force and responses, a blow's from its pulse on."""
+    signals = np.vstack([noise.force_of(blow), blow.responses])[:, :n]
+    if sigma:
+        start = max(int(np.argmax(np.abs(signals[0]) > 0)) - BEFORE, 0)
+        signals = np.hstack([signals[:, start:], np.zeros((len(signals), start))])
+    return np.asarray(np.fft.rfft(signals * np.exp(-sigma * blow.step_s * np.arange(signals.shape[1])))) * blow.step_s
+
+
+def _variance(motion: ComplexArray, frf: ComplexArray, energies: FloatArray) -> FloatArray:
+    return np.asarray(energies[1] + np.abs(frf) ** 2 * energies[0] + (UNEXPLAINED * np.abs(motion)) ** 2)
+
+
+def _apart(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+    """Misfit of one FRF for all blows over its expectation; force and motion are (n_blows, WIDTH)."""
+    frf = np.sum(motion * force.conj(), 0) / np.sum(np.abs(force) ** 2, 0)
+    variance = _variance(motion, frf, energies)
+    frf = np.sum(motion * force.conj() / variance, 0) / np.sum(np.abs(force) ** 2 / variance, 0)
+    return float(np.sum(np.abs(motion - frf * force) ** 2 / variance) / (motion.size - motion.shape[1]))
+
+
+def _left(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+    """Misfit of the best local quotient over its expectation; force and motion are (n_records, WIDTH)."""
+    n_blows, n_lines = motion.shape
+    powers = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(max(POLES, ZEROS, TRANSIENT) + 1)
+    below, above, ends = powers[:, 1 : POLES + 1], powers[:, : ZEROS + 1], powers[:, : TRANSIENT + 1]
+    common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_blows * n_lines, -1)
+    columns = np.hstack([common, np.kron(np.eye(n_blows), ends)])
+    denominator, frf = np.ones(n_lines, complex), np.zeros(n_lines, complex)
+    total = 0.0
+    for _ in range(ROUNDS):
+        weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
+        found, *_ = np.linalg.lstsq(columns * weight[:, None], motion.ravel() * weight, rcond=1e-12)
+        total = float(np.sum(np.abs((motion.ravel() - columns @ found) * weight) ** 2))
+        denominator = 1 + below @ found[:POLES]
+        frf = (above @ found[POLES : POLES + ZEROS + 1]) / denominator
+    return float(total / (motion.size - columns.shape[1]))
