@@ -1,0 +1,211 @@
+"use strict";
+// Draws the pictures of the page: those on the screen at once, the others when the browser has time.
+(() => {
+  const page = JSON.parse(document.getElementById("page-data").textContent);
+  const root = document.documentElement;
+  const THEMES = {
+    light: {
+      ink: "#1b1f24", muted: "#59636e", grid: "#e4e8ec", paper: "#ffffff",
+      measured: "#1b1f24", nominal: "#b45f00", updated: "#0072b2", reference: "#1b1f24", good: "#00795a", bad: "#c44601",
+      c0: "#0072b2", c1: "#c44601", c2: "#00795a", c3: "#a3408a", c4: "#8a6a00", c5: "#4b4fc4", c6: "#59636e",
+    },
+    dark: {
+      ink: "#e6e9ed", muted: "#a3adb8", grid: "#2c343d", paper: "#14181d",
+      measured: "#e6e9ed", nominal: "#f0a03c", updated: "#5cb8f2", reference: "#e6e9ed", good: "#35c79f", bad: "#ff8a4c",
+      c0: "#5cb8f2", c1: "#ff8a4c", c2: "#35c79f", c3: "#e88fc6", c4: "#e8d04a", c5: "#a9abff", c6: "#a3adb8",
+    },
+  };
+  const PRINT_WIDTH = 680;
+  const decoded = [];
+  const drawn = new Map();
+  let theme = "light";
+  let hidden = new Set(page.hiddenFrfs);
+  let range = null;
+  let scale = page.frequencyScale;
+  let printing = false;
+
+  function array(index) {
+    if (!decoded[index]) {
+      const text = atob(page.arrays[index]);
+      const bytes = Uint8Array.from(text, (c) => c.charCodeAt(0));
+      decoded[index] = new Float32Array(bytes.buffer);
+    }
+    return decoded[index];
+  }
+
+  function colour(text) {
+    const [name, opacity] = text.slice(1).split("/");
+    const hex = THEMES[theme][name] || THEMES[theme].muted;
+    if (!opacity) return hex;
+    const part = (from) => parseInt(hex.slice(from, from + 2), 16);
+    return `rgba(${part(1)},${part(3)},${part(5)},${opacity})`;
+  }
+
+  function unpack(node) {
+    if (typeof node === "string") return node[0] === "@" ? colour(node) : node;
+    if (Array.isArray(node)) return node.map(unpack);
+    if (node === null || typeof node !== "object") return node;
+    if ("$" in node) return array(node.$);
+    return Object.fromEntries(Object.entries(node).map(([key, value]) => [key, unpack(value)]));
+  }
+
+  function themed(layout, element) {
+    const { ink, muted, grid, paper } = THEMES[theme];
+    const base = {
+      paper_bgcolor: paper, plot_bgcolor: paper, font: { family: "system-ui, sans-serif", size: 12.5, color: ink },
+      margin: { l: 74, r: 18, t: 34, b: 46 }, hovermode: "closest", dragmode: "zoom", autosize: true,
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11.5 } },
+      hoverlabel: { bgcolor: paper, bordercolor: muted, font: { color: ink, size: 12 }, namelength: -1 },
+    };
+    const full = { ...base, ...layout };
+    full.width = printing ? PRINT_WIDTH : undefined;
+    for (const key of Object.keys(full).filter((name) => /^[xy]axis\d*$/.test(name))) {
+      const line = { gridcolor: grid, linecolor: muted, zerolinecolor: grid, tickcolor: muted, automargin: true, showline: true };
+      full[key] = { ...line, ticks: "outside", ...full[key] };
+    }
+    if ("frequency" in element.dataset) {
+      const shown = range || layout.xaxis.range;
+      full.xaxis = { ...full.xaxis, type: scale, range: scale === "log" ? shown.map(logarithm) : [...shown] };
+    }
+    return full;
+  }
+
+  const logarithm = (value) => Math.log10(Math.max(value, page.lowestHz));
+
+  function traces(picture) {
+    return unpack(picture.data).map((trace) => {
+      const frf = trace.meta && trace.meta.frf;
+      return frf !== undefined && hidden.has(frf) ? { ...trace, visible: false } : trace;
+    });
+  }
+
+  function draw(name) {
+    const picture = page.pictures[name];
+    const figure = document.getElementById(name);
+    const plot = figure.querySelector(".plot");
+    const config = { responsive: !printing, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
+    Plotly.react(plot, traces(picture), themed(unpack(picture.layout), figure), config);
+    if (!drawn.has(name)) {
+      drawn.set(name, plot);
+      plot.on("plotly_relayout", (change) => follow(name, change));
+      plot.addEventListener("keydown", (event) => steer(event, name));
+    }
+  }
+
+  function redraw() {
+    for (const name of drawn.keys()) draw(name);
+  }
+
+  // Linked frequency axes: what one picture shows, all show.
+  function follow(name, change) {
+    const figure = document.getElementById(name);
+    if (!("frequency" in figure.dataset)) return;
+    if (change["xaxis.autorange"]) show(null);
+    else if (change["xaxis.range[0]"] !== undefined) {
+      const ends = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+      show(scale === "log" ? ends.map((end) => 10 ** end) : ends, name);
+    }
+  }
+
+  function show(ends, except) {
+    range = ends;
+    for (const [name, plot] of drawn) {
+      const figure = document.getElementById(name);
+      if (name === except || !("frequency" in figure.dataset)) continue;
+      const shown = range || page.pictures[name].layout.xaxis.range;
+      plot.layout.xaxis.range = scale === "log" ? shown.map(logarithm) : [...shown];
+      plot.layout.xaxis.autorange = false;
+      Plotly.redraw(plot);
+    }
+  }
+
+  function steer(event, name) {
+    const figure = document.getElementById(name);
+    const moves = { ArrowLeft: [-0.15, -0.15], ArrowRight: [0.15, 0.15], "+": [0.15, -0.15], "=": [0.15, -0.15], "-": [-0.2, 0.2] };
+    const plot = drawn.get(name);
+    if (event.key === "0") {
+      if ("frequency" in figure.dataset) show(null);
+      else Plotly.react(plot, plot.data, themed(unpack(page.pictures[name].layout), figure));
+    } else if (event.key in moves && plot.layout.xaxis) {
+      const [low, high] = plot.layout.xaxis.range;
+      const [left, right] = moves[event.key].map((part) => part * (high - low));
+      Plotly.relayout(plot, { "xaxis.range[0]": low + left, "xaxis.range[1]": high + right });
+    } else return;
+    event.preventDefault();
+  }
+
+  function setTheme(name) {
+    theme = name;
+    root.dataset.theme = name;
+    document.querySelectorAll(".swatch").forEach((mark) => { mark.style.background = colour(mark.dataset.colour); });
+    redraw();
+  }
+
+  function setScale(name) {
+    scale = name;
+    document.getElementById("scale").textContent = name === "log" ? "Frequency: log" : "Frequency: linear";
+    redraw();
+  }
+
+  function choose() {
+    const boxes = [...document.querySelectorAll(".chooser input")];
+    hidden = new Set(boxes.filter((box) => !box.checked).map((box) => Number(box.value)));
+    document.getElementById("shown").textContent = `${boxes.length - hidden.size} of ${boxes.length}`;
+    redraw();
+  }
+
+  function listen() {
+    document.getElementById("theme").addEventListener("click", () => setTheme(theme === "light" ? "dark" : "light"));
+    document.getElementById("scale").addEventListener("click", () => setScale(scale === "log" ? "linear" : "log"));
+    document.getElementById("print").addEventListener("click", () => window.print());
+    document.querySelectorAll(".chooser input").forEach((box) => box.addEventListener("change", choose));
+    document.querySelectorAll(".chooser button").forEach((button) => button.addEventListener("click", () => {
+      document.querySelectorAll(".chooser input").forEach((box) => { box.checked = button.dataset.all === "1"; });
+      choose();
+    }));
+    document.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") document.querySelectorAll(".chooser[open]").forEach((list) => { list.open = false; });
+    });
+    window.addEventListener("beforeprint", beforePrint);
+    window.addEventListener("afterprint", afterPrint);
+  }
+
+  let screenTheme = "light";
+  function beforePrint() {
+    if (printing) return;
+    printing = true;
+    screenTheme = theme;
+    theme = "light";
+    root.dataset.theme = "light";
+    document.querySelectorAll("main details").forEach((list) => { list.dataset.was = list.open; list.open = true; });
+    Object.keys(page.pictures).forEach(draw);
+  }
+
+  function afterPrint() {
+    printing = false;
+    document.querySelectorAll("main details").forEach((list) => { list.open = list.dataset.was === "true"; });
+    setTheme(screenTheme);
+  }
+
+  function start() {
+    setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    setScale(scale);
+    listen();
+    const waiting = new Set(Object.keys(page.pictures));
+    const take = (name) => { if (waiting.delete(name)) draw(name); };
+    const observer = new IntersectionObserver((entries) => {
+      entries.filter((entry) => entry.isIntersecting).forEach((entry) => take(entry.target.id));
+    }, { rootMargin: "200px" });
+    waiting.forEach((name) => observer.observe(document.getElementById(name)));
+    const whenIdle = window.requestIdleCallback || ((work) => setTimeout(work, 30));
+    const next = () => {
+      const [name] = waiting;
+      if (name === undefined) { root.dataset.drawn = "all"; return; }
+      take(name);
+      whenIdle(next);
+    };
+    whenIdle(next);
+  }
+
+  start();
+})();

@@ -1,0 +1,195 @@
+"""The first screen: the verdict, three numbers, the structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.prediction.agreement import compare_frfs
+from frf_ipz.report.contents import RunContents
+from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
+from frf_ipz.report.reference import measured_at
+from frf_ipz.report.section import Markup, Section
+from frf_ipz.report.structure_drawing import Marks, draw_structure
+from frf_ipz.report.targets import target_rows
+from frf_ipz.report.wording import counted, listed, number, percent
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One number with its name and what it means."""
+
+    title: str
+    figure: str
+    meaning: str
+
+
+def build(run: RunContents) -> Section:
+    """Give the first screen.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+
+    Returns
+    -------
+    Section
+        The section.
+    """
+    cards = _cards(run)
+    shown = "".join(
+        f'<div class="card"><dt>{escape(card.title)}</dt><dd>{escape(card.figure)}</dd>'
+        f"<dd>{escape(card.meaning)}</dd></div>"
+        for card in cards
+    )
+    head = Markup(html=f'<p class="verdict">{escape(verdict(run))}</p><dl class="cards">{shown}</dl>')
+    frfs = run.frfs
+    marks = Marks(
+        sensors=() if frfs is None else frfs.output_dofs,
+        blows=() if frfs is None else frfs.input_dofs,
+        points=run.points,
+        missing=marked_nodes(run.diagnosis, frfs),
+    )
+    drawing = draw_structure(run.geometry, marks)
+    notes: tuple[str, ...] = ()
+    if run.stale:
+        notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale), 10)}.",)
+    return Section(
+        anchor="overview",
+        title="Overview",
+        lead="",
+        blocks=(head, *([] if drawing is None else [drawing])),
+        notes=notes,
+    )
+
+
+def verdict(run: RunContents) -> str:
+    """Sum up the run in a sentence or two.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+
+    Returns
+    -------
+    str
+        Text.
+    """
+    parts = [verdict_of(run.diagnosis)] if run.diagnosis is not None else []
+    if run.updated is not None and run.pairs is not None:
+        parts.append(_of_update(run))
+    elif run.fit is not None:
+        low, high = run.fit.band_hz
+        modes = counted(run.fit.n_modes, "mode")
+        parts.append(
+            f"{modes} found between {number(low)} and {number(high)} Hz in {counted(len(run.fit.labels), 'FRF')}."
+        )
+    elif run.frfs is not None:
+        parts.append(f"{counted(run.frfs.n_frfs, 'FRF')} estimated; nothing fitted yet.")
+    return " ".join(parts) or "This run holds no results yet."
+
+
+def _of_update(run: RunContents) -> str:
+    rows = target_rows(run)
+    if not rows:
+        return "No measured pole or zero has a counterpart in the model, so the model is left as it was."
+    before, after = (
+        max(abs(value) for value in errors) for errors in zip(*[(r.before, r.after) for r in rows], strict=True)
+    )
+    word = "all" if len(rows) > 1 else "the"
+    text = (
+        f"The updated model meets {word} {counted(len(rows), 'measured pole or zero', 'paired poles and zeros')} "
+        f"within {percent(after, 2)} in frequency (before: {percent(before, 2)})"
+    )
+    width = _half_width_db(run)
+    points = [str(dof) for dof in run.points]
+    if points and np.isfinite(width):
+        text += f", and predicts {listed(points, 3)} to ±{number(width, 2)} dB"
+    return text + "."
+
+
+def _cards(run: RunContents) -> list[Card]:
+    if run.updated is None:
+        return _cards_without_model(run)
+    return [_point_card(run), _target_card(run), _missing_card(run)]
+
+
+def _cards_without_model(run: RunContents) -> list[Card]:
+    cards = []
+    if run.frfs is not None:
+        coherence = run.frfs.coherence[run.used_lines()]
+        known = coherence[np.isfinite(coherence)]
+        figure = number(float(np.median(known)), 5) if known.size else "unknown"
+        cards.append(Card("Coherence", figure, "median over the band; 1 is perfect"))
+    if run.fit is not None:
+        cards.insert(0, Card("Modes", str(run.fit.n_modes), "in the band"))
+        ratio = run.fit.misfit["ratio"].to_numpy(float) if "ratio" in run.fit.misfit else np.zeros(0)
+        if ratio.size:
+            figure = f"{number(float(np.nanmax(ratio)), 2)} x noise"
+            cards.append(Card("Worst misfit of the fit", figure, "1 is all that the measurement can tell"))
+    return cards
+
+
+def _point_card(run: RunContents) -> Card:
+    prediction = run.prediction
+    known = {}
+    if prediction is not None:
+        known = measured_at(prediction, run.reference) or measured_at(prediction, run.frfs)
+    if prediction is None or not known:
+        return _measured_card(run)
+    numbers = list(known)
+    measured = np.stack([known[index] for index in numbers], 1)
+    lines = np.isfinite(measured).all(axis=1)
+    before, after = (
+        compare_frfs(measured[lines], values[lines][:, numbers]) for values in (prediction.nominal, prediction.values)
+    )
+    figure = f"{number(float(before.median_db.mean()), 2)} → {number(float(after.median_db.mean()), 2)} dB"
+    correlations = f"X_S {after.shape.min():.3f}, X_A {after.amplitude.min():.3f}"
+    meaning = f"median over the band, before and after; correlations {correlations}"
+    return Card("Error at the point of interest", figure, meaning)
+
+
+def _measured_card(run: RunContents) -> Card:
+    updated, frfs = run.updated, run.frfs
+    if updated is None or frfs is None:
+        return Card("Error at measured points", "unknown", "no FRF was measured")
+    measured = frfs.values[run.used_lines()]
+    norm = max(float(np.linalg.norm(measured)), np.finfo(float).tiny)
+    errors = [
+        float(np.linalg.norm(measured - run.model_values(model))) / norm for model in (updated.nominal, updated.model)
+    ]
+    figure = f"{percent(errors[0], 2)} → {percent(errors[1], 2)}"
+    meaning = "of the FRFs' norm, before and after; nothing was measured at the points of interest"
+    return Card("Error at the measured points", figure, meaning)
+
+
+def _target_card(run: RunContents) -> Card:
+    rows = target_rows(run)
+    if not rows:
+        return Card("Worst target", "none", "no measured pole or zero has a counterpart in the model")
+    worst = max(rows, key=lambda row: abs(row.after))
+    meaning = f"{worst.name} at {number(worst.measured_hz)} Hz; before: {percent(worst.before, 2)}"
+    return Card("Worst target after updating", percent(abs(worst.after), 2), meaning)
+
+
+def _missing_card(run: RunContents) -> Card:
+    if run.diagnosis is not None:
+        figure, meaning = said_in_short(run.diagnosis)
+        return Card("Missing in the model", figure, meaning)
+    rows = [] if run.pairs is None else [row for row in run.pairs.rows if row.measured >= 0]
+    open_rows = [row for row in rows if row.verdict is not Verdict.PAIRED]
+    figure = f"{len(open_rows)} of {len(rows)}" if open_rows else "nothing seen"
+    return Card("Missing in the model", figure, "measured poles and zeros without a counterpart; no diagnosis was run")
+
+
+def _half_width_db(run: RunContents) -> float:
+    if run.prediction is None:
+        return float("nan")
+    low, high = run.prediction.magnitude_low, run.prediction.magnitude_high
+    good = (low > 0) & np.isfinite(high)
+    return float(np.median(10 * np.log10(high[good] / low[good]))) if good.any() else float("nan")

@@ -1,0 +1,177 @@
+"""Poles and zeros in the s-plane with their error ellipses; tables of modes and zeros."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
+from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
+from frf_ipz.report.section import Block, Section
+from frf_ipz.report.table import Table
+from frf_ipz.report.wording import counted, number, with_error
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.report.contents import RunContents
+
+Q95_PLANE = float(np.sqrt(-2 * np.log(0.05)))  # standard deviations of the ellipse that holds 95 % of a normal pair
+CORNERS = 33
+NOISE_FROM = {"recordings": "the scatter between blows", "misfit": "the misfit of the fit"}
+MOST_ELLIPSES = 400  # drawn; more would make the page large
+
+
+def build(run: RunContents) -> Section | None:
+    """Give the section on poles and zeros.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+
+    Returns
+    -------
+    Section or None
+        None without a fit.
+    """
+    fit = run.fit
+    if fit is None:
+        return None
+    known = int(np.count_nonzero(fit.zeros.identifiable))
+    len(fit.zeros.values) - known
+    lead = (
+        f"{counted(fit.n_modes, 'pole')} shared by all FRFs, and {counted(known, 'zero')} of single FRFs with a number"
+        + (
+            f"; {len(fit.zeros.values) - known} more that the data do not support."
+            if known < len(fit.zeros.values)
+            else "."
+        )
+    )
+    where = {"recordings": "the scatter between blows", "misfit": "the misfit of the fit"}.get(
+        fit.noise_from, fit.noise_from
+    )
+    blocks: list[Block] = [_picture(fit, where), _mode_table(fit)]
+    blocks += [_zero_table(fit)] if len(fit.zeros.values) else []
+    return Section(anchor="poles", title="Poles and zeros", lead=lead, blocks=tuple(blocks), notes=fit.warnings)
+
+
+def _picture(fit: ModalFit, noise_from: str) -> Picture:
+    poles = fit.model.poles[: fit.n_modes]
+    traces = [*_ellipses(poles, _blocks(fit)[: fit.n_modes], "poles", "@ink")]
+    hover = "%{x:.7g} Hz, damping %{y:.5f} %<br>%{text}"
+    names = [f"pole {place + 1}" for place in range(len(poles))]
+    style: Trace = {"symbol": "x", "size": 9, "text": names, "hover": hover}
+    traces.append(markers(natural_frequency_hz(poles), 100 * damping_ratio(poles), "poles", "@ink", **style))
+    for frf, label in enumerate(fit.labels):
+        traces += _zeros_of(fit, frf, str(label), hover)
+    spread = 100 * np.concatenate([damping_ratio(poles), damping_ratio(fit.zeros.values[_shown(fit)])])
+    top = 1.25 * float(np.quantile(spread, 0.95)) if spread.size else 1.0
+    bottom = min(0.0, 1.25 * float(spread.min())) if spread.size else 0.0
+    y = Axis(title="Damping ratio, %", options={"range": [bottom, max(top, 1e-3)], "zeroline": True})
+    return Picture(
+        name="pole-zero-map",
+        title="Poles and zeros, with the ellipses that hold the true ones with 95 % probability",
+        alt=f"Map of {counted(len(poles), 'pole')} and {counted(int(_shown(fit).sum()), 'zero')} over frequency and "
+        "damping ratio; ellipses show their uncertainty.",
+        traces=tuple(traces),
+        layout=panels(frequency_axis(*fit.band_hz), y),
+        note=f"Crosses: poles; circles: zeros of each FRF. The uncertainty comes from {noise_from}; zoom in to see "
+        "small ellipses. Zeros with a negative damping ratio lie in the right half plane: their FRF is not of minimum "
+        "phase.",
+        height_px=440,
+        is_over_frequency=True,
+    )
+
+
+def _shown(fit: ModalFit) -> BoolArray:
+    return fit.zeros.identifiable & (np.abs(damping_ratio(fit.zeros.values)) < 0.999)
+
+
+def _zeros_of(fit: ModalFit, frf: int, label: str, hover: str) -> list[Trace]:
+    here = _shown(fit) & (fit.zeros.frf == frf)
+    values = fit.zeros.values[here]
+    if not len(values):
+        return []
+    kinds = [f"zero of {label} ({fit.zeros.kind[place]})" for place in np.flatnonzero(here)]
+    colour = colour_of(frf)
+    more: Trace = {"meta": {"frf": frf}}
+    style: Trace = {"symbol": "circle-open", "size": 9, "text": kinds, "hover": hover, **more}
+    dots = markers(natural_frequency_hz(values), 100 * damping_ratio(values), f"zeros {label}", colour, **style)
+    return [*_ellipses(values, _blocks(fit)[fit.n_modes :][here], f"zeros {label}", colour, **more), dots]
+
+
+def _blocks(fit: ModalFit) -> FloatArray:
+    """Covariance of each pole and zero alone, (n, 2, 2)."""
+    place = 2 * np.arange(len(fit.covariance) // 2)
+    rows = place[:, None] + np.array([0, 1])
+    return np.asarray(fit.covariance[rows[:, :, None], rows[:, None, :]])
+
+
+def _ellipses(roots: ComplexArray, covariance: FloatArray, name: str, colour: str, **more: Any) -> list[Trace]:  # noqa: ANN401  any property of a trace
+    """Ellipses in the plane of frequency and damping ratio, to first order."""
+    rows = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)) & (np.abs(roots) > 0))[:MOST_ELLIPSES]
+    if not len(rows):
+        return []
+    angle = np.linspace(0, 2 * np.pi, CORNERS)
+    circle = Q95_PLANE * np.stack([np.cos(angle), np.sin(angle)])
+    x, y = np.full((2, len(rows), CORNERS + 1), np.nan)
+    for place, row in enumerate(rows):
+        values, vectors = np.linalg.eigh(covariance[row])
+        step = vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * circle)
+        moved = roots[row] + step[0] + 1j * step[1]
+        x[place, :CORNERS], y[place, :CORNERS] = natural_frequency_hz(moved), 100 * damping_ratio(moved)
+    style: Trace = {"width": 1, "showlegend": False, "fill": "toself", "fillcolor": f"{colour}/0.12"}
+    return [line(x.ravel(), y.ravel(), name, colour, **style, **more)]
+
+
+def _deviations(roots: ComplexArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Propagate to standard deviations of frequency in Hz and of the damping ratio, to first order."""
+    modulus = np.where(np.abs(roots) > 0, np.abs(roots), 1.0)
+    real, imag = roots.real / modulus, roots.imag / modulus
+    slopes_f = np.stack([real, imag], 1) / (2 * np.pi)
+    slopes_d = np.stack([-(imag**2), real * imag], 1) / modulus[:, None]
+    with np.errstate(invalid="ignore"):  # zeros without a number have an infinite variance
+        both = [np.sqrt(np.einsum("ni,nij,nj->n", slopes, covariance, slopes)) for slopes in (slopes_f, slopes_d)]
+    return both[0], both[1]
+
+
+def _mode_table(fit: ModalFit) -> Table:
+    poles = fit.model.poles[: fit.n_modes]
+    hertz_std, ratio_std = _deviations(poles, _blocks(fit)[: fit.n_modes])
+    extra = [name for name in ("mpc", "quality") if name in fit.modes and len(fit.modes) == len(poles)]
+    rows = []
+    for place, pole in enumerate(poles):
+        hertz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
+        more = [_cell(fit.modes[name].iloc[place]) for name in extra]
+        cells = [with_error(hertz, hertz_std[place], 7), with_error(100 * ratio, 100 * ratio_std[place], 5)]
+        rows.append([str(place + 1), *cells, *more])
+    columns = (
+        "pole",
+        "frequency, Hz",
+        "damping ratio, %",
+        *[name.upper() if name == "mpc" else name for name in extra],
+    )
+    return Table(caption="Modes of the band", columns=columns, rows=rows, file="poles.parquet, modes.parquet")
+
+
+def _cell(value: object) -> str:
+    return number(float(value), 3) if isinstance(value, float | int | np.number) else str(value)
+
+
+def _zero_table(fit: ModalFit) -> Table:
+    zeros = fit.zeros
+    hertz_std, ratio_std = _deviations(zeros.values, _blocks(fit)[fit.n_modes :])
+    order: IntArray = np.lexsort((np.abs(zeros.values), zeros.frf))
+    rows = []
+    for place in order:
+        root, known = zeros.values[place], bool(zeros.identifiable[place])
+        numbers = ["–", "–"]
+        if known:
+            hertz, ratio = float(natural_frequency_hz(root)), float(damping_ratio(root))
+            numbers = [with_error(hertz, hertz_std[place], 7), with_error(100 * ratio, 100 * ratio_std[place], 5)]
+        rows.append([str(fit.labels[zeros.frf[place]]), zeros.kind[place], *numbers, zeros.reason[place]])
+    columns = ("FRF (sensor / blow)", "kind", "frequency, Hz", "damping ratio, %", "why without a number")
+    marked = frozenset(np.flatnonzero(~zeros.identifiable[order]).tolist())
+    return Table(caption="Zeros", columns=columns, rows=rows, marked=marked, file="zeros.parquet")

@@ -1,0 +1,65 @@
+"""What ran: versions, inputs with their digests, options, times."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from typing import TYPE_CHECKING
+
+from frf_ipz.report.section import Markup, Section
+from frf_ipz.report.table import Table
+from frf_ipz.report.wording import number
+
+if TYPE_CHECKING:
+    from frf_ipz.report.contents import RunContents
+
+SHOWN_DIGITS = 16  # of a digest; all stand in run.json
+
+
+def build(run: RunContents) -> Section:
+    """Give the section on provenance.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+
+    Returns
+    -------
+    Section
+        The section.
+    """
+    record = run.record
+    versions = {"frf_ipz": record.get("frf_ipz", ""), "Python": record.get("python", ""), **record.get("packages", {})}
+    lead = f"Pipeline {record.get('pipeline', '')}" + (f", run on {record['when']}." if "when" in record else ".")
+    options = json.dumps(record.get("configuration", {}), indent=1, ensure_ascii=False)
+    blocks = (
+        Table(
+            caption="Versions",
+            columns=("package", "version"),
+            rows=[[name, str(text)] for name, text in versions.items()],
+        ),
+        Table(
+            caption="Stages", columns=("stage", "time, s", "state", "digest of all it depends on"), rows=_stages(run)
+        ),
+        Table(
+            caption="Input files",
+            columns=("file", "SHA-256"),
+            rows=[[name, digest[:SHOWN_DIGITS] + "…"] for name, digest in record.get("inputs", {}).items()],
+            file="run.json",
+        ),
+        Markup(html=f"<details><summary>All options, as resolved</summary><pre>{escape(options)}</pre></details>"),
+    )
+    return Section(anchor="provenance", title="Provenance", lead=lead, blocks=blocks)
+
+
+def _stages(run: RunContents) -> list[list[str]]:
+    return [
+        [
+            name,
+            number(float(entry.get("seconds", float("nan"))), 3),
+            "stale" if name in run.stale else "current",
+            str(entry.get("key", ""))[:SHOWN_DIGITS] + "…",
+        ]
+        for name, entry in run.record.get("stages", {}).items()
+    ]
