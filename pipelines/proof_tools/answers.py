@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +49,8 @@ class Cause:
         Plain in an answer, with an interval in a diagnosis.
     probability, gain : float
         Of a diagnosis: probability, and evidence in nats.
+    places : tuple of mapping
+        Of a diagnosis: all places that are possible.
     nonlinear : bool
         Of an answer: whether it depends on level.
     """
@@ -57,6 +60,7 @@ class Cause:
     parameters: Mapping[str, float | str | Value] = field(default_factory=dict)
     probability: float = 1.0
     gain: float = 0.0
+    places: tuple[Mapping[str, Any], ...] = ()
     nonlinear: bool = False
 
 
@@ -112,8 +116,10 @@ class Diagnosis:
         Locations that an unexplained mismatch is traced to.
     before, after : mapping of str to float
         Normalised FRF errors: ``training`` and ``held_out``.
-    noise_floor : float, optional
-        What noise alone makes of the held-out error.
+    ambiguous : tuple of frozenset of str
+        Effects that cannot be told apart.
+    held_over_noise : float, optional
+        Error on held-out blows after, over that of noise alone.
     """
 
     verdict: str
@@ -122,7 +128,8 @@ class Diagnosis:
     places: tuple[Mapping[str, Any], ...] = ()
     before: Mapping[str, float] = field(default_factory=dict)
     after: Mapping[str, float] = field(default_factory=dict)
-    noise_floor: float | None = None
+    ambiguous: tuple[frozenset[str], ...] = ()
+    held_over_noise: float | None = None
 
 
 FAILED = Diagnosis(verdict="failed")
@@ -210,7 +217,7 @@ def read_diagnosis(path: Path) -> Diagnosis:
     if table.get("verdict") not in ("consistent", "explained", "unexplained"):
         raise AnswerError(f"{path}: the verdict is {table.get('verdict')!r}, not consistent, explained or unexplained")
     try:
-        findings = tuple(_said_cause(one) for one in table.get("findings", []))
+        findings = tuple(_said_cause(one) for one in table.get("findings", []) if one.get("significant", True))
         alternatives = tuple(_said_cause(one) for one in table.get("alternatives", []))
     except (KeyError, TypeError, ValueError) as error:
         raise AnswerError(f"{path}: a finding or an alternative is not what the contract says ({error!r})") from None
@@ -224,7 +231,8 @@ def read_diagnosis(path: Path) -> Diagnosis:
         places=(*(one.location for one in findings), *places),
         before=_numbers(fit.get("before", {})),
         after=_numbers(fit.get("after", {})),
-        noise_floor=_held_out_noise(table.get("noise_floor")),
+        ambiguous=tuple(frozenset(one["effects"]) for one in table.get("ambiguity", [])),
+        held_over_noise=fit.get("after", {}).get("held_out_over_noise"),
     )
 
 
@@ -232,28 +240,23 @@ def _said_cause(table: Mapping[str, Any]) -> Cause:
     return Cause(
         effect=table["effect"],
         location=table.get("location", {}),
-        parameters={name: _value(value) for name, value in table.get("parameters", {}).items()},
+        parameters={name: _value(value) for name, value in table.get("parameters", {}).items() if value is not None},
         probability=float(table.get("probability", 1.0)),
         gain=float(table.get("log_evidence_gain", 0.0)),
+        places=tuple(table.get("location_set", ())),
         nonlinear=table["effect"] in NONLINEAR,
     )
 
 
 def _value(entry: Mapping[str, Any] | float | str) -> Value | str:
-    """Read a number with its interval: as given, or from the standard deviation."""
+    """Read a number with its interval: as given, or from the standard deviation; an open end is infinite."""
     if isinstance(entry, str):
         return entry
     if not isinstance(entry, Mapping):
         return Value(value=float(entry), low=float(entry), high=float(entry))
-    value = float(entry["value"])
-    low, high = value - COVER * float(entry.get("std", 0)), value + COVER * float(entry.get("std", 0))
-    low, high = entry.get("ci95", (entry.get("low", low), entry.get("high", high)))
-    return Value(value=value, low=float(low), high=float(high))
-
-
-def _held_out_noise(entry: Mapping[str, Any] | float | None) -> float | None:
-    value = entry.get("held_out") if isinstance(entry, Mapping) else entry
-    return None if value is None else float(value)
+    value, std = float(entry["value"]), float(entry.get("std") or 0.0)
+    low, high = entry.get("ci95") or (value - COVER * std, value + COVER * std)
+    return Value(value=value, low=-math.inf if low is None else low, high=math.inf if high is None else high)
 
 
 def _numbers(table: Mapping[str, Any]) -> dict[str, float]:

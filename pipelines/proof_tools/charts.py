@@ -112,11 +112,13 @@ def time_chart(groups: dict[str, Sequence[float]], label: str) -> str:
     Returns
     -------
     str
-        An ``img`` element.
+        An ``img`` element, or a sentence where no time is known.
     """
     known = {group: [t for t in times if not math.isnan(t)] for group, times in groups.items()}
     known = {group: times for group, times in known.items() if times}
-    figure = Figure(figsize=(8.2, 0.9 + 0.35 * max(len(known), 1)), layout="constrained")
+    if not known:
+        return f"<p>No times of {label} are known.</p>"
+    figure = Figure(figsize=(8.2, 0.9 + 0.35 * len(known)), layout="constrained")
     axes = figure.add_subplot()
     for row, times in enumerate(known.values()):
         axes.plot(times, [row] * len(times), "|", color=BLUE, markersize=12)

@@ -26,12 +26,15 @@ class ParameterScore:
         Relative; infinite where it is missing or a wrong word.
     covered : bool
         Whether the 95 % interval holds the truth.
+    is_number : bool
+        False for a word: it counts in no median and no interval.
     """
 
     effect: str
     name: str
     error: float
     covered: bool
+    is_number: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,8 +75,10 @@ class Judgement:
         Outside the catalogue: how much worse the closest known effect at its place is.
     flagged_place : str or None
         Outside the catalogue, a law at a node or spring: how close the place of the mismatch is.
-    held_out, noise_floor, before : float
-        Errors on held-out blows; nan where not given.
+    in_place_set : bool or None
+        Whether the true place is among those that are said to be possible; None where none are said.
+    before, held_out, held_over_noise : float
+        Errors on held-out blows before and after, and after over that of noise alone; nan where not given.
     """
 
     name: str
@@ -98,9 +103,10 @@ class Judgement:
     pair_places: int = 0
     substitute_nats: float | None = None
     flagged_place: str | None = None
-    held_out: float = math.nan
-    noise_floor: float = math.nan
+    in_place_set: bool | None = None
     before: float = math.nan
+    held_out: float = math.nan
+    held_over_noise: float = math.nan
 
 
 def judge(truth: Truth, said: Diagnosis, layout: Layout) -> Judgement:
@@ -148,9 +154,10 @@ def judge(truth: Truth, said: Diagnosis, layout: Layout) -> Judgement:
         pair_places=sum(places[0] in (EXACT, None) for places in found),
         substitute_nats=truth.separation_nats if truth.group == "unknown" else None,
         flagged_place=_flagged_place(truth, said, layout),
-        held_out=said.after.get("held_out", math.nan),
-        noise_floor=math.nan if said.noise_floor is None else said.noise_floor,
+        in_place_set=_in_place_set(option, first, layout),
         before=said.before.get("held_out", math.nan),
+        held_out=said.after.get("held_out", math.nan),
+        held_over_noise=math.nan if said.held_over_noise is None else said.held_over_noise,
     )
 
 
@@ -184,11 +191,21 @@ def _found(cause: Cause, said: Diagnosis, layout: Layout) -> list[str | None]:
 
 
 def reported_set(said: Diagnosis) -> set[str]:
-    """Effects that a diagnosis does not tell apart: those within 5 nats of the one named first."""
+    """Effects that a diagnosis does not tell apart: those within 5 nats of the one named first, or said to be."""
     if not said.findings:
         return set()
-    least = said.findings[0].gain - SET_NATS
-    return {one.effect for one in said.findings} | {one.effect for one in said.alternatives if one.gain >= least}
+    first = said.findings[0]
+    close = {one.effect for one in said.alternatives if one.gain >= first.gain - SET_NATS}
+    named = {effect for effects in said.ambiguous if first.effect in effects for effect in effects}
+    return {one.effect for one in said.findings} | close | named
+
+
+def _in_place_set(option: Cause | None, said: Cause | None, layout: Layout) -> bool | None:
+    """Whether the true place of a right effect is among the possible ones; None for an effect without a place."""
+    if option is None or said is None or not said.places:
+        return None
+    compared = [compare_places(option.effect, option.location, place, layout) for place in said.places]
+    return None if None in compared else EXACT in compared
 
 
 def _parameters(option: Cause | None, said: Cause | None, place: str | None) -> tuple[ParameterScore, ...]:
@@ -204,7 +221,7 @@ def _parameters(option: Cause | None, said: Cause | None, place: str | None) -> 
 def _parameter(effect: str, name: str, truth: float | str | Value, said: float | str | Value | None) -> ParameterScore:
     if isinstance(truth, str):
         same = said == truth
-        return ParameterScore(effect=effect, name=name, error=0.0 if same else math.inf, covered=same)
+        return ParameterScore(effect=effect, name=name, error=0.0 if same else math.inf, covered=same, is_number=False)
     if isinstance(truth, Value) or not isinstance(said, Value):
         return ParameterScore(effect=effect, name=name, error=math.inf, covered=False)
     error = abs(said.value - truth) / abs(truth)

@@ -24,6 +24,7 @@ table { border-collapse: collapse; margin: 0.6em 0; } img { max-width: 100%; }
 td, th { padding: 0.2em 0.6em; text-align: left; border-bottom: 1px solid #ddd; vertical-align: top; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .yes { color: #13702f; } .no { color: #b3261e; } .open { color: #777; } .wide { overflow-x: auto; }
+table.bars td { white-space: nowrap; } table.bars td:nth-child(2) { white-space: normal; }
 table.confusion { font-size: 12px; } table.confusion td { text-align: center; padding: 0.15em 0.35em; }
 table.confusion th.top { writing-mode: vertical-rl; transform: rotate(180deg); border: 0; }
 """
@@ -132,11 +133,12 @@ def _bar_table(bars: Sequence[Bar]) -> str:
         plain = f"{bar.value:.1%}" if percent and not math.isnan(bar.value) else _number(bar.value)
         reached = _rate(bar.rate) if bar.rate else plain
         rows.append([bar.group, escape(bar.name), bar.wanted, reached, words[bar.passes]])
-    return _table(["", "bar", "wanted", "reached", ""], rows, text_columns=5)
+    return _table(["", "bar", "wanted", "reached", ""], rows, text_columns=5).replace("<table>", '<table class="bars">')
 
 
 def _confusion(judgements: Sequence[Judgement]) -> str:
-    """Rows are true, columns are said."""
+    """Rows are true, columns are said; pairs have a table of their own."""
+    judgements = [one for one in judgements if one.group != "pair"]
     ends = ("consistent", "unexplained", "failed")
     names = sorted({one.said for one in judgements} - set(ends))
     columns = [*names, *(end for end in ends if any(one.said == end for one in judgements))]
@@ -172,7 +174,8 @@ def _place_table(judgements: Sequence[Judgement]) -> str:
 
 
 def _parameters(judgements: Sequence[Judgement]) -> str:
-    scores = [score for one in judgements if one.right and one.group != "pair" for score in one.parameters]
+    right = [one for one in judgements if one.right and one.group != "pair"]
+    scores = [score for one in right for score in one.parameters if score.is_number]
     if not scores:
         return "<p>None.</p>"
     rows = []
@@ -232,9 +235,9 @@ def _held_out(judgements: Sequence[Judgement]) -> str:
     rows = []
     for group in sorted({one.group for one in known}):
         mine = [one for one in known if one.group == group]
-        columns = ([one.before for one in mine], [one.held_out for one in mine], [one.noise_floor for one in mine])
+        columns = ([one.before for one in mine], [one.held_out for one in mine], [one.held_over_noise for one in mine])
         rows.append([group, str(len(mine)), *(_number(_median(values)) for values in columns)])
-    return _table(["group", "cases", "error before, median", "after", "of noise alone"], rows)
+    return _table(["group", "cases", "error before, median", "after", "after, over that of noise"], rows)
 
 
 def _median(values: Sequence[float]) -> float:

@@ -137,14 +137,12 @@ def _group(cases: Judgements, *groups: str) -> list[Judgement]:
     return [case.judgement for case in cases if case.judgement.group in groups]
 
 
-def _at_least(group: str, name: str, part: float, claims: Sequence[bool], words: str = "") -> Bar:
-    rate = Rate.of(claims)
-    wanted = words or f"at least {part:.0%}"
-    return _counted(group, name, wanted, rate, lambda value: value >= part)
+def _at_least(group: str, name: str, part: float, claims: Sequence[bool]) -> Bar:
+    return _counted(group, name, f"at least {part * 100:.0f} %", Rate.of(claims), lambda value: value >= part)
 
 
 def _at_most(group: str, name: str, part: float, claims: Sequence[bool]) -> Bar:
-    return _counted(group, name, f"at most {part:.0%}", Rate.of(claims), lambda value: value <= part)
+    return _counted(group, name, f"at most {part * 100:.0f} %", Rate.of(claims), lambda value: value <= part)
 
 
 def _counted(group: str, name: str, wanted: str, rate: Rate, good: Callable[[float], bool]) -> Bar:
@@ -204,20 +202,25 @@ def calibrated(cases: Judgements) -> tuple[list[float], list[bool]]:
 
 
 def _places(cases: Judgements) -> list[Bar]:
-    placed = [one.place for one in _group(cases, "linear") if one.right and one.place]
+    right = [one for one in _group(cases, "linear") if one.right]
+    placed = [one.place for one in right if one.place]
+    in_sets = [one.in_place_set for one in right if one.in_place_set is not None]
     return [
         _at_least("places", "exact, where the effect is right", 0.95, [place == EXACT for place in placed]),
         _at_least("places", "within one node or element", 0.99, [place in (EXACT, NEAR) for place in placed]),
+        _at_least("places", "true place among the possible ones said", 0.98, in_sets),
     ]
 
 
 def _parameters(cases: Judgements) -> list[Bar]:
     scores = [score for one in _group(cases, "linear", "nonlinear") if one.right for score in one.parameters]
-    covered = Rate.of(score.covered for score in scores)
-    errors = [score.error for score in scores]
+    covered = Rate.of(score.covered for score in scores if score.is_number)
+    errors = [score.error for score in scores if score.is_number]
+    words = [score.covered for score in scores if not score.is_number]
     return [
         _measured("parameters", "median error", "at most 3 %", errors, lambda value: value <= 0.03),
         _at_least("parameters", "error at most 10 %", 0.9, [error <= 0.1 for error in errors]),
+        _at_least("parameters", "words (high-pass or low-pass)", 1.0, words),
         _counted("parameters", "95 % intervals cover", "90 to 98 %", covered, lambda value: 0.9 <= value <= 0.98),
     ]
 
@@ -278,9 +281,9 @@ def _fit(cases: Judgements) -> list[Bar]:
     known = [
         one
         for one in _group(cases, "linear", "nonlinear", "pair")
-        if one.detected and not math.isnan(one.held_out) and not math.isnan(one.noise_floor)
+        if one.detected and not math.isnan(one.held_over_noise)
     ]
-    claims = [one.held_out <= 1.3 * one.noise_floor for one in known]
+    claims = [one.held_over_noise <= 1.3 for one in known]
     return [_at_least("held out", "misfit on held-out blows at most 1.3 times the noise", 0.9, claims)]
 
 

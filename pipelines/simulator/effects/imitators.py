@@ -49,7 +49,7 @@ def imitators(bench: Bench, effect: Effect) -> list[Substitute]:
     bench : Bench
         The specimen on its test bench.
     effect : Effect
-        A linear one of the contract.
+        A linear one.
 
     Returns
     -------
@@ -71,6 +71,7 @@ def imitators(bench: Bench, effect: Effect) -> list[Substitute]:
         "sensor_dynamics": _of_filter,
         "sensor_gain": _of_gain,
         "sensor_misplaced": _of_place,
+        "unknown": _of_outside,
     }.get(effect.name, lambda _bench, _one: [])(bench, effect)
 
 
@@ -362,3 +363,22 @@ def _of_place(bench: Bench, effect: Effect) -> list[Substitute]:
                 Substitute(name="sensor_misplaced", location=location, build=lambda _v, e=effect_there: e, start={})
             )
     return [*found, _gain(channel, 0.8)]
+
+
+def _of_outside(bench: Bench, effect: Effect) -> list[Substitute]:
+    """Make what the table has for the channels or for some of the nodes of an effect outside it, and for damping."""
+    low, high = bench.set_up.band_hz
+    found = []
+    for channel in effect.location.get("channels", ()):
+        found += [_gain(channel, 0.9), _delay(channel, 0.02 / high)]
+        found += [_filter(channel, "lowpass", 3 * high), _filter(channel, "highpass", low / 3)]
+    nodes = effect.location.get("nodes", [])
+    for node in nodes[:: max(1, len(nodes) // 2)]:
+        motion = (bench.point(node), None)
+        stiffness, middle = 0.3 * bench.stiffness(motion), _middle(bench)
+        hung = {"mass_kg": stiffness / middle**2, "frequency_hz": middle / (2 * np.pi), "damping_ratio": 0.02}
+        found += [_grounded(bench, node, stiffness), _mass(bench, node, hung["mass_kg"]), _resonator(bench, node, hung)]
+        found += [_damper(bench, node, bench.damping(motion))]
+        found += [_joint({"nodes": [node]}, motion, "stiffness_N_m", stiffness, 1 / middle)]
+    ratio = bench.set_up.damping_ratio
+    return [*found, _level(bench, 1.2 * ratio), _loss(0.5 * ratio)]

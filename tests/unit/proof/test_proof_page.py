@@ -1,0 +1,128 @@
+"""The whole proof with a command that guesses: the page stands on its own and says what was counted."""
+
+import ast
+import base64
+import json
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import proof
+import proof_tools
+from proof_tools.page import write_page, write_scores
+from proof_tools.scoring import bars
+
+GUESS = """
+import json, sys
+from pathlib import Path
+stage, pipeline, _, out, _ = sys.argv[1:]
+if stage == "diagnose":
+    mass = {"mass_kg": {"value": 0.02, "std": 1e-3}}
+    finding = {"effect": "added_mass", "location": {"nodes": [3]}, "parameters": mass, "probability": 0.9,
+               "log_evidence_gain": 50.0}
+    if "case_2" in pipeline:
+        sys.exit("frf-ipz: <the fit> failed")
+    verdict = "consistent" if "case_3" in pipeline else "explained"
+    found = [] if verdict == "consistent" else [finding]
+    Path(out).mkdir(parents=True)
+    Path(out, "diagnosis.json").write_text(json.dumps({"verdict": verdict, "findings": found}))
+    Path(out, "run.json").write_text(json.dumps({"stages": {"diagnose": {"seconds": 1.5}}}))
+"""
+ANSWERS = {
+    "case_1": {"effect": "added_mass", "location": {"nodes": [3]}, "parameters": {"mass_kg": 0.0201}},
+    "case_2": {"effect": "added_mass", "location": {"nodes": [3]}, "parameters": {"mass_kg": 0.0201}},
+    "case_3": {"effect": "null", "location": {}, "parameters": {}},
+    "case_4": {"effect": "unknown", "unknown_kind": "skew", "location": {"nodes": [3, 5]}, "parameters": {}},
+}
+
+
+class Page(HTMLParser):
+    """Elements that must be closed, and where pictures come from."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.sources, self.links = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+        self.sources += [value for name, value in attributes if name == "src"]
+        self.links += [value for name, value in attributes if name == "href"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    """Run the proof on a folder of cases with their answers beside them."""
+    folder = tmp_path_factory.mktemp("practice")
+    for name, answer in ANSWERS.items():
+        (folder / name).mkdir()
+        (folder / name / "model.toml").write_text('[model]\nkind = "beam"\n', encoding="utf-8")
+        (folder / name / "pipeline.toml").write_text('[pipeline]\ntest = "test.toml"\n', encoding="utf-8")
+        (folder / "truth").mkdir(exist_ok=True)
+        (folder / "truth" / f"{name}.json").write_text(json.dumps(answer), encoding="utf-8")
+    guess = folder / "guess.py"
+    guess.write_text(GUESS, encoding="utf-8")
+    out = folder / "results"
+    proof.main(["--cases", str(folder), "--out", str(out)], command=[sys.executable, str(guess)])
+    return out
+
+
+def test_scores_say_what_was_counted(scored):
+    scores = json.loads((scored / "scores.json").read_text(encoding="utf-8"))
+    said = {case["judgement"]["name"]: case["judgement"]["said"] for case in scores["cases"]}
+    assert said == {"case_1": "added_mass", "case_2": "failed", "case_3": "consistent", "case_4": "added_mass"}
+    faults = {case["judgement"]["name"]: case["fault"] for case in scores["cases"]}
+    assert faults == {"case_1": "", "case_2": "frf-ipz: <the fit> failed", "case_3": "", "case_4": ""}
+    found = {(bar["group"], bar["name"]): bar for bar in scores["bars"]}
+    first = found["linear", "effect named first, of all"]
+    assert (first["rate"]["hits"], first["rate"]["count"], first["passes"]) == (1, 2, False)
+    assert first["interval"][0] < 0.5 < first["interval"][1]
+    assert found["nulls", "false alarms"]["passes"] is True
+    assert found["outside the catalogue", "flagged"]["value"] == 0
+    assert found["two effects", "both"]["value"] is None
+    assert found["time", "linear case, from FRFs, median"]["value"] == 1.5
+
+
+def test_the_page_stands_on_its_own(scored):
+    text = (scored / "proof.html").read_text(encoding="utf-8")
+    page = Page()
+    page.feed(text)
+    assert page.open == []
+    assert page.links == []
+    assert page.sources
+    for source in page.sources:
+        head, data = source.split(",", 1)
+        assert head == "data:image/svg+xml;base64"
+        ElementTree.fromstring(base64.b64decode(data))
+    assert "<script" not in text
+    assert "&lt;the fit&gt; failed" in text
+    assert "1 of 2: 50.0% (1.3% to 98.7%)" in text
+    headings = re.findall("<h2>(.*?)</h2>", text)
+    assert headings[:3] == ["Bars", "What was said for what", "Places"]
+    assert len(headings) == 12
+
+
+def test_a_page_without_cases_is_drawn(tmp_path):
+    write_page(tmp_path / "proof.html", [], bars([]), title="None & nothing", code="x")
+    write_scores(tmp_path / "scores.json", [], bars([]), code="x")
+    page = Page()
+    page.feed((tmp_path / "proof.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    assert json.loads((tmp_path / "scores.json").read_text(encoding="utf-8"))["cases"] == []
+
+
+def test_modules_and_functions_are_small():
+    for path in [*Path(proof_tools.__file__).parent.glob("*.py"), Path(proof.__file__)]:
+        text = path.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 400, path.name
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef):
+                start = node.body[1 if ast.get_docstring(node) else 0].lineno
+                assert node.end_lineno - start < 40, f"{path.name}: {node.name}"

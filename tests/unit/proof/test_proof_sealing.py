@@ -1,0 +1,157 @@
+"""What a diagnosis can read holds nothing of the truth, and answers cannot change unseen."""
+
+import json
+import sys
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from proof_tools.blind import diagnose_all, predict_all, worth_predicting, write_pipeline
+from proof_tools.commands import code_digest, read_done, run
+from proof_tools.plan import FULL, SLICE, Folders, plan_cases, turns
+from proof_tools.sealing import BrokenSealError, check_seal, make_cases
+from simulator.effects.catalogue import CONTRACT, NONLINEAR
+
+COUNTS = {"linear": 1, "null": 1}
+FAKE = """
+import json, sys
+from pathlib import Path
+stage, pipeline, _, out, _ = sys.argv[1:]
+seen = Path(pipeline).read_text(encoding="utf-8")
+if stage == "diagnose":
+    if "broken" in seen:
+        sys.exit("frf-ipz: no such file")
+    Path(out).mkdir(parents=True)
+    Path(out, "diagnosis.json").write_text(json.dumps({"verdict": "explained", "findings": []}))
+with Path(sys.argv[0]).with_suffix(".log").open("a") as log:
+    log.write(json.dumps(sys.argv[1:]) + chr(10))
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folders = Folders.inside(tmp_path_factory.mktemp("proof"))
+    steps = []
+    make_cases(plan_cases(COUNTS), folders, workers=1, step=lambda: steps.append(1))
+    return folders, steps
+
+
+@pytest.fixture
+def fake(tmp_path):
+    path = tmp_path / "fake.py"
+    path.write_text(FAKE, encoding="utf-8")
+    return [sys.executable, str(path)]
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_names_tell_nothing_and_a_slice_is_part_of_the_whole():
+    everything = plan_cases(FULL)
+    assert len({order.name for order in everything}) == len(everything) == 480
+    assert len({order.seed for order in everything}) == 480
+    assert [order.name for order in everything] == sorted(order.name for order in everything)
+    part = plan_cases(SLICE)
+    assert set(part) <= set(everything)
+    groups = [order.group for order in everything]
+    changes = sum(a != b for a, b in pairwise(groups))
+    assert changes > 200  # sorted by group there would be four
+    assert not [order.name for order in everything if order.group in order.name or order.effect in order.name]
+
+
+def test_every_effect_takes_its_turn():
+    assert sorted(turns("linear")) == sorted(set(CONTRACT) - set(NONLINEAR))
+    assert {order.effect for order in plan_cases(FULL) if order.group == "linear"} == set(turns("linear"))
+    assert len({order.effect for order in plan_cases(FULL) if order.group == "unknown"}) == 15
+
+
+def test_a_case_holds_nothing_of_the_truth(made):
+    folders, steps = made
+    assert len(steps) == 2
+    for name in names_in(folders.cases):
+        truth = json.loads((folders.sealed / f"{name}.json").read_text(encoding="utf-8"))
+        files = [path for path in (folders.cases / name).rglob("*") if path.is_file()]
+        kinds = {path.suffix for path in files}
+        assert kinds <= {".toml", ".csv", ".mtx"}
+        assert not [path for path in files if "truth" in path.name or "points" in path.name]
+        words = "".join(path.read_text(encoding="utf-8") for path in files if path.suffix == ".toml")
+        for effect in truth["effects"]:
+            assert effect["effect"] not in words
+            assert not [value for value in effect["parameters"].values() if repr(value) in words]
+        assert str(truth["seed"]) not in words
+        assert "seed" not in words
+    assert not [path for path in folders.cases.rglob("*") if path.is_symlink()]
+
+
+def test_what_is_made_is_not_made_again(made):
+    folders, _ = made
+    before = {path: path.stat().st_mtime_ns for path in folders.root.rglob("*") if path.is_file()}
+    make_cases(plan_cases(COUNTS), folders, workers=1, step=lambda: None)
+    assert {path: path.stat().st_mtime_ns for path in folders.root.rglob("*") if path.is_file()} == before
+
+
+def test_an_answer_that_changes_is_noticed(made):
+    folders, _ = made
+    names = names_in(folders.cases)
+    check_seal(folders, names)
+    path = folders.sealed / f"{names[0]}.json"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("1", "2", 1), encoding="utf-8")
+    with pytest.raises(BrokenSealError, match=names[0]):
+        check_seal(folders, names)
+    path.write_text(text, encoding="utf-8")
+    check_seal(folders, names)
+
+
+def test_the_diagnosis_is_told_nothing_of_the_answers(made, fake):
+    folders, _ = made
+    names = names_in(folders.cases)
+    diagnose_all(names, folders, workers=2, step=lambda: None, command=fake)
+    log = Path(fake[1]).with_suffix(".log")
+    calls = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+    assert len(calls) == 2
+    for stage, pipeline, option, out, quiet in calls:
+        assert (stage, option, quiet) == ("diagnose", "--out", "--quiet")
+        told = " ".join([pipeline, out, Path(pipeline).read_text(encoding="utf-8")])
+        assert str(folders.sealed) not in told
+        assert folders.sealed.name not in told
+    diagnose_all(names, folders, workers=2, step=lambda: None, command=fake)
+    assert len(log.read_text(encoding="utf-8").splitlines()) == 2  # what this code has diagnosed is not done again
+    assert all(read_done(folders.diagnosed, name).code == code_digest() for name in names)
+    assert all(worth_predicting(name, folders) for name in names if points_of(folders, name))
+    predict_all(names, folders, workers=1, step=lambda: None, command=fake)
+    calls = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()][2:]
+    assert [call[0] for call in calls] == ["predict"] * 4
+    assert [Path(call[3]).name for call in calls] == ["with", "without"] * 2
+
+
+def points_of(folders, name):
+    return tomllib.loads((folders.cases / name / "pipeline.toml").read_text(encoding="utf-8"))["predict"]["points"]
+
+
+def test_pipelines_apply_the_finding_or_leave_it_out(made):
+    folders, _ = made
+    name = names_in(folders.cases)[0]
+    handed_in = (folders.cases / name / "pipeline.toml").read_bytes()
+    applied = tomllib.loads(write_pipeline(folders, name, applying=True).read_text(encoding="utf-8"))
+    without = tomllib.loads(write_pipeline(folders, name, applying=False).read_text(encoding="utf-8"))
+    assert applied["diagnose"] == {"apply": True}
+    assert "diagnose" not in without
+    for table in (applied, without):
+        assert Path(table["pipeline"]["test"]) == (folders.cases / name / "test.toml").resolve()
+        assert table["fit"] == tomllib.loads(handed_in.decode())["fit"]
+    assert (folders.cases / name / "pipeline.toml").read_bytes() == handed_in
+
+
+def test_a_command_that_fails_or_hangs_is_written_down(tmp_path):
+    failed = run([sys.executable, "-c", "import sys; sys.exit('frf-ipz: no such file')"], code="x")
+    assert (failed.status, failed.message) == (1, "frf-ipz: no such file")
+    hung = run([sys.executable, "-c", "import time; time.sleep(60)"], code="x", longest_s=0.2)
+    assert hung.status == -9
+    busy = run([sys.executable, "-c", "import time\nwhile time.process_time() < 0.3: pass"], code="x")
+    assert busy.status == 0
+    assert busy.cpu_s >= 0.3
+    assert not list(tmp_path.iterdir())
