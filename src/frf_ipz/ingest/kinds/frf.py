@@ -121,20 +121,28 @@ def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, .
         lines = lines[_has(frf.frequency_hz, lines)]
     low = max(frf.frequency_hz[0] for frf in frfs)
     high = min(frf.frequency_hz[-1] for frf in frfs)
-    for frf in frfs:
-        frequency = frf.frequency_hz
-        could = int(np.count_nonzero((frequency >= low * (1 - 1e-9)) & (frequency <= high * (1 + 1e-9))))
-        if len(lines) < 2 or len(lines) < MOST_LOST * could:
-            raise FileFormatError(
-                frf.source.path,
-                f"its lines ({len(frequency)} from {frequency[0]:g} to {frequency[-1]:g} Hz) are not those of "
-                f"{frfs[0].source.path.name} ({len(frfs[0].frequency_hz)} from {frfs[0].frequency_hz[0]:g} to "
-                f"{frfs[0].frequency_hz[-1]:g} Hz): all FRFs of a test need common lines; export them alike",
-            )
+    could = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
+    if len(lines) < max(2, MOST_LOST * could):
+        raise _no_common_lines(frfs)
     most = max(len(frf.frequency_hz) for frf in frfs)
     if len(lines) == most:
         return lines, ()
     return lines, (f"{len(lines)} of up to {most} lines are used: those that all files share",)
+
+
+def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:
+    return int(np.count_nonzero((frequency_hz >= low * (1 - 1e-9)) & (frequency_hz <= high * (1 + 1e-9))))
+
+
+def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
+    """Make the error that names the file that shares the fewest lines with the first."""
+    first = frfs[0]
+    odd = min(frfs, key=lambda frf: int(_has(frf.frequency_hz, first.frequency_hz).sum()))
+    given, wanted = (
+        f"{len(frf.frequency_hz)} from {frf.frequency_hz[0]:g} to {frf.frequency_hz[-1]:g} Hz" for frf in (odd, first)
+    )
+    problem = f"its lines ({given}) are not those of {first.source.path.name} ({wanted}): all FRFs of a test need "
+    return FileFormatError(odd.source.path, problem + "common lines; export them alike")
 
 
 def _has(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:

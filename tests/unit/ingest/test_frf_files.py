@@ -1,0 +1,327 @@
+"""FRFs that were estimated elsewhere, in all formats."""
+
+import re
+
+import numpy as np
+import pytest
+import pyuff
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+from frf_ipz.quantities import FrfQuantity
+from synthetic_campaign import Structure, write_test
+
+LINES_HZ = np.arange(0.0, 200.5, 0.5)
+VALUES = Structure().accelerance(2j * np.pi * LINES_HZ)
+DIGITS = 1e-14  # relative: the numbers are written with all of their digits
+GRAVITY = 9.80665
+
+
+def read(folder, *entries):
+    body = "".join(f"[[frf]]\n{entry}\n" for entry in entries)
+    return estimate_frfs(read_test(write_test(folder, body, kind="frf")), IngestOptions())
+
+
+def message(folder, *entries):
+    with pytest.raises(InputError) as caught:
+        read(folder, *entries)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def entry(file="frf.csv", quantity="accelerance", **more):
+    given = {"file": file, "quantity": quantity, **more}
+    return "\n".join(f"{key} = {str(value).replace(chr(39), chr(34))}" for key, value in quoted(given).items())
+
+
+def quoted(given):
+    return {key: f'"{value}"' if isinstance(value, str) else list_or_number(value) for key, value in given.items()}
+
+
+def list_or_number(value):
+    return list(value) if isinstance(value, tuple) else value
+
+
+def long_csv(
+    folder, *, name="frf.csv", extra=(), factor=1.0, lines_hz=LINES_HZ, values=VALUES, outputs=("1:+z", "2:-x")
+):
+    rows = [",".join(["frequency_hz", "output_dof", "input_dof", "real", "imag", *extra])]
+    for column, output in enumerate(outputs):
+        for frequency, value in zip(lines_hz, values[:, column] * factor, strict=True):
+            more = {"coherence": 0.9, "variance": 0.25}
+            numbers = [repr(float(number)) for number in (value.real, value.imag, *(more[key] for key in extra))]
+            rows.append(",".join([repr(float(frequency)), output, "7:+z", *numbers]))
+    (folder / name).write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def text_file(folder, columns, *, name="frf.txt", delimiter="\t"):
+    np.savetxt(
+        folder / name, np.column_stack(columns), fmt="%.16e", delimiter=delimiter, header="an analyser", comments=""
+    )
+
+
+def expect(frfs, values=VALUES):
+    np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ, rtol=DIGITS)
+    assert np.abs(frfs.values - values).max() <= 10 * DIGITS * np.abs(values).max()
+
+
+def test_long_csv(tmp_path):
+    long_csv(tmp_path)
+    result = read(tmp_path, entry())
+    frfs = result.frfs
+    expect(frfs)
+    assert [str(label) for label in frfs.labels] == ["1:+z / 7:+z", "2:-x / 7:+z"]
+    assert [label.output_channel for label in frfs.labels] == ["output 1:+z", "output 2:-x"]
+    assert frfs.labels[0].input_channel == "input 7:+z"
+    assert np.isnan(frfs.variance).all()
+    assert np.isnan(frfs.coherence).all()
+    assert list(frfs.averages) == [0, 0]
+    assert result.blows.empty
+
+
+def test_coherence_and_variance_come_along(tmp_path):
+    long_csv(tmp_path, extra=("coherence", "variance"))
+    frfs = read(tmp_path, entry()).frfs
+    assert np.unique(frfs.coherence) == pytest.approx([0.9])
+    assert np.unique(frfs.variance) == pytest.approx([0.25])
+
+
+def test_units_scale_values_and_their_variance(tmp_path):
+    long_csv(tmp_path, extra=("variance",), factor=1 / GRAVITY)
+    frfs = read(tmp_path, entry(unit="g_0/N")).frfs
+    expect(frfs)
+    assert np.unique(frfs.variance) == pytest.approx([0.25 * GRAVITY**2])
+
+
+def test_rows_of_a_long_csv_may_come_in_any_order(tmp_path):
+    long_csv(tmp_path)
+    head, *rows = (tmp_path / "frf.csv").read_text(encoding="utf-8").splitlines()
+    mixed = [rows[place] for place in np.random.default_rng(1).permutation(len(rows))]
+    (tmp_path / "frf.csv").write_text("\n".join([head, *mixed]), encoding="utf-8")
+    frfs = read(tmp_path, entry()).frfs
+    order = [str(label.output_dof) for label in frfs.labels].index("1:+z")
+    np.testing.assert_allclose(frfs.values[:, order], VALUES[:, 0], rtol=DIGITS)
+
+
+@pytest.mark.parametrize("delimiter", ["\t", " ", ",", ";"])
+def test_text_with_real_and_imaginary_parts(tmp_path, delimiter):
+    text_file(tmp_path, [LINES_HZ, VALUES[:, 0].real, VALUES[:, 0].imag], delimiter=delimiter)
+    frfs = read(tmp_path, one_text(["frequency_hz", "real", "imag"])).frfs
+    expect(frfs, VALUES[:, :1])
+
+
+def one_text(columns, file="frf.txt", output="1:+z", **more):
+    return entry(file, output_dof=output, input_dof="7:+z", columns=tuple(columns), skip_rows=1, **more)
+
+
+@pytest.mark.parametrize(
+    ("columns", "make"),
+    [
+        (("magnitude", "phase_rad"), lambda h: (np.abs(h), np.angle(h))),
+        (("magnitude_db", "phase_deg"), lambda h: (20 * np.log10(np.abs(h)), np.degrees(np.angle(h)))),
+        (("phase_deg", "magnitude"), lambda h: (np.degrees(np.angle(h)), np.abs(h))),
+    ],
+)
+def test_text_with_magnitude_and_phase(tmp_path, columns, make):
+    lines, values = LINES_HZ[1:], VALUES[1:, 1]
+    text_file(tmp_path, [lines, *make(values)])
+    frfs = read(tmp_path, one_text(["frequency_hz", *columns])).frfs
+    np.testing.assert_allclose(frfs.values[:, 0], values, rtol=1e-12)
+
+
+def test_columns_may_be_skipped(tmp_path):
+    text_file(tmp_path, [LINES_HZ, LINES_HZ, VALUES[:, 0].imag, np.full(len(LINES_HZ), 0.5), VALUES[:, 0].real])
+    frfs = read(tmp_path, one_text(["frequency_hz", "skip", "imag", "coherence", "real"])).frfs
+    expect(frfs, VALUES[:, :1])
+    assert np.unique(frfs.coherence) == [0.5]
+
+
+def universal(folder, *, func_type=4, values=VALUES[:, 0], **more):
+    of_set = {
+        "func_type": func_type,
+        "rsp_node": 3,
+        "rsp_dir": -3,
+        "ref_node": 4,
+        "ref_dir": 1,
+        "abscissa_spacing": 1,
+        "abscissa_min": 0.0,
+        "abscissa_inc": 0.5,
+        "ordinate_spec_data_type": 12,
+        "orddenom_spec_data_type": 13,
+        "rsp_ent_name": "part",
+        "ref_ent_name": "part",
+        "id1": "a measurement",
+    } | more
+    file = pyuff.UFF(str(folder / "frf.uff"))
+    data = pyuff.prepare_58(binary=0, data=values, x=LINES_HZ, **of_set)
+    file.write_sets([data], "add" if (folder / "frf.uff").exists() else "overwrite")
+
+
+def make_binary(file, values):
+    """Write the numbers of a universal file of one set as little-endian doubles, as the format 58b wants them."""
+    lines = file.read_bytes().split(b"\n")
+    data = np.ascontiguousarray(values, "<c16").tobytes()
+    head = b"    58b%6d%6d%12d%12d%6d%6d%12d%12d" % (1, 2, 11, len(data), 0, 0, 0, 0)
+    file.write_bytes(b"\n".join([lines[0], head, *lines[2:13], data]) + b"\n    -1\n")
+
+
+def test_universal_files(tmp_path):
+    universal(tmp_path)
+    universal(tmp_path, rsp_node=5, rsp_dir=4, values=VALUES[:, 1])
+    frfs = read(tmp_path, entry("frf.uff")).frfs
+    assert [str(label) for label in frfs.labels] == ["3:-z / 4:+x", "5:+rx / 4:+x"]
+    np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ, rtol=1e-6)
+    assert np.abs(frfs.values - VALUES).max() < 1e-11 * np.abs(VALUES).max()  # written with 12 digits
+
+
+def test_binary_universal_files(tmp_path):
+    universal(tmp_path)
+    make_binary(tmp_path / "frf.uff", VALUES[:, 0])
+    frfs = read(tmp_path, entry("frf.uff")).frfs
+    assert [str(label) for label in frfs.labels] == ["3:-z / 4:+x"]
+    np.testing.assert_array_equal(frfs.values[:, 0], VALUES[:, 0])
+
+
+def test_coherences_of_universal_files_are_found(tmp_path):
+    universal(tmp_path)
+    universal(tmp_path, func_type=6, values=np.full(len(LINES_HZ), 0.75 + 0j))
+    frfs = read(tmp_path, entry("frf.uff")).frfs
+    assert frfs.n_frfs == 1
+    assert np.unique(frfs.coherence) == pytest.approx([0.75])
+
+
+def test_units_in_labels_of_universal_files_are_used(tmp_path):
+    universal(tmp_path, ordinate_axis_units_lab="g", orddenom_axis_units_lab="N", values=VALUES[:, 0] / GRAVITY)
+    frfs = read(tmp_path, entry("frf.uff")).frfs
+    assert np.abs(frfs.values[:, 0] - VALUES[:, 0]).max() < 1e-11 * np.abs(VALUES).max()  # written with 12 digits
+
+
+def test_several_files_make_one_test(tmp_path):
+    text_file(tmp_path, [LINES_HZ, VALUES[:, 0].real, VALUES[:, 0].imag], name="a.txt")
+    text_file(tmp_path, [LINES_HZ, VALUES[:, 1].real, VALUES[:, 1].imag], name="b.txt")
+    columns = ["frequency_hz", "real", "imag"]
+    expect(read(tmp_path, one_text(columns, "a.txt"), one_text(columns, "b.txt", "2:+z")).frfs)
+
+
+def test_only_common_lines_are_used_and_said(tmp_path):
+    long_csv(tmp_path, outputs=("1:+z",))
+    long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ[20:], values=VALUES[20:])
+    result = read(tmp_path, entry(), entry("b.csv"))
+    np.testing.assert_allclose(result.frfs.frequency_hz, LINES_HZ[20:], rtol=DIGITS)
+    np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[20:, 0], rtol=DIGITS)
+    assert "381 of up to 401 lines are used" in result.warnings[0]
+
+
+def test_masses_and_scale_are_handed_on(tmp_path):
+    long_csv(tmp_path)
+    path = write_test(tmp_path, f"[[frf]]\n{entry()}\n", kind="frf", head='unknown_scale = "common"')
+    assert estimate_frfs(read_test(path), IngestOptions()).frfs.unknown_scale == "common"
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda text: text.replace("frequency_hz", "f"), "no known format for FRFs.*CSV.*UFF 58"),
+        (lambda text: text.replace("output_dof", "output"), "line 1: has no column 'output_dof'"),
+        (lambda text: text.replace("1:+z", "1:+w"), r"column 'output_dof' or 'input_dof'.*1:\+w"),
+        (lambda text: text.replace("\n0.5,1:+z,7:+z,", "\n0.5,1:+z,7:+z,x", 1), "line 3, column 'real'.*'x"),
+        (lambda text: text.replace("\n0.5,1:+z,7:+z,", "\n0.5,1:+z,7:+z,,", 1), "line 3: has 6 values.*5 columns"),
+        (lambda text: text.replace("\n0.5,1:+z", "\nnan,1:+z", 1), "line 3, column 'frequency_hz'.*'nan'"),
+        (lambda text: text.replace("\n0.5,1:+z", "\n0.0,1:+z", 1), "1:\\+z / 7:\\+z do not ascend from 0"),
+        (lambda text: text[: len(text) // 2].rpartition(",")[0], "cut off"),
+        (lambda text: text.splitlines()[0], "no line that begins with a number"),
+        (lambda _: "", "is empty"),
+    ],
+)
+def test_faults_in_a_long_csv(tmp_path, change, says):
+    long_csv(tmp_path)
+    file = tmp_path / "frf.csv"
+    file.write_text(change(file.read_text(encoding="utf-8")), encoding="utf-8")
+    text = message(tmp_path, entry())
+    assert re.search(says, text), text
+    assert "frf.csv" in text
+
+
+def test_values_that_cannot_be(tmp_path):
+    long_csv(tmp_path, extra=("variance",))
+    file = tmp_path / "frf.csv"
+    file.write_text(file.read_text(encoding="utf-8").replace(",0.25\n", ",-0.25\n", 1), encoding="utf-8")
+    assert re.search("column 'variance': the FRF .* has a negative variance", message(tmp_path, entry()))
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: entry("absent.csv"), r"absent\.csv: there is no such file"),
+        (lambda: entry(quantity="inertance"), "quantity.*receptance.*mobility.*accelerance"),
+        (lambda: entry(unit="m/N"), "'m/N' is no unit of accelerance; expected is a unit like m/s\\^2/N"),
+        (lambda: entry(unit="quark"), "'quark' is no unit that can be read"),
+        (lambda: one_text(["frequency_hz", "real", "imagin"]), "'columns' names 'imagin'; did you mean 'imag'"),
+        (lambda: one_text(["frequency_hz", "real"]), "needed are frequency_hz and either real and imag"),
+        (lambda: one_text(["frequency_hz", "real", "imag", "coherence"]), "has 3 columns, but 'columns'.*names 4"),
+        (lambda: entry("frf.txt", columns=("frequency_hz", "real", "imag")), "needs 'output_dof' and 'input_dof'"),
+        (lambda: one_text(["frequency_hz", "real", "imag"], output="1:q"), r"\[\[frf\]\] 'frf.txt'.*1:q"),
+        (lambda: entry(skip_row=3), "skip_row.*did you mean 'skip_rows'"),
+    ],
+)
+def test_mistakes_in_an_entry(tmp_path, make, says):
+    long_csv(tmp_path)
+    text_file(tmp_path, [LINES_HZ, VALUES[:, 0].real, VALUES[:, 0].imag])
+    text = message(tmp_path, make())
+    assert re.search(says, text), text
+
+
+def test_one_frf_twice(tmp_path):
+    long_csv(tmp_path)
+    long_csv(tmp_path, name="b.csv")
+    assert re.search(
+        r"b\.csv: holds the FRF .* that frf\.csv holds already", message(tmp_path, entry(), entry("b.csv"))
+    )
+
+
+def test_files_without_common_lines(tmp_path):
+    long_csv(tmp_path, outputs=("1:+z",))
+    long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)
+    assert re.search(r"b\.csv: its lines .* are not those of frf\.csv", message(tmp_path, entry(), entry("b.csv")))
+
+
+def test_a_channel_in_a_test_of_frfs(tmp_path):
+    long_csv(tmp_path)
+    channel = '[[channel]]\ncolumn = "a"\nrole = "input"\nquantity = "force"\n'
+    path = write_test(tmp_path, channel + f"[[frf]]\n{entry()}\n", kind="frf")
+    with pytest.raises(InputError, match=r"key 'channel'.*has no channels"):
+        read_test(path)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"func_type": 1}, "holds no data set 58 with a frequency response function"),
+        ({"rsp_dir": 0}, "states no direction .rsp_dir 0 at node 3.; name output_dof and input_dof"),
+        ({"ordinate_spec_data_type": 8}, "is stated to be receptance, but the test says accelerance"),
+        ({"orddenom_spec_data_type": 12}, "is not a ratio to a force"),
+    ],
+)
+def test_faults_in_a_universal_file(tmp_path, more, says):
+    values = VALUES[:, 0].real if more.get("func_type") == 1 else VALUES[:, 0]
+    universal(tmp_path, values=values, **more)
+    text = message(tmp_path, entry("frf.uff"))
+    assert re.search(says, text), text
+    assert "frf.uff" in text
+
+
+def test_a_universal_file_that_is_cut_off(tmp_path):
+    universal(tmp_path)
+    file = tmp_path / "frf.uff"
+    file.write_bytes(file.read_bytes()[:3000])
+    assert "frf.uff" in message(tmp_path, entry("frf.uff"))
+
+
+def test_a_direction_of_a_universal_file_may_be_given(tmp_path):
+    universal(tmp_path, rsp_dir=0)
+    frfs = read(tmp_path, entry("frf.uff", output_dof="9:+y")).frfs
+    assert str(frfs.labels[0]) == "9:+y / 4:+x"
+    assert frfs.labels[0].quantity is FrfQuantity.ACCELERANCE
