@@ -39,6 +39,9 @@ QUIET = 0.1  # of the signal's spread: what its first samples stay below if it s
 ENOUGH = 16  # averages that the shortest useful segments must give
 FEW = 6  # averages that tell something at all
 SETTLED = 1.3  # the unexplained share falls by less than this from one length of segments to the double
+SATURATED = 0.5  # of the response: where more is unexplained at all lengths, it may be leakage that is
+SMALL = 1e-3  # of the response: leakage that is smaller than the scatter of so few averages
+EXCITED = 1e-3  # of the strongest line's force power: lines with less tell nothing about leakage
 SHORTEST = 256  # samples of a segment
 HANN_HALF_OVERLAP = 1.0 / 18.0  # twice the squared correlation of segments that overlap by half
 
@@ -154,15 +157,13 @@ def _asked_segment(survey: Survey, segment_s: float) -> int:
 
 def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Survey:
     tried = _try_segments(files, survey)
-    settled = [
-        short
-        for short, double in zip(tried[1:], tried[:-1], strict=True)
-        if short.count >= ENOUGH and short.unexplained <= SETTLED * double.unexplained
-    ]
-    if settled:
-        best = settled[0]
-        why = f"{100 * best.unexplained:.2g} % of the response is unexplained, and longer segments do not explain more"
-        return _in_segments(survey, best.length, why)
+    for short, double in zip(tried[1:], tried[:-1], strict=True):
+        if short.count < ENOUGH:
+            continue
+        if short.unexplained <= SMALL or short.unexplained <= min(SETTLED * double.unexplained, SATURATED):
+            why = f"long enough: {100 * short.unexplained:.2g} % of the response is unexplained by the force"
+            return _in_segments(survey, short.length, why)
+        break  # shorter ones leak more
     if may_window and all(record.rested for record in survey.used):
         shortest = min(record.n_samples for record in survey.used)
         why = "all start from rest, and are too short for segments without leakage"
@@ -170,8 +171,9 @@ def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Surve
     lengths = [trial.length for trial in sorted(tried, key=lambda trial: trial.unexplained)]
     length = lengths[0] if lengths else min(record.n_samples for record in survey.used) // 4
     warning = (
-        "the records are too short: segments without leakage would give too few averages, and they do not start from "
-        "rest; record longer, or switch the shaker on within the record. Expect peaks that are too low and too wide"
+        "the records are too short, or most of the response is noise: segments without leakage would give too few "
+        "averages, and the records do not start from rest; record longer, or switch the shaker on within the record. "
+        "Expect peaks that are too low and too wide"
     )
     survey = _in_segments(survey, length, "the least bad")
     return replace(survey, warnings=(*survey.warnings, warning))
@@ -196,9 +198,10 @@ def _try_segments(files: RecordingFiles, survey: Survey) -> list[_Segments]:
 
 def _measure(length: int, sums: SpectrumSums) -> _Segments:
     independent = independent_segments(sums.count)
-    unexplained = unexplained_power(sums).sum(axis=0) / (independent - 1.0)
-    share = unexplained / np.maximum(sums.responses.sum(axis=1) / independent, np.finfo(float).tiny)
-    return _Segments(length=length, count=sums.count, unexplained=float(np.mean(share)))
+    unexplained = unexplained_power(sums) / (independent - 1.0)
+    share = unexplained / np.maximum(sums.responses.T / independent, np.finfo(float).tiny)
+    excited = sums.force > EXCITED * sums.force.max()
+    return _Segments(length=length, count=sums.count, unexplained=float(np.mean(share[excited])))
 
 
 def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:

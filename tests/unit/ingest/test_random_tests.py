@@ -1,0 +1,148 @@
+"""Shaker tests: long stationary records in segments, records from rest whole under an exponential window."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.survey.random import independent_segments, segments_of
+from frf_ipz.ingest.test_file import read_test
+from synthetic_campaign import Structure, respond, write_csv, write_test
+
+STEP_S = 1 / 1024
+RECORD = '[[record]]\ndof = "7:+z"\nfiles = ["records/*.csv"]\n'
+STRUCTURE = Structure()
+BAND_HZ = (10.0, 250.0)
+
+
+def estimate(path, **options):
+    return estimate_frfs(read_test(path), IngestOptions(**options))
+
+
+def smooth_noise(rng, n_samples):
+    """Random force without anything near half of the sampling rate, where sampled responses are no longer exact."""
+    spectrum = np.fft.rfft(rng.standard_normal(n_samples))
+    frequency = np.fft.rfftfreq(n_samples, STEP_S)
+    return np.fft.irfft(spectrum * np.exp(-((frequency / 280.0) ** 8)), n_samples)
+
+
+def from_rest(rng, n_samples, *, structure=STRUCTURE, noise=0.0):
+    """Force that is switched on after a short while, and the responses."""
+    force = smooth_noise(rng, n_samples)
+    start = n_samples // 50
+    force *= np.clip((np.arange(n_samples) - start) / start, 0.0, 1.0) ** 2
+    signals = np.vstack([force, respond(structure, force, STEP_S)])
+    signals[1:] += noise * rng.standard_normal(signals[1:].shape)
+    return signals
+
+
+def stationary(rng, n_samples, **more):
+    """A stretch of a test that has been running for a while."""
+    return from_rest(rng, n_samples + 8192, **more)[:, 8192:]
+
+
+def write(folder, records, step_s=STEP_S):
+    for number, signals in enumerate(records):
+        write_csv(folder / "records" / f"{number}.csv", signals, step_s)
+    return write_test(folder, RECORD, kind="random")
+
+
+def errors(frfs, structure=STRUCTURE):
+    band = frfs.in_band(BAND_HZ)
+    truth = structure.accelerance(frfs.s[band])
+    return np.abs(frfs.values[band] - truth) / np.abs(truth).max(axis=0)
+
+
+def test_a_long_stationary_record_is_cut_into_segments(tmp_path):
+    rng = np.random.default_rng(1)
+    result = estimate(write(tmp_path, [stationary(rng, 120_000, noise=0.01)]))
+    assert "under Hann windows, overlapping by half" in result.choices[0]
+    assert result.frfs.window_decay_1_s == 0.0
+    assert result.frfs.averages[0] >= 16
+    assert errors(result.frfs).max() < 0.03
+    assert result.warnings == ()
+    assert np.median(result.frfs.coherence[result.frfs.in_band(BAND_HZ)]) > 0.99
+
+
+def test_records_from_rest_are_used_whole_and_give_exact_frfs(tmp_path):
+    rng = np.random.default_rng(2)
+    light = Structure(damping_ratio=(0.003, 0.002, 0.002))
+    result = estimate(write(tmp_path, [from_rest(rng, 8192, structure=light) for _ in range(4)]))
+    assert "records used whole" in result.choices[0]
+    assert result.frfs.window_decay_1_s == pytest.approx(7.0 / (8192 * STEP_S))
+    assert list(result.frfs.averages) == [4, 4]
+    assert errors(result.frfs, light).max() < 5e-3  # exp(-7) of the motion at the end is cut off
+    assert result.blows.used.all()
+
+
+def test_the_variance_of_whole_records_is_their_error(tmp_path):
+    rng = np.random.default_rng(3)
+    light = Structure(damping_ratio=(0.003, 0.002, 0.002))
+    frfs = estimate(write(tmp_path, [from_rest(rng, 8192, structure=light, noise=0.3) for _ in range(6)])).frfs
+    band = frfs.in_band(BAND_HZ)
+    error = np.abs(frfs.values - light.accelerance(frfs.s))[band] ** 2
+    assert np.mean(error / frfs.variance[band]) == pytest.approx(1.0, abs=0.2)
+
+
+def test_the_variance_of_segments_is_their_error(tmp_path):
+    rng = np.random.default_rng(4)
+    frfs = estimate(write(tmp_path, [stationary(rng, 60_000, noise=0.3)]), segment_s=4.0).frfs
+    band = frfs.in_band(BAND_HZ)
+    error = np.abs(frfs.values - STRUCTURE.accelerance(frfs.s))[band] ** 2
+    assert np.mean(error / frfs.variance[band]) == pytest.approx(1.0, abs=0.25)
+
+
+def test_segments_may_be_asked_for(tmp_path):
+    path = write(tmp_path, [stationary(np.random.default_rng(5), 20_000)])
+    result = estimate(path, segment_s=2.0)
+    assert result.frfs.frequency_hz[1] == pytest.approx(0.5)
+    assert list(result.frfs.averages) == [20_000 // 1024 - 1] * 2
+    assert "as asked for" in result.choices[0]
+
+
+def test_records_that_are_too_short_and_never_at_rest_are_used_with_a_warning(tmp_path):
+    light = Structure(damping_ratio=(0.001, 0.001, 0.001))
+    result = estimate(write(tmp_path, [stationary(np.random.default_rng(6), 3000, structure=light)]))
+    assert any("too short" in warning and "do not start from rest" in warning for warning in result.warnings)
+
+
+def test_overload_of_a_record_is_left_out(tmp_path):
+    rng = np.random.default_rng(7)
+    records = [stationary(rng, 20_000, noise=0.01) for _ in range(3)]
+    limit = 0.4 * np.abs(records[1][1]).max()
+    records[1][1] = np.clip(records[1][1], -limit, limit)
+    result = estimate(write(tmp_path, records))
+    assert list(result.blows.used) == [True, False, True]
+    assert result.blows.marks[1] == "overload of acc_1"
+
+
+@pytest.mark.parametrize("segment_s", [1e-3, 1e3])
+def test_segments_that_cannot_be_are_refused(tmp_path, segment_s):
+    path = write(tmp_path, [stationary(np.random.default_rng(8), 4000)])
+    with pytest.raises(InputError, match=r"segment_s = .* samples; possible are 32 to 4000"):
+        estimate(path, segment_s=segment_s)
+
+
+def test_records_can_be_read_whole(tmp_path):
+    signals = from_rest(np.random.default_rng(9), 8192)
+    (record,) = read_blows(read_test(write(tmp_path, [signals])), IngestOptions())
+    assert record.rested
+    np.testing.assert_allclose(record.force, signals[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(record.responses, signals[1:], rtol=1e-12, atol=1e-12)
+
+
+def test_half_overlapping_segments_cover_the_record():
+    pieces = list(segments_of(np.ones((2, 1000)), 200))
+    assert len(pieces) == 9
+    total = np.zeros(1000)
+    for number, piece in enumerate(pieces):
+        total[100 * number : 100 * number + 200] += piece[0]
+    np.testing.assert_allclose(total[100:900], 1.0, rtol=1e-12)
+
+
+def test_overlapping_segments_are_worth_a_little_less_than_their_number():
+    assert independent_segments(0) == 0.0
+    assert independent_segments(1) == 1.0
+    assert independent_segments(1000) == pytest.approx(1000 / (1 + 1 / 18), rel=1e-3)
