@@ -174,7 +174,7 @@ def _best(said: Cause, truth: Truth, layout: Layout) -> tuple[Cause | None, str 
     compared = []
     for option in _accepted(truth):
         if option.effect == said.effect:
-            place = compare_places(said.effect, option.location, said.location, layout)
+            place = compare_places(option.location, said.location, layout)
             if option in truth.causes or place != WRONG:
                 compared.append((option, place))
     return max(compared, key=lambda pair: RANKS.get(pair[1], 3), default=(None, None))
@@ -183,9 +183,7 @@ def _best(said: Cause, truth: Truth, layout: Layout) -> tuple[Cause | None, str 
 def _found(cause: Cause, said: Diagnosis, layout: Layout) -> list[str | None]:
     """Places of the findings that name a true cause, the closest first."""
     places = [
-        compare_places(cause.effect, cause.location, one.location, layout)
-        for one in said.findings
-        if one.effect == cause.effect
+        compare_places(cause.location, one.location, layout) for one in said.findings if one.effect == cause.effect
     ]
     return sorted(places, key=lambda place: -RANKS.get(place, 3))
 
@@ -204,7 +202,7 @@ def _in_place_set(option: Cause | None, said: Cause | None, layout: Layout) -> b
     """Whether the true place of a right effect is among the possible ones; None for an effect without a place."""
     if option is None or said is None or not said.places:
         return None
-    compared = [compare_places(option.effect, option.location, place, layout) for place in said.places]
+    compared = [compare_places(option.location, place, layout) for place in said.places]
     return None if None in compared else EXACT in compared
 
 
@@ -255,7 +253,7 @@ def _flagged_place(truth: Truth, said: Diagnosis, layout: Layout) -> str | None:
     cause = truth.causes[0] if truth.causes else None
     if truth.group != "unknown" or cause is None or not cause.nonlinear or "channels" in cause.location:
         return None
-    found = [compare_places(UNKNOWN, cause.location, place, layout) or "wrong" for place in said.places]
+    found = [compare_places(cause.location, place, layout) or "wrong" for place in said.places]
     return max(found, key=RANKS.__getitem__, default="wrong")
 
 

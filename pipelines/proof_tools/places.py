@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+KEYS = ("nodes", "elements", "springs", "groups", "channels")
 EXACT, NEAR, WRONG = "exact", "near", "wrong"
 RANKS = {EXACT: 2, NEAR: 1, WRONG: 0}
 SAME_LENGTH = 1.001  # of distances: drawn positions have nine digits
@@ -26,10 +27,13 @@ class Layout:
         Of the nodes of a model of kind matrices, m. Empty for others.
     springs : mapping of str to pair of int
         Nodes of each spring of a lumped model.
+    ends : mapping of str to int
+        Nodes at the ends of a beam.
     """
 
     positions: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     springs: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    ends: Mapping[str, int] = field(default_factory=dict)
 
     def are_neighbours(self, a: int, b: int) -> bool:
         """Whether two nodes are the same or next to each other.
@@ -76,22 +80,20 @@ def read_layout(case: Path) -> Layout:
     table = tomllib.loads((case / "model.toml").read_text(encoding="utf-8"))
     if "lumped" in table:
         return Layout(springs={one["id"]: tuple(one["nodes"]) for one in table["lumped"]["spring"]})
-    if "matrices" not in table:
-        return Layout()
+    if "beam" in table:
+        return Layout(ends={"left": 1, "right": table["beam"]["elements"] + 1})
     lines = (case / table["matrices"]["dofs"]).read_text(encoding="utf-8").split()
     rows = [line.split(",") for line in lines[1:]]
     return Layout(positions={int(row[0]): tuple(float(x) for x in row[2:5]) for row in rows})
 
 
-def compare_places(effect: str, truth: Mapping[str, Any], said: Mapping[str, Any], layout: Layout) -> str | None:
+def compare_places(truth: Mapping[str, Any], said: Mapping[str, Any], layout: Layout) -> str | None:
     """Compare a place with the true one.
 
     Parameters
     ----------
-    effect : str
-        What is there.
     truth, said : mapping
-        As ``location`` in ``diagnosis.json``.
+        As ``location`` in ``diagnosis.json``. The end of a beam may be named by its side or by its node.
     layout : Layout
         Of the model.
 
@@ -100,14 +102,11 @@ def compare_places(effect: str, truth: Mapping[str, Any], said: Mapping[str, Any
     str, or None
         ``exact``, ``near`` (within one node or element) or ``wrong``; None for an effect without a place.
     """
-    keys = [key for key in ("nodes", "elements", "springs", "groups", "channels", "end") if truth.get(key)]
-    if effect == "boundary_compliance" and "end" in truth and "end" in said:
-        keys = ["end"]
-    if not keys:
-        return None
-    if "nodes" in keys and "end" in keys:  # either says where it is
-        keys = ["end"] if said.get("end") else ["nodes"]
-    return min((_compare(key, truth[key], said.get(key), layout) for key in keys), key=RANKS.__getitem__)
+    if truth.get("end") and not said.get("end"):
+        node = layout.ends.get(truth["end"])
+        truth = {"nodes": truth.get("nodes") or [node]}
+    keys = ["end"] if truth.get("end") else [key for key in KEYS if truth.get(key)]
+    return min((_compare(key, truth[key], said.get(key), layout) for key in keys), key=RANKS.get, default=None)
 
 
 def _compare(key: str, truth: Any, said: Any, layout: Layout) -> str:  # noqa: ANN401 - a list or a name

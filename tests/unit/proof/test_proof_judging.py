@@ -165,6 +165,8 @@ def test_the_reported_set_is_what_lies_within_five_nats(truth, diagnosis):
     assert not judge(truth(LOW_PASS), said, Layout()).in_set
     told = diagnosis("explained", finding(MASS), ambiguity=[{"effects": ["added_mass", "sensor_dynamics"]}])
     assert reported_set(told) == {"added_mass", "sensor_dynamics"}
+    told = diagnosis("explained", finding(MASS), ambiguity=[{"effects": ["time_delay", "sensor_dynamics"]}])
+    assert reported_set(told) == {"added_mass"}
 
 
 def test_what_is_insignificant_is_no_finding(truth, diagnosis):

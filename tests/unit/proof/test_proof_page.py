@@ -63,7 +63,7 @@ def scored(tmp_path_factory):
     folder = tmp_path_factory.mktemp("practice")
     for name, answer in ANSWERS.items():
         (folder / name).mkdir()
-        (folder / name / "model.toml").write_text('[model]\nkind = "beam"\n', encoding="utf-8")
+        (folder / name / "model.toml").write_text("[beam]\nelements = 9\n", encoding="utf-8")
         (folder / name / "pipeline.toml").write_text('[pipeline]\ntest = "test.toml"\n', encoding="utf-8")
         (folder / "truth").mkdir(exist_ok=True)
         (folder / "truth" / f"{name}.json").write_text(json.dumps(answer), encoding="utf-8")

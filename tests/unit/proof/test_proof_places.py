@@ -4,7 +4,7 @@ import pytest
 
 from proof_tools.places import Layout, compare_places, read_layout
 
-BEAM = Layout()
+BEAM = Layout(ends={"left": 1, "right": 41})
 FRAME = Layout(springs={"k1": (0, 1), "k2": (1, 2), "k3": (2, 3), "k4": (0, 3)})
 # rows of three nodes, 0.1 m apart, the rows 0.3 m apart; numbers with gaps
 PLATE = Layout(positions={10 * j + i: (0.1 * i, 0.3 * j, 0.0) for j in range(3) for i in range(3)})
@@ -43,9 +43,10 @@ PLATE = Layout(positions={10 * j + i: (0.1 * i, 0.3 * j, 0.0) for j in range(3) 
     ],
 )
 def test_a_place_is_compared(layout, truth, said, expected):
-    assert compare_places("grounded_spring", truth, said, layout) == expected
+    assert compare_places(truth, said, layout) == expected
 
 
+@pytest.mark.parametrize("truth", [{"end": "right", "nodes": [41]}, {"end": "right"}])
 @pytest.mark.parametrize(
     ("said", "expected"),
     [
@@ -53,12 +54,14 @@ def test_a_place_is_compared(layout, truth, said, expected):
         ({"end": "right", "nodes": [41]}, "exact"),
         ({"nodes": [41]}, "exact"),
         ({"nodes": [40]}, "near"),
+        ({"nodes": [1]}, "wrong"),
         ({"end": "left"}, "wrong"),
         ({"end": "left", "nodes": [41]}, "wrong"),
+        ({}, "wrong"),
     ],
 )
-def test_an_end_may_be_named_by_its_side_or_its_node(said, expected):
-    assert compare_places("boundary_compliance", {"end": "right", "nodes": [41]}, said, BEAM) == expected
+def test_an_end_may_be_named_by_its_side_or_its_node(truth, said, expected):
+    assert compare_places(truth, said, BEAM) == expected
 
 
 def test_the_layout_is_read_from_the_model(tmp_path):
@@ -66,6 +69,8 @@ def test_the_layout_is_read_from_the_model(tmp_path):
     text += '[[lumped.spring]]\nid = "k1"\nnodes = [0, 1]\nstiffness_N_m = 1.0\n'
     (tmp_path / "model.toml").write_text(text, encoding="utf-8")
     assert read_layout(tmp_path).springs == {"k1": (0, 1)}
+    (tmp_path / "model.toml").write_text("[beam]\nelements = 40\n", encoding="utf-8")
+    assert read_layout(tmp_path) == BEAM
     (tmp_path / "model.toml").write_text('[matrices]\ndofs = "dofs.csv"\n', encoding="utf-8")
     (tmp_path / "dofs.csv").write_text("node,direction,x_m,y_m,z_m\n7,z,0.5,0.25,0\n9,z,1,0,0\n", encoding="utf-8")
     assert read_layout(tmp_path).positions == {7: (0.5, 0.25, 0.0), 9: (1.0, 0.0, 0.0)}
