@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import pandas as pd
 
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
+from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel
+from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.rational import PoleResidueModel, ZeroSet
 
 
@@ -30,7 +32,7 @@ class ModalFit:
         Lines of the FrfSet that were fitted.
     zeros : ZeroSet
         Zeros of every FRF, in the band and near it.
-    covariance : (2 n, 2 n) array
+    covariance : (2 n, 2 n) array, or RootCovariance
         Joint covariance of the `n_modes` poles, then of the zeros: real and imaginary part of each in turn, (rad/s)^2.
         Rows of zeros that are not identifiable hold infinity on the diagonal and 0 elsewhere.
     residue_covariance : (n_modes, n_frfs, 2, 2) array
@@ -58,7 +60,7 @@ class ModalFit:
     band_hz: tuple[float, float]
     used_lines: BoolArray
     zeros: ZeroSet
-    covariance: FloatArray
+    covariance: FloatArray | RootCovariance
     residue_covariance: FloatArray
     value_std: FloatArray
     stabilization: pd.DataFrame
@@ -70,5 +72,6 @@ class ModalFit:
 
     def __post_init__(self) -> None:
         size = 2 * (self.n_modes + len(self.zeros.values))
-        require_shape("the covariance of poles and zeros", self.covariance, (size, size))
+        if self.covariance.shape != (size, size):
+            raise ShapeError(f"the covariance has the shape {self.covariance.shape}; needed is ({size}, {size})")
         require_shape("the covariance of the residues", self.residue_covariance, (self.n_modes, len(self.labels), 2, 2))

@@ -20,9 +20,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import IllConditionedError
 
 
-def reduced_normal_matrix(
-    theta: FloatArray, H: ComplexArray, order: int, *, real: bool
-) -> ComplexArray:
+def reduced_normal_matrix(theta: FloatArray, H: ComplexArray, order: int, *, real: bool) -> ComplexArray:
     """Normal matrix of the denominator's coefficients, the numerators eliminated.
 
     Parameters

@@ -9,12 +9,16 @@ covariance all follow from U and z.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.partial_fractions import pair_columns, stacked
+from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 WORST_PIVOT = 1e-6  # of a unit column: below, the normal equations lose too many digits and QR is taken
 
@@ -35,6 +39,10 @@ class Weighted:
         Weight of an FRF: one over the standard deviation of each part of its noise is profile times gain, N/m.
     full : (n_lines, n_frfs) array or None
         Weights where profile times gain is not good enough.
+    stretch : (n_frfs,) array or None
+        Relative change of all natural frequencies in each FRF, where the structure drifted between recordings.
+    real_modes : bool
+        Residues of receptances are imaginary, as those of normal modes.
     """
 
     s: ComplexArray
@@ -42,6 +50,13 @@ class Weighted:
     profile: FloatArray
     gain: FloatArray
     full: FloatArray | None = None
+    stretch: FloatArray | None = None
+    real_modes: bool = False
+
+    @property
+    def is_shared(self) -> bool:
+        """One basis serves all FRFs."""
+        return self.full is None and self.stretch is None
 
     @property
     def weight(self) -> FloatArray:
@@ -58,7 +73,9 @@ class Compressed:
     poles : (n_poles,) complex array
         Where it was taken, rad/s.
     n_smooth : int
-        Number of smooth columns; then come 2 n_poles of the residues and 2 n_poles of the poles' changes.
+        Number of smooth columns; then come those of the residues and 2 n_poles of the poles' changes.
+    real_modes : bool
+        Residues have imaginary parts only: n_poles columns; otherwise 2 n_poles, real parts first.
     U : (n_systems, n, n) array
         Upper triangular; one system for all FRFs, or one an FRF.
     z : (n_frfs, n) array
@@ -71,6 +88,7 @@ class Compressed:
 
     poles: ComplexArray
     n_smooth: int
+    real_modes: bool
     U: FloatArray
     z: FloatArray
     total: FloatArray
@@ -84,7 +102,7 @@ class Compressed:
     @property
     def n_linear(self) -> int:
         """Number of linear coefficients of an FRF."""
-        return self.n_smooth + 2 * self.n_poles
+        return self.n_smooth + (1 if self.real_modes else 2) * self.n_poles
 
     @property
     def misfit(self) -> FloatArray:
@@ -108,9 +126,21 @@ class Compressed:
         Returns
         -------
         (n_frfs, n_linear) array
-            Smooth ones, real parts of the residues, imaginary parts.
+            Smooth ones, real parts of the residues (not of normal modes), imaginary parts.
         """
         return self.scaled_coefficients() / self.scale[:, None]
+
+    def scaled_residues(self) -> ComplexArray:
+        """Best residues at these poles, times `scale`.
+
+        Returns
+        -------
+        (n_frfs, n_poles) complex array
+            Of receptances.
+        """
+        parts = self.scaled_coefficients()[:, self.n_smooth :]
+        real = np.zeros_like(parts) if self.real_modes else parts[:, : self.n_poles]
+        return np.asarray(real + 1j * parts[:, -self.n_poles :]) if self.n_poles else np.zeros(parts.shape, complex)
 
     def residues(self) -> ComplexArray:
         """Best residues at these poles.
@@ -120,11 +150,10 @@ class Compressed:
         (n_poles, n_frfs) complex array
             Of receptances, m/N rad/s.
         """
-        parts = self.coefficients()[:, self.n_smooth :]
-        return np.asarray(parts[:, : self.n_poles] + 1j * parts[:, self.n_poles :]).T
+        return np.asarray((self.scaled_residues() / self.scale[:, None]).T)
 
 
-def compress(data: Weighted, poles: ComplexArray, smooth: FloatArray) -> Compressed:
+def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compressed:
     """Compress the data around poles.
 
     Parameters
@@ -133,32 +162,88 @@ def compress(data: Weighted, poles: ComplexArray, smooth: FloatArray) -> Compres
         Lines and weights.
     poles : (n_poles,) complex array
         rad/s.
-    smooth : (2 n_lines, n_smooth) array
-        Stacked columns of what lies out of band.
+    terms : SmoothTerms
+        What lies out of band.
 
     Returns
     -------
     Compressed
         The small system.
     """
-    columns = np.concatenate([smooth, pair_columns(data.s, poles), pair_columns(data.s, poles, power=2)], axis=1)
-    if data.full is None:
-        rows = stacked(data.receptance * data.profile[:, None]) * data.gain
+    weight = data.weight if not data.is_shared else data.gain
+    if data.is_shared:
+        columns = model_columns(data, poles, terms, with_slopes=True)
         columns *= np.tile(data.profile, 2)[:, None]
+        rows = stacked(data.receptance * data.profile[:, None]) * data.gain
         U, z = _reduce(columns, rows)
-        systems, right = U[None], z.T
-        total = np.einsum("lf,lf->f", rows, rows)
-        scale = data.gain
+        systems, right, total = U[None], z.T, np.einsum("lf,lf->f", rows, rows)
     else:
-        reduced = [
-            _reduce(columns * np.tile(weight, 2)[:, None], stacked(value * weight)[:, None])
-            for weight, value in zip(data.full.T, data.receptance.T, strict=True)
-        ]
+        reduced = [_reduced_one(data, poles, terms, frf, weight[:, frf]) for frf in range(weight.shape[1])]
         systems = np.stack([U for U, _ in reduced])
-        right = np.stack([z[:, 0] for _, z in reduced])
-        total = np.sum(np.abs(data.receptance * data.full) ** 2, axis=0)
-        scale = np.ones(len(total))
-    return Compressed(poles=poles, n_smooth=smooth.shape[1], U=systems, z=right, total=total, scale=scale)
+        right = np.stack([z for _, z in reduced])
+        total = np.sum(np.abs(data.receptance * weight) ** 2, axis=0)
+    return Compressed(
+        poles=poles,
+        n_smooth=terms.n_columns,
+        real_modes=data.real_modes,
+        U=systems,
+        z=right,
+        total=total,
+        scale=data.gain if data.is_shared else np.ones(len(total)),
+    )
+
+
+def model_columns(
+    data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, frf: int = 0, with_slopes: bool = False
+) -> FloatArray:
+    """Columns of the model of one FRF, not weighted.
+
+    Parameters
+    ----------
+    data : Weighted
+        Lines.
+    poles : (n_poles,) complex array
+        rad/s.
+    terms : SmoothTerms
+        What lies out of band.
+    frf : int
+        Which FRF: they differ where the structure drifted.
+    with_slopes : bool
+        Add the columns of the poles' changes.
+
+    Returns
+    -------
+    (2 n_lines, n_columns) array
+        Smooth ones, residues, and slopes.
+    """
+    s = data.s if data.stretch is None else data.s / (1 + data.stretch[frf])
+    residues = pair_columns(s, poles)
+    parts = [terms.columns(data.s), residues[:, len(poles) :] if data.real_modes else residues]
+    return np.concatenate([*parts, pair_columns(s, poles, power=2)] if with_slopes else parts, axis=1)
+
+
+def response(data: Weighted, system: Compressed, terms: SmoothTerms) -> ComplexArray:
+    """Evaluate the model on the lines.
+
+    Parameters
+    ----------
+    data : Weighted
+        Lines.
+    system : Compressed
+        Of the same data.
+    terms : SmoothTerms
+        What lies out of band.
+
+    Returns
+    -------
+    (n_lines, n_frfs) complex array
+        Receptances, m/N.
+    """
+    coefficients = system.coefficients()
+    if data.stretch is None:
+        return unstacked(model_columns(data, system.poles, terms) @ coefficients.T)
+    one = [model_columns(data, system.poles, terms, frf=frf) @ row for frf, row in enumerate(coefficients)]
+    return unstacked(np.stack(one, axis=1))
 
 
 def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
@@ -178,9 +263,15 @@ def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
     """
     if len(U) == 1:
         return np.asarray(linalg.solve_triangular(U[0], z.T, check_finite=False).T)
-    return np.stack(
-        [linalg.solve_triangular(one, side, check_finite=False) for one, side in zip(U, z, strict=True)]
-    )
+    return np.stack([linalg.solve_triangular(one, side, check_finite=False) for one, side in zip(U, z, strict=True)])
+
+
+def _reduced_one(
+    data: Weighted, poles: ComplexArray, terms: SmoothTerms, frf: int, weight: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    columns = model_columns(data, poles, terms, frf=frf, with_slopes=True) * np.tile(weight, 2)[:, None]
+    U, z = _reduce(columns, stacked(data.receptance[:, frf] * weight)[:, None])
+    return U, z[:, 0]
 
 
 def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:

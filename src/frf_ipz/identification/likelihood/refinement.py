@@ -63,9 +63,7 @@ class Refined:
         return float(np.sum(self.system.misfit))
 
 
-def refine(
-    data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, held: BoolArray | None = None, iterations: int = MAX_ITERATIONS
-) -> Refined:
+def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iterations: int = MAX_ITERATIONS) -> Refined:
     """Iterate poles to the maximum of the likelihood.
 
     Parameters
@@ -84,11 +82,10 @@ def refine(
     Refined
         The optimum.
     """
-    smooth = terms.columns(data.s)
     line = float(np.median(np.diff(data.s.imag)))
     band = float(data.s.imag[0]), float(data.s.imag[-1])
     lost: list[complex] = []
-    system, poles = _without_lost(data, poles, smooth, band, lost)
+    system, poles = _without_lost(data, poles, terms, band, lost)
     damping, count = FIRST_DAMPING, 0
     information, gradient = normal_equations(system)
     while count < iterations and len(system.poles):
@@ -96,7 +93,7 @@ def refine(
         step, gain = _damped_step(information, gradient, damping)
         if gain < SMALL_GAIN:
             break
-        trial = compress(data, _moved(system.poles, step, line), smooth)
+        trial = compress(data, _moved(system.poles, step, line), terms)
         if np.sum(trial.misfit) > np.sum(system.misfit):
             damping *= 10
             if damping > MOST_DAMPING:
@@ -105,7 +102,7 @@ def refine(
         damping = max(damping / 10, LEAST_DAMPING)
         system = trial
         if (_gone(system.poles, band)).any():
-            system, _ = _without_lost(data, system.poles, smooth, band, lost)
+            system, _ = _without_lost(data, system.poles, terms, band, lost)
         information, gradient = normal_equations(system)
     return Refined(system=system, information=information, lost=np.array(lost, complex), iterations=count)
 
@@ -131,7 +128,7 @@ def normal_equations(system: Compressed) -> tuple[FloatArray, FloatArray]:
 
 
 def pole_jacobian(system: Compressed) -> FloatArray:
-    """Derivative of each FRF with respect to the poles, what residues can follow taken off.
+    """Differentiate each FRF by the poles, less what residues can follow.
 
     Parameters
     ----------
@@ -145,8 +142,8 @@ def pole_jacobian(system: Compressed) -> FloatArray:
     """
     n, n_poles = system.n_linear, system.n_poles
     D = system.U[:, n:, n:]
-    residues = system.scaled_coefficients()[:, system.n_smooth :]
-    a, b = residues[:, None, :n_poles], residues[:, None, n_poles:]
+    residues = system.scaled_residues()[:, None]
+    a, b = residues.real, residues.imag
     real, imag = D[:, :, :n_poles], D[:, :, n_poles:]
     return np.concatenate([real * a + imag * b, imag * a - real * b], axis=2)
 
@@ -178,8 +175,8 @@ def _gone(poles: ComplexArray, band: tuple[float, float]) -> BoolArray:
 
 
 def _without_lost(
-    data: Weighted, poles: ComplexArray, smooth: FloatArray, band: tuple[float, float], lost: list[complex]
+    data: Weighted, poles: ComplexArray, terms: SmoothTerms, band: tuple[float, float], lost: list[complex]
 ) -> tuple[Compressed, ComplexArray]:
     gone = _gone(poles, band)
     lost.extend(poles[gone].tolist())
-    return compress(data, poles[~gone], smooth), poles[~gone]
+    return compress(data, poles[~gone], terms), poles[~gone]

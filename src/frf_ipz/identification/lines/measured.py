@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import InputError
 from frf_ipz.identification.likelihood.compression import Weighted
 from frf_ipz.identification.lines.noise import rough_variance
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line tells nothing of the structure
 LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
+MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: real structures are not linear to less
 FEWEST_LINES = 16  # what the fit of a single mode needs
 SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
 DEAD = 1.3  # times the noise, in mean square: an FRF below carries none
@@ -52,7 +53,7 @@ class MeasuredLines:
     variance: FloatArray
     known: BoolArray
     used: BoolArray
-    powers: FloatArray
+    powers: IntArray
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -77,9 +78,7 @@ class MeasuredLines:
         profile = (log_weight - gain).mean(axis=1)
         spread = log_weight - gain - profile[:, None]
         full = np.exp(log_weight) if not shared and np.sqrt(np.mean(spread**2)) > SHARED_SPREAD else None
-        return Weighted(
-            s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full
-        )
+        return Weighted(s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full)
 
 
 def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
@@ -102,7 +101,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     InputError
         If too few lines are left.
     """
-    known = np.isfinite(frfs.variance).any(axis=0)
+    known = np.asarray(np.isfinite(frfs.variance).any(axis=0), bool)
     usable = _usable(frfs, known)
     noise = np.where(known, frfs.variance, np.nan)
     if not known.all():
@@ -118,7 +117,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     powers = np.array([label.quantity.power for label in frfs.labels])
     if not known.all():  # once more in the band alone: what lies outside may be of another size
         noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])
-    variance = np.maximum(noise[used], (LEAST_NOISE * np.abs(lines.values)) ** 2)
+    variance = noise[used] + (np.where(known, LEAST_NOISE, MODEL_ERROR) * np.abs(lines.values)) ** 2
     variance = np.maximum(variance, np.finfo(float).tiny * 1e40)
     to_receptance = lines.s[:, None] ** powers
     return MeasuredLines(
@@ -151,9 +150,9 @@ def with_noise_of(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLines:
         return lines
     unit = np.abs(lines.s[:, None]) ** lines.powers
     variance = lines.variance.copy()
-    variance[:, ~lines.known] = (rough_variance(misfit * unit) / unit**2)[:, ~lines.known]
-    least = (LEAST_NOISE * np.abs(lines.receptance)) ** 2
-    return replace(lines, variance=np.maximum(variance, least))
+    floor = (MODEL_ERROR * np.abs(lines.receptance)) ** 2
+    variance[:, ~lines.known] = (rough_variance(misfit * unit) / unit**2 + floor)[:, ~lines.known]
+    return replace(lines, variance=variance)
 
 
 def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
@@ -162,11 +161,11 @@ def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
     coherent = np.isfinite(frfs.coherence)
     if coherent.any():
         usable &= ~(np.nanmedian(np.where(coherent, frfs.coherence, 1.0), axis=1) < LEAST_COHERENCE)
-    return usable
+    return np.asarray(usable)
 
 
 def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
-    """The longest stretch of lines that carry signal, as far as it is the user who has said nothing."""
+    """Find the lines that carry signal, for a user who has said nothing."""
     strong = usable & (np.nanmedian(np.abs(frfs.values) / np.sqrt(noise), axis=1) > SIGNAL)
     if not strong.any():
         raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")

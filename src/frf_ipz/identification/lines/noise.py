@@ -6,6 +6,7 @@ is not moved by the few lines on which a narrow peak does vary.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import comb, log
 
 import numpy as np
@@ -49,11 +50,11 @@ def smooth_level(squares: FloatArray) -> FloatArray:
     n_lines = len(squares)
     edges = np.linspace(0, n_lines, max(1, n_lines // BLOCK_LINES) + 1).astype(int)
     # the median of an exponential distribution is ln 2 times its mean
-    blocks = [np.median(squares[low:high], axis=0) / log(2) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    blocks = [np.median(squares[low:high], axis=0) / log(2) for low, high in pairwise(edges)]
     middles = (edges[:-1] + edges[1:] - 1) / 2
     levels = np.log(np.maximum(blocks, TINY))
     lines = np.arange(n_lines)
-    return np.exp(np.stack([np.interp(lines, middles, level) for level in levels.T], axis=1))
+    return np.asarray(np.exp(np.stack([np.interp(lines, middles, level) for level in levels.T], axis=1)))
 
 
 def _squared_differences(values: ComplexArray) -> FloatArray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import fft, stats
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
@@ -33,10 +34,32 @@ class Candidates:
         rad/s, the strongest first.
     strength : (n,) array
         Energy of the match over what chance would give at most.
+    half_width_rad_s : (n_widths,) array
+        Half widths that were matched.
+    level : (n_widths,) array
+        Typical energy of a match over that of white noise: above 1 where neighbouring lines err alike.
     """
 
     poles: ComplexArray
     strength: FloatArray
+    half_width_rad_s: FloatArray
+    level: FloatArray
+
+    def level_at(self, poles: ComplexArray) -> FloatArray:
+        """Level for poles of some half width.
+
+        Parameters
+        ----------
+        poles : (n_poles,) complex array
+            rad/s.
+
+        Returns
+        -------
+        (n_poles,) array
+            At least 1.
+        """
+        known = np.log(self.half_width_rad_s)
+        return np.asarray(np.interp(np.log(np.maximum(-poles.real, np.exp(known[0]))), known, self.level))
 
 
 def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -> Candidates:
@@ -62,23 +85,29 @@ def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -
     size = fft.next_fast_len(n_grid + n_grid // PADDING)
     spread = np.zeros((misfit.shape[1], n_grid), np.complex64)  # single precision: the misfit is of order one
     spread[:, place] = misfit.T
-    signal = fft.ifft(spread, size, axis=1, norm="forward")
+    signal = np.asarray(fft.ifft(spread, size, axis=1, norm="forward"), np.complex64)
     present = np.zeros(n_grid)
     present[place] = 1.0
     widths = _half_widths(frequency_hz, line)
     limit = _chance_limit(misfit.shape[1], len(frequency_hz) * len(widths))
+    typical = float(stats.chi2.median(2 * misfit.shape[1]))
+    levels = np.ones(len(widths))
     found: list[tuple[float, complex]] = []
-    for width in widths:
+    for number, width in enumerate(widths):
         energy = _match(signal, width, n_grid)[place] / _template_energy(present, width)[place]
-        peaks = _peaks(energy / limit, width)
+        levels[number] = max(1.0, float(np.median(energy)) / typical)
+        ratio = energy / (limit * levels[number])
         found += [
-            (float(energy[k] / limit), 2 * np.pi * complex(-width * line, frequency_hz[k])) for k in peaks[: 2 * most]
+            (float(ratio[k]), 2 * np.pi * complex(-width * line, frequency_hz[k])) for k in _peaks(ratio)[: 2 * most]
         ]
-    return _separate(sorted(found, key=lambda item: -item[0]), most)
+    poles, strength = _separate(sorted(found, key=lambda item: -item[0]), most)
+    return Candidates(
+        poles=poles, strength=strength, half_width_rad_s=2 * np.pi * line * np.asarray(widths), level=levels
+    )
 
 
 def _places(frequency_hz: FloatArray, line: float) -> IntArray:
-    """Number of each line on a grid; a gap longer than the tails of the widest match is shortened."""
+    """Place the lines on a grid; a gap longer than the tails of the widest match is shortened."""
     steps = np.clip(np.round(np.diff(frequency_hz) / line), 1, 10 * TAILS)
     return np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
 
@@ -90,7 +119,7 @@ def _half_widths(frequency_hz: FloatArray, line: float) -> FloatArray:
     return np.geomspace(NARROWEST, widest, count)
 
 
-def _match(signal: ComplexArray, width: float, n_grid: int) -> FloatArray:
+def _match(signal: npt.NDArray[np.complex64], width: float, n_grid: int) -> FloatArray:
     """Energy of the match at every place of the grid, summed over FRFs."""
     size = signal.shape[1]
     # a broad match varies slowly: a part of the time signal is enough, and gives fewer points
@@ -117,22 +146,20 @@ def _chance_limit(n_frfs: int, n_places: int) -> float:
     return float(stats.chi2.isf(FALSE_ALARMS / n_places, 2 * n_frfs))
 
 
-def _peaks(ratio: FloatArray, width: float) -> IntArray:
+def _peaks(ratio: FloatArray) -> IntArray:
     above = np.flatnonzero(ratio > 1)
     inner = above[(above > 0) & (above < len(ratio) - 1)]
     tops = inner[(ratio[inner] >= ratio[inner - 1]) & (ratio[inner] >= ratio[inner + 1])]
     return np.asarray(tops[np.argsort(-ratio[tops])])
 
 
-def _separate(found: list[tuple[float, complex]], most: int) -> Candidates:
+def _separate(found: list[tuple[float, complex]], most: int) -> tuple[ComplexArray, FloatArray]:
     kept: list[tuple[float, complex]] = []
     for strength, pole in found:
         shadow = sum(stronger * _overlap(pole, other) for stronger, other in kept)
         if len(kept) < most and strength > SHADOW * shadow:
             kept.append((strength, pole))
-    return Candidates(
-        poles=np.array([pole for _, pole in kept], complex), strength=np.array([strength for strength, _ in kept])
-    )
+    return np.array([pole for _, pole in kept], complex), np.array([strength for strength, _ in kept])
 
 
 def _overlap(pole: complex, other: complex) -> float:

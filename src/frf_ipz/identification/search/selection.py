@@ -3,109 +3,187 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, Weighted
+from frf_ipz.identification.likelihood.compression import Weighted
 from frf_ipz.identification.likelihood.refinement import Refined, refine
-from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-from frf_ipz.identification.lines.measured import MeasuredLines, with_noise_of
-from frf_ipz.identification.lines.noise import smooth_level
-from frf_ipz.identification.search.candidates import find_candidates
-from frf_ipz.numerics.partial_fractions import pair_columns, unstacked
+from frf_ipz.identification.search.drift import drift_of
+from frf_ipz.identification.search.judgement import Judgement, judge
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
-MOST_ROUNDS = 3
-GROWTH = 3 # a search adds at most one pole for so many there are, and two
-WORST_DAMPING = 0.5
+if TYPE_CHECKING:
+    from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+    from frf_ipz.identification.options import FitOptions
 
-@dataclass
-class Search:
-    lines: MeasuredLines
+ROUNDS = 4  # of adding poles
+ROUGH_ITERATIONS = 12  # of a fit whose poles are still to be judged
+UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole says nothing
+NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or struck
+NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Selected:
+    """The fit with the modes that the lines ask for.
+
+    Parameters
+    ----------
+    data : Weighted
+        What was fitted; with the drift between FRFs where there is one.
+    fit : Refined
+        Poles and residues.
+    judgement : Judgement
+        Of this fit.
+    decisions : tuple of dict
+        What was added, dropped, pinned and struck.
+    """
+
+    data: Weighted
+    fit: Refined
+    judgement: Judgement
+    decisions: tuple[dict[str, object], ...]
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Search:
+    """The work: what is fitted, and what was decided so far."""
+
     data: Weighted
     terms: SmoothTerms
-    fit: Refined
-    decisions: list = field(default_factory=list)
+    pinned: FloatArray
+    struck: tuple[tuple[float, str], ...]
+    refused: list[complex] = field(default_factory=list)
+    decisions: list[dict[str, object]] = field(default_factory=list)
 
-def response(system: Compressed, terms: SmoothTerms, s: ComplexArray) -> ComplexArray:
-    columns = np.concatenate([terms.columns(s), pair_columns(s, system.poles)], axis=1)
-    return unstacked(columns @ system.coefficients().T)
-
-def white_misfit(st: Search) -> ComplexArray:
-    return (st.data.receptance - response(st.fit.system, st.terms, st.data.s)) * st.data.weight
-
-def gains(system: Compressed) -> FloatArray:
-    """Increase of chi2 per pole and FRF if the pole left."""
-    n, k, m = system.n_linear, system.n_smooth, system.n_poles
-    c = system.scaled_coefficients()
-    out = np.empty((m, len(c)))
-    inv = [linalg.solve_triangular(U[:n, :n], np.eye(n)) for U in system.U]
-    C = np.stack([i @ i.T for i in inv])
-    for r in range(m):
-        ix = [k + r, k + m + r]
-        B = np.linalg.inv(C[:, ix][:, :, ix])
-        x = c[:, ix]
-        out[r] = np.einsum('fi,fij,fj->f', x, np.broadcast_to(B, (len(c), 2, 2)), x)
-    return out
-
-def levels(e: ComplexArray) -> FloatArray:
-    return np.maximum(smooth_level(np.abs(e) ** 2) / 2, 1.0)
-
-def significance(st: Search, e) -> FloatArray:
-    lev = levels(e)
-    f = st.lines.frequency_hz
-    at = np.clip(np.searchsorted(f, natural_frequency_hz(st.fit.poles)), 0, len(f) - 1)
-    g = gains(st.fit.system) / lev[at]
-    F = g.shape[1]
-    return g.sum(1) / ((2 * F + 2) * np.log(2 * len(f)))
+    def note(self, poles: ComplexArray, action: str, reasons: list[str]) -> None:
+        for pole, reason in zip(poles, reasons, strict=True):
+            hz, ratio = float(natural_frequency_hz(pole[None])[0]), float(damping_ratio(pole[None])[0])
+            self.decisions.append({"frequency_hz": hz, "damping_ratio": ratio, "action": action, "reason": reason})
 
 
-def std_ratio(fit):
-    n=len(fit.poles)
-    try: C=np.linalg.inv(fit.information)
-    except np.linalg.LinAlgError: return np.full(n,np.inf)
-    return np.sqrt(np.abs(np.diag(C)))[:n]/-fit.poles.real
+def select_modes(data: Weighted, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
+    """Find the modes that the lines ask for.
 
-def search(lines, poles, terms, verbose=0):
-    data = lines.weighted(shared=True)
-    fit = refine(data, poles, terms, iterations=12)
-    st = Search(lines=lines, data=data, terms=terms, fit=fit)
-    black=np.zeros(0,complex)
-    def skim(tst):
-        nonlocal black
-        while len(tst.fit.poles):
-            e = white_misfit(tst)
-            sig = significance(tst, e)
-            lev=levels(e); f=lines.frequency_hz; at=np.clip(np.searchsorted(f, natural_frequency_hz(tst.fit.poles)), 0, len(f) - 1)
-            sr = std_ratio(tst.fit)*np.sqrt(np.median(lev[at],1))
-            bad = (sig < 1)|(sr>.3)
-            if not bad.any(): break
-            if verbose: print('   drop', [f'{a:.2f}:{b:.1f}:{c:.2f}' for a,b,c in zip(natural_frequency_hz(tst.fit.poles[bad]), sig[bad],sr[bad])])
-            black=np.concatenate([black,tst.fit.poles[bad]])
-            tst = replace(tst, fit=refine(data, tst.fit.poles[~bad], terms, iterations=12))
-        return tst
-    st=skim(st)
-    for rnd in range(MOST_ROUNDS):
-        e = white_misfit(st); lev=levels(e)
-        most=2 + len(st.fit.poles) // GROWTH
-        c1 = find_candidates(lines.frequency_hz, e , most)
-        c2 = find_candidates(lines.frequency_hz, e / np.sqrt(lev), most)
-        if verbose: print('round', rnd, 'poles', len(st.fit.poles), 'chi2/N', (np.abs(e)**2).mean()/2, 'median lev', np.median(levels(e)));print('   raw',np.round(natural_frequency_hz(c1.poles),2), np.round(c1.strength,1)); print('   nrm', np.round(natural_frequency_hz(c2.poles),2), np.round(c2.strength,1))
-        cp=np.zeros(0,complex)
-        for q in np.concatenate([c1.poles,c2.poles]):
-            if len(cp) and (abs(cp-q)<2*abs(q.real)).any(): continue
-            if len(black) and (abs(black.imag-q.imag)<2*np.maximum(abs(q.real),abs(black.real))).any(): continue
-            cp=np.append(cp,q)
-        if not len(cp): break
-        old = st.fit.poles
-        trial = refine(data, np.concatenate([old, cp]), terms, iterations=12)
-        black=np.concatenate([black,trial.lost])
-        tst = skim(replace(st, fit=trial))
-        n=len(tst.fit.poles)
-        if n<=len(old) and tst.fit.misfit>st.fit.misfit: continue
-        st = tst
-    st=replace(st,fit=refine(data,st.fit.poles,terms))
-    e=white_misfit(st)
-    return st, significance(st, e)
+    Parameters
+    ----------
+    data : Weighted
+        Lines and weights.
+    poles : (n_poles,) complex array
+        Where to start, rad/s.
+    terms : SmoothTerms
+        What lies out of band.
+    options : FitOptions
+        Poles that are pinned and struck.
+
+    Returns
+    -------
+    Selected
+        The fit.
+    """
+    struck = tuple((one.hz, one.why) for one in options.strike)
+    search = _Search(data=data, terms=terms, pinned=np.array(options.pin_hz, float), struck=struck)
+    poles = _pin(search, _strike(search, poles))
+    fit, judgement = _skim(search, refine(data, poles, terms, iterations=ROUGH_ITERATIONS))
+    for _ in range(ROUNDS):
+        search.data, fit, judgement = _with_drift(search, fit, judgement)
+        proposed = _proposed(search, judgement)
+        if not len(proposed):
+            break
+        trial = refine(search.data, np.concatenate([fit.poles, proposed]), terms, iterations=ROUGH_ITERATIONS)
+        search.refused.extend(trial.lost.tolist())
+        better, verdict = _skim(search, trial)
+        if len(better.poles) <= len(fit.poles) and better.misfit > fit.misfit:
+            continue
+        search.note(*_added(fit.poles, better.poles))
+        fit, judgement = better, verdict
+    return Selected(data=search.data, fit=fit, judgement=judgement, decisions=tuple(search.decisions))
+
+
+def _strike(search: _Search, poles: ComplexArray) -> ComplexArray:
+    near = _near_struck(search, poles)
+    reasons = [next(why for hz, why in search.struck if _is_near(pole, hz)) for pole in poles[near]]
+    search.note(poles[near], "struck", reasons)
+    return poles[~near]
+
+
+def _near_struck(search: _Search, poles: ComplexArray) -> BoolArray:
+    return np.array([any(_is_near(pole, hz) for hz, _ in search.struck) for pole in poles], bool)
+
+
+def _is_near(pole: complex, hz: float) -> bool:
+    return abs(abs(pole) / (2 * np.pi) - hz) < NEAR_PIN * hz
+
+
+def _pin(search: _Search, poles: ComplexArray) -> ComplexArray:
+    for hz in search.pinned:
+        omega = 2 * np.pi * hz
+        if not any(_is_near(pole, hz) for pole in poles):
+            poles = np.append(poles, omega * complex(-0.01, 1.0))
+        search.note(np.array([omega * 1j]), "pinned", ["the user says that a mode is here"])
+    return poles
+
+
+def _protected(search: _Search, poles: ComplexArray) -> BoolArray:
+    """Mark the pole nearest to each pinned frequency."""
+    kept = np.zeros(len(poles), bool)
+    for hz in search.pinned:
+        if len(poles):
+            kept[np.argmin(np.abs(natural_frequency_hz(poles) - hz))] = True
+    return kept
+
+
+def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
+    """Drop poles that are not significant, the weakest half of them at a time: one may have hidden another."""
+    while True:
+        judgement = judge(search.data, fit, search.terms)
+        struck = _near_struck(search, fit.poles)
+        weak = (judgement.significance < 1) | (judgement.damping_std > UNCERTAIN)
+        bad = struck | (weak & ~_protected(search, fit.poles))
+        if not bad.any():
+            return fit, judgement
+        bad &= struck | (judgement.significance <= np.median(judgement.significance[bad]))
+        reasons = [_why(judgement, number) for number in np.flatnonzero(bad).tolist()]
+        search.note(fit.poles[bad], "dropped", reasons)
+        search.refused.extend(fit.poles[bad].tolist())
+        fit = refine(search.data, fit.poles[~bad], search.terms, iterations=ROUGH_ITERATIONS)
+
+
+def _why(judgement: Judgement, number: int) -> str:
+    if judgement.significance[number] < 1:
+        return f"takes off the misfit {judgement.significance[number]:.2g} of what the BIC demands"
+    return f"its damping is known to {judgement.damping_std[number]:.0%} only"
+
+
+def _with_drift(search: _Search, fit: Refined, judgement: Judgement) -> tuple[Weighted, Refined, Judgement]:
+    if search.data.stretch is not None or not len(fit.poles):
+        return search.data, fit, judgement
+    stretch = drift_of(search.data, fit, search.terms)
+    if stretch is None:
+        return search.data, fit, judgement
+    search.data = replace(search.data, stretch=stretch)
+    search.refused.clear()
+    fit, judgement = _skim(search, refine(search.data, fit.poles, search.terms, iterations=ROUGH_ITERATIONS))
+    return search.data, fit, judgement
+
+
+def _proposed(search: _Search, judgement: Judgement) -> ComplexArray:
+    chosen: list[complex] = []
+    for pole in np.concatenate([one.poles for one in judgement.missing]):
+        again = any(abs(other - pole) < NEAR_REFUSED * -pole.real for other in chosen)
+        refused = any(
+            abs(other.imag - pole.imag) < NEAR_REFUSED * max(-pole.real, -other.real) for other in search.refused
+        )
+        if not (again or refused):
+            chosen.append(complex(pole))
+    poles = np.array(chosen, complex)
+    return poles[~_near_struck(search, poles)]
+
+
+def _added(before: ComplexArray, after: ComplexArray) -> tuple[ComplexArray, str, list[str]]:
+    new = after
+    if len(before):
+        new = after[np.min(np.abs(after[:, None] - before), axis=1) > -after.real]
+    return new, "added", ["the misfit had a peak here that noise does not make"] * len(new)

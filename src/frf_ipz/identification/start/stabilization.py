@@ -1,11 +1,13 @@
 """First poles: a stabilisation diagram over model orders, and those of its poles that keep coming back.
 
-The choice is generous. LSCF poles are biased by noise, most of all in damping, and are only where the likelihood starts.
+The choice is generous. LSCF poles are biased by noise, most of all in damping: they are only where the likelihood
+starts.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,7 +81,7 @@ def start_poles(frfs: FrfSet, lines: MeasuredLines, *, max_order: int | None = N
     orders = np.unique(np.linspace(max(2, top // 4), top, ORDERS).astype(int))
     found = [_poles_of_order(M, n_ref, int(order), circle, lines) for order in orders]
     stable = [np.zeros((3, len(found[0].poles)), bool)]
-    stable += [_stability(low, high) for low, high in zip(found[:-1], found[1:], strict=True)]
+    stable += [_stability(low, high) for low, high in pairwise(found)]
     return Start(poles=found[-1].poles, table=_table(found, stable))
 
 
@@ -136,8 +138,9 @@ def _poles_of_order(M: ComplexArray, n_ref: int, order: int, circle: _Circle, li
     z = denominator_roots(D)
     poles = circle.poles(z)
     low, high = (2 * np.pi * hz for hz in lines.band_hz)
-    kept = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (damping_ratio(poles) < MOST_DAMPING)
-    kept = np.flatnonzero(kept)[np.argsort(poles.imag[kept])]
+    inside = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (damping_ratio(poles) < MOST_DAMPING)
+    kept = np.flatnonzero(inside)
+    kept = kept[np.argsort(poles.imag[kept])]
     return _OrderPoles(order=order, poles=poles[kept], shapes=participation(D, z[kept]))
 
 

@@ -1,0 +1,175 @@
+"""Errors of poles, residues and whatever follows from them, to first order.
+
+At the optimum the coefficients x and poles p of an FRF err by ``dx = U11^-1 (e - U12 T dp)``, with white e of its own
+and dp common to all; ``T dp`` are the slopes' coefficients. What depends on x and p inherits an own part and a
+common one, which are independent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.identification.likelihood.compression import Compressed
+from frf_ipz.identification.likelihood.refinement import Refined
+from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+from frf_ipz.numerics.partial_fractions import pair_columns, unstacked
+
+LINES_AT_ONCE = 64
+NEAR_POLES = 8  # poles whose errors a stretch of lines shows: those far away add nothing that could be seen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FitErrors:
+    """Where errors of a fit come from.
+
+    Parameters
+    ----------
+    system : Compressed
+        At the optimum.
+    terms : SmoothTerms
+        What lies out of band.
+    pole_root : (2 n_poles, 2 n_poles) array
+        A root of the covariance of the poles: all real parts, then all imaginary parts, rad/s.
+    """
+
+    system: Compressed
+    terms: SmoothTerms
+    pole_root: FloatArray
+
+    def linear(self, rows: ComplexArray, slopes: ComplexArray, frf: int) -> tuple[ComplexArray, ComplexArray]:
+        """Errors of numbers that are linear in coefficients and slopes of an FRF.
+
+        Parameters
+        ----------
+        rows : (n, n_linear) complex array
+            Derivatives by the coefficients.
+        slopes : (n, 2 n_poles) complex array
+            Derivatives by the slopes' coefficients.
+        frf : int
+            Which FRF.
+
+        Returns
+        -------
+        own : (n, n_linear) complex array
+            Response to the FRF's own white errors.
+        common : (n, 2 n_poles) complex array
+            Response to the white errors behind the poles.
+        """
+        n = self.system.n_linear
+        U = self.system.U[frf if len(self.system.U) > 1 else 0]
+        own = linalg.solve_triangular(U[:n, :n], rows.T, trans="T", check_finite=False).T
+        common = (slopes - own @ U[:n, n:]) @ self.slope_errors(frf)
+        return own / self.system.scale[frf], common / self.system.scale[frf]
+
+    def slope_errors(self, frf: int) -> FloatArray:
+        """Errors of the slopes' coefficients, times `scale`.
+
+        Parameters
+        ----------
+        frf : int
+            Which FRF.
+
+        Returns
+        -------
+        (2 n_poles, 2 n_poles) array
+            Response to the white errors behind the poles.
+        """
+        residues = self.system.scaled_residues()[frf]
+        real, imag = np.split(self.pole_root, 2)
+        a, b = residues.real[:, None], residues.imag[:, None]
+        return np.concatenate([a * real - b * imag, b * real + a * imag])
+
+
+def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors:
+    """Find where errors of a fit come from.
+
+    Parameters
+    ----------
+    fit : Refined
+        The fit.
+    terms : SmoothTerms
+        What lies out of band.
+    level : (n_poles,) array
+        Factor on each pole's variance, where neighbouring lines err alike.
+
+    Returns
+    -------
+    FitErrors
+        Poles, residues, and the rest.
+    """
+    root = np.linalg.pinv(np.linalg.cholesky(_regular(fit.information))).T
+    return FitErrors(system=fit.system, terms=terms, pole_root=root * np.sqrt(np.tile(level, 2))[:, None])
+
+
+def model_rows(system: Compressed, terms: SmoothTerms, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Differentiate responses anywhere in the plane.
+
+    Parameters
+    ----------
+    system : Compressed
+        The fit.
+    terms : SmoothTerms
+        What lies out of band.
+    s : (n,) complex array
+        rad/s.
+
+    Returns
+    -------
+    rows : (n, n_linear) complex array
+        By the coefficients.
+    slopes : (n, 2 n_poles) complex array
+        By the slopes' coefficients.
+    """
+    pairs = pair_columns(s, system.poles)
+    kept = pairs[:, system.n_poles :] if system.real_modes else pairs
+    rows = np.concatenate([terms.columns(s), kept], axis=1)
+    return unstacked(rows), unstacked(pair_columns(s, system.poles, power=2))
+
+
+def value_std(errors: FitErrors, s: ComplexArray) -> FloatArray:
+    """Give the standard deviation of the fitted responses on the lines.
+
+    Parameters
+    ----------
+    errors : FitErrors
+        Where errors come from.
+    s : (n_lines,) complex array
+        rad/s.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        Of the complex value's modulus, as receptance, m/N.
+    """
+    system = errors.system
+    n, n_frfs = system.n_linear, len(system.z)
+    roots = np.stack([errors.slope_errors(frf) for frf in range(n_frfs)])
+    squares = np.empty((len(s), n_frfs))
+    for first in range(0, len(s), LINES_AT_ONCE):
+        part = slice(first, first + LINES_AT_ONCE)
+        rows, slopes = model_rows(system, errors.terms, s[part])
+        near = _near(system.poles, s[part])
+        for number, U in enumerate(system.U):
+            frfs = np.arange(n_frfs) if len(system.U) == 1 else np.array([number])
+            own = linalg.solve_triangular(U[:n, :n], rows.T, trans="T", check_finite=False).T
+            common = (slopes - own @ U[:n, n:])[:, near]
+            chosen = roots[np.ix_(frfs, near)]
+            moved = (common.conj() @ (chosen @ chosen.transpose(0, 2, 1))) * common
+            squares[part, frfs] = np.sum(np.abs(own) ** 2, axis=1)[:, None] + moved.sum(axis=2).real.T
+    return np.asarray(np.sqrt(squares) / system.scale)
+
+
+def _near(poles: ComplexArray, s: ComplexArray) -> FloatArray:
+    middle = s[len(s) // 2]
+    closest = np.sort(np.argsort(np.abs(poles - middle))[:NEAR_POLES])
+    return np.concatenate([closest, closest + len(poles)])
+
+
+def _regular(information: FloatArray) -> FloatArray:
+    """Give a pole that nothing is known about a large variance, not a failure."""
+    least = np.finfo(float).eps * len(information)
+    return np.asarray(information + np.diag(least * np.diag(information) + np.finfo(float).tiny))

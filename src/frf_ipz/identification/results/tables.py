@@ -1,0 +1,135 @@
+"""Tables of a fit: the modes with their quality, and the misfit of each FRF by bands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.modes import modal_assurance, modal_phase_collinearity
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
+
+if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.identification.search.judgement import Judgement
+
+BANDS = 8  # of the misfit table, as wide as one another
+GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the damping
+GOOD_SIGNIFICANCE = 5.0  # times what the BIC demands
+COLLINEAR = 0.9  # phase collinearity of a mode that looks normal
+ALIKE = 0.9  # MAC between two modes at which the shapes do not tell them apart
+CLOSE = 0.02  # relative distance of two modes whose shapes are compared for it
+
+
+def mode_table(poles: ComplexArray, residues: ComplexArray, judgement: Judgement, modes: IntArray) -> pd.DataFrame:
+    """Table of the modes with a quality mark.
+
+    Parameters
+    ----------
+    poles : (n_modes,) complex array
+        rad/s.
+    residues : (n_modes, n_frfs) complex array
+        Of receptances.
+    judgement : Judgement
+        Of the fit.
+    modes : (n_modes,) int array
+        Places of the modes in the judgement.
+
+    Returns
+    -------
+    DataFrame
+        One row a mode; `quality` is good, fair or poor, and `remarks` says why.
+    """
+    shapes = residues.T
+    assurance = modal_assurance(shapes, shapes)
+    np.fill_diagonal(assurance, 0.0)
+    near = np.abs(np.abs(poles)[:, None] / np.abs(poles) - 1) < CLOSE
+    confused = np.max(assurance * near, axis=1, initial=0.0)
+    rows = {
+        "pole_id": np.arange(1, len(poles) + 1),
+        "frequency_hz": natural_frequency_hz(poles),
+        "damping_ratio": damping_ratio(poles),
+        # residues of normal modes are imaginary in every FRF: a phase common to all of them shows complexity as well
+        "mpc": modal_phase_collinearity(shapes) if shapes.shape[0] > 1 else np.ones(len(poles)),
+        "highest_mac": np.max(assurance, axis=1, initial=0.0),
+        "significance": judgement.significance[modes],
+        "damping_std_ratio": judgement.damping_std[modes],
+        "misfit_level": _level_at(judgement, poles),
+    }
+    remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
+    quality = [_quality(rows, number, len(text)) for number, text in enumerate(remarks)]
+    return pd.DataFrame({**rows, "quality": quality, "remarks": ["; ".join(text) for text in remarks]})
+
+
+def misfit_table(
+    frequency_hz: FloatArray, misfit: ComplexArray, std: FloatArray, labels: tuple[FrfLabel, ...]
+) -> pd.DataFrame:
+    """Table of the misfit of each FRF by bands.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Lines, Hz.
+    misfit : (n_lines, n_frfs) complex array
+        Measured minus model, in units of the FRF.
+    std : (n_lines, n_frfs) array
+        Noise: root of E of its squared modulus.
+    labels : tuple of FrfLabel
+        The FRFs.
+
+    Returns
+    -------
+    DataFrame
+        One row an FRF and band.
+    """
+    edges = np.linspace(frequency_hz[0], frequency_hz[-1], BANDS + 1)
+    band = np.clip(np.searchsorted(edges, frequency_hz, side="right") - 1, 0, BANDS - 1)
+    rows = []
+    for frf, label in enumerate(labels):
+        for number in range(BANDS):
+            lines = band == number
+            if not lines.any():
+                continue
+            size, noise = _rms(np.abs(misfit[lines, frf])), _rms(std[lines, frf])
+            rows.append(
+                {
+                    "frf": frf,
+                    "output_dof": str(label.output_dof),
+                    "input_dof": str(label.input_dof),
+                    "band_low_hz": float(edges[number]),
+                    "band_high_hz": float(edges[number + 1]),
+                    "misfit": size,
+                    "noise": noise,
+                    "ratio": _rms(np.abs(misfit[lines, frf]) / std[lines, frf]),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _level_at(judgement: Judgement, poles: ComplexArray) -> FloatArray:
+    place = np.clip(np.searchsorted(judgement.frequency_hz, natural_frequency_hz(poles)), 0, len(judgement.level) - 1)
+    return np.asarray(np.sqrt(np.median(judgement.level[place], axis=1)))
+
+
+def _remarks(rows: dict[str, FloatArray], number: int, confused: float) -> list[str]:
+    remarks = []
+    if rows["damping_std_ratio"][number] > GOOD_DAMPING:
+        remarks.append(f"damping known to {rows['damping_std_ratio'][number]:.0%}")
+    if rows["significance"][number] < GOOD_SIGNIFICANCE:
+        remarks.append("hardly more than the data ask for")
+    if rows["mpc"][number] < COLLINEAR:
+        remarks.append("complex shape")
+    if confused > ALIKE:
+        remarks.append("same shape as the mode beside it")
+    return remarks
+
+
+def _quality(rows: dict[str, FloatArray], number: int, n_remarks: int) -> str:
+    poor = rows["damping_std_ratio"][number] > POOR_DAMPING
+    return "poor" if poor or n_remarks > 2 else "fair" if n_remarks else "good"

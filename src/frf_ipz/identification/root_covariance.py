@@ -1,0 +1,95 @@
+"""Joint covariance of poles and zeros that is never formed as a whole.
+
+Errors of all roots share those of the poles; beyond that the zeros of one FRF share that FRF's noise alone. So the
+covariance is ``common common' + own`` with a block-diagonal `own`: hundreds of FRFs with dozens of zeros each need
+megabytes instead of gigabytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RootCovariance:
+    """Covariance with the indexing of a matrix.
+
+    Parameters
+    ----------
+    common : (n_rows, n_sources) array
+        How each real and imaginary part follows errors that all share, rad/s.
+    own : (n_rows, n_rows) sparse array
+        What is left, one block an FRF, (rad/s)^2.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> covariance = RootCovariance(common=np.array([[1.0], [2.0]]), own=sparse.csr_array(np.eye(2)))
+    >>> covariance[np.ix_([0, 1], [1])]
+    array([[2.],
+           [5.]])
+    >>> float(covariance[1, 1])
+    5.0
+    """
+
+    common: FloatArray
+    own: Any
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.common), len(self.common)
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes: 2."""
+        return 2
+
+    def __getitem__(self, key: Any) -> Any:  # noqa: ANN401 - whatever indexes a matrix: numbers, slices, `np.ix_`
+        rows, columns = key if isinstance(key, tuple) else (key, slice(None))
+        every = np.arange(len(self.common))
+        row, column = every[rows], every[columns]
+        across = np.ravel(row)[:, None], np.ravel(column)[None, :]
+        block = self.common[across[0].ravel()] @ self.common[across[1].ravel()].T
+        block = block + self.own[across[0].ravel()][:, across[1].ravel()].toarray()
+        if np.ndim(row) == 0 and np.ndim(column) == 0:
+            return block[0, 0]
+        if np.ndim(row) == 0 or np.ndim(column) == 0:
+            return block.ravel()
+        return block
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:  # noqa: ANN401, FBT001 - NumPy's protocol
+        del copy
+        return np.asarray(self[:, :], dtype)
+
+    def diagonal(self) -> FloatArray:
+        """Variances.
+
+        Returns
+        -------
+        (n_rows,) array
+            (rad/s)^2.
+        """
+        return np.asarray(np.einsum("ij,ij->i", self.common, self.common) + self.own.diagonal())
+
+    def pair_blocks(self) -> FloatArray:
+        """Covariance of the real and imaginary part of each root by itself.
+
+        Returns
+        -------
+        (n_roots, 2, 2) array
+            (rad/s)^2.
+        """
+        parts = self.common.reshape(-1, 2, self.common.shape[1])
+        cross = np.zeros(len(self.common) - 1) if len(self.common) else np.zeros(0)
+        cross[:] = self.own.diagonal(1)
+        blocks = np.einsum("kim,kjm->kij", parts, parts)
+        blocks[:, [0, 1], [0, 1]] += self.own.diagonal().reshape(-1, 2)
+        blocks[:, 0, 1] += cross[::2]
+        blocks[:, 1, 0] += cross[::2]
+        return np.asarray(blocks)
