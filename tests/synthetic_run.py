@@ -1,4 +1,4 @@
-"""A run's results without a run: the demo beam with an elastic clamp, its FRFs, fit, pairs, update and prediction.
+"""A run's results without a run: a beam whose stiffness is off, its FRFs, fit, pairs, update and prediction.
 
 For whatever draws results. The measured FRFs are those of a true structure with noise; everything after them is what
 the stages give.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.fe.response import model_frfs
+from frf_ipz.plotting.targets import Target, target_rows
 from frf_ipz.structure import Geometry, StructuralModel
 
 if TYPE_CHECKING:
@@ -123,6 +124,18 @@ class RunContents:
         if frfs is None:
             return np.zeros((0, 0), complex)
         return model_frfs(model, frfs.labels, frfs.s[self.used_lines()])
+
+    def targets(self) -> list[Target]:
+        """Targets of the update.
+
+        Returns
+        -------
+        list of Target
+            Poles first; empty without an update.
+        """
+        if self.updated is None or self.pairs is None:
+            return []
+        return target_rows(self.updated, self.pairs, self.labels)
 
 
 def read_contents(folder: RunFolder) -> RunContents:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.plotting.projection import project
 from frf_ipz.report.picture import Picture, Trace, line, markers
 from frf_ipz.report.wording import listed, number
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.structure import Geometry
 
-FLAT = 1e-6  # of the largest extent: thinner than this is flat
 MOST_LABELS = 24  # DOFs of a kind that are labelled; more would cover each other
 SHELF = {"sensor": 0.2, "blow": 0.62, "point": -0.34, "missing": 0.0}  # above and below a structure that is a line
 
@@ -85,17 +85,7 @@ def _plan(geometry: Geometry | None, marks: Marks) -> tuple[IntArray, FloatArray
         nodes = np.array(sorted({dof.node for dof in dofs if dof.node > 0}), int)
         positions = np.stack([nodes, np.zeros(len(nodes))], 1).astype(float)
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
-    return geometry.nodes, _project(geometry.coordinates_m), geometry.lines
-
-
-def _project(coordinates: FloatArray) -> FloatArray:
-    extent = np.ptp(coordinates, axis=0)
-    wide = np.flatnonzero(extent > FLAT * max(float(extent.max()), np.finfo(float).tiny))
-    if len(wide) <= 2:
-        axes = [*wide, *[axis for axis in range(3) if axis not in wide]][:2]
-        return np.asarray(coordinates[:, sorted(axes) if len(wide) == 2 else axes], float)
-    x, y, z = coordinates.T
-    return np.stack([(x - y) * np.cos(np.pi / 6), z + (x + y) * np.sin(np.pi / 6)], 1)
+    return geometry.nodes, project(geometry.coordinates_m), geometry.lines
 
 
 def _body(positions: FloatArray, lines: IntArray, place: Mapping[int, int]) -> Trace:

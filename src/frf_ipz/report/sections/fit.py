@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.frfs import LEAST, Q95, magnitude_title
 from frf_ipz.report.picture import (
     Axis,
     Picture,
@@ -19,7 +20,6 @@ from frf_ipz.report.picture import (
     panels,
 )
 from frf_ipz.report.section import Section
-from frf_ipz.report.sections.frfs import LEAST, Q95, magnitude_title
 from frf_ipz.report.table import Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, number

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.frfs import LEAST, Q95, magnitude_title
+from frf_ipz.plotting.phases import PHASE_LIMITS, phase_degrees
 from frf_ipz.report.picture import (
     Axis,
     Picture,
@@ -24,16 +26,10 @@ from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.frf import FrfLabel, FrfSet
+    from frf_ipz.frf import FrfSet
     from frf_ipz.report.contents import RunContents
 
-PHASE_CUT = 135.0  # degrees: undamped structures stay at multiples of 90, so noise does not make curves jump here
-PHASE_AXIS = {"dtick": 90, "range": [PHASE_CUT - 365, PHASE_CUT + 5], "tick0": 0}
-Q95 = 1.96  # standard deviations of a 95 % interval
-LEAST = 0.1  # of the magnitude: a band that reaches below is drawn down to here
+PHASE_AXIS = {"dtick": 90, "tick0": 0, "range": list(PHASE_LIMITS)}
 
 
 def build(run: RunContents) -> Section | None:
@@ -116,39 +112,6 @@ def _frf(frfs: FrfSet, place: int, bins: int, *, has_coherence: bool) -> list[Tr
         points = frfs.frequency_hz[lines], frfs.coherence[lines, place]
         traces.append(line(*points, str(label), colour, hover="%{x:.6g} Hz: %{y:.5f}", yaxis="y3", **below))
     return traces
-
-
-def magnitude_title(labels: Sequence[FrfLabel]) -> str:
-    """Title of an axis with the magnitude of FRFs.
-
-    Parameters
-    ----------
-    labels : sequence of FrfLabel
-        What is drawn.
-
-    Returns
-    -------
-    str
-        Quantity and unit, or several of them.
-    """
-    kinds = dict.fromkeys((label.quantity.value, label.unit) for label in labels)
-    return " or ".join(f"{quantity.capitalize()}, {unit}" for quantity, unit in kinds)
-
-
-def phase_degrees(values: ComplexArray) -> FloatArray:
-    """Phase for drawing, cut where structures hardly ever are.
-
-    Parameters
-    ----------
-    values : complex array
-        FRFs.
-
-    Returns
-    -------
-    array
-        From -225 to 135 degrees.
-    """
-    return np.asarray((np.degrees(np.angle(values)) - PHASE_CUT) % -360.0 + PHASE_CUT)
 
 
 def _table(frfs: FrfSet) -> Table:

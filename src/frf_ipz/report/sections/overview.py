@@ -14,7 +14,6 @@ from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
 from frf_ipz.report.reference import measured_at
 from frf_ipz.report.section import Markup, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
-from frf_ipz.report.targets import target_rows
 from frf_ipz.report.wording import counted, listed, number, percent
 
 
@@ -95,7 +94,7 @@ def verdict(run: RunContents) -> str:
 
 
 def _of_update(run: RunContents) -> str:
-    rows = target_rows(run)
+    rows = run.targets()
     if not rows:
         return "No measured pole or zero has a counterpart in the model, so the model is left as it was."
     before, after = (
@@ -169,7 +168,7 @@ def _measured_card(run: RunContents) -> Card:
 
 
 def _target_card(run: RunContents) -> Card:
-    rows = target_rows(run)
+    rows = run.targets()
     if not rows:
         return Card("Worst target", "none", "no measured pole or zero has a counterpart in the model")
     worst = max(rows, key=lambda row: abs(row.after))

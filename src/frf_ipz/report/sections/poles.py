@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.plotting.ellipses import error_ellipses, root_covariances, root_deviations, shown_zeros
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.report.contents import RunContents
 
-Q95_PLANE = float(np.sqrt(-2 * np.log(0.05)))  # standard deviations of the ellipse that holds 95 % of a normal pair
-CORNERS = 33
 NOISE_FROM = {"recordings": "the scatter between blows", "misfit": "the misfit of the fit"}
 MOST_ELLIPSES = 400  # drawn; more would make the page large
 
@@ -59,21 +58,21 @@ def build(run: RunContents) -> Section | None:
 
 def _picture(fit: ModalFit, noise_from: str) -> Picture:
     poles = fit.model.poles[: fit.n_modes]
-    traces = [*_ellipses(poles, _blocks(fit)[: fit.n_modes], "poles", "@ink")]
+    traces = [*_ellipses(poles, root_covariances(fit)[: fit.n_modes], "poles", "@ink")]
     hover = "%{x:.7g} Hz, damping %{y:.5f} %<br>%{text}"
     names = [f"pole {place + 1}" for place in range(len(poles))]
     style: Trace = {"symbol": "x", "size": 9, "text": names, "hover": hover}
     traces.append(markers(natural_frequency_hz(poles), 100 * damping_ratio(poles), "poles", "@ink", **style))
     for frf, label in enumerate(fit.labels):
         traces += _zeros_of(fit, frf, str(label), hover)
-    spread = 100 * np.concatenate([damping_ratio(poles), damping_ratio(fit.zeros.values[_shown(fit)])])
+    spread = 100 * np.concatenate([damping_ratio(poles), damping_ratio(fit.zeros.values[shown_zeros(fit)])])
     top = 1.25 * float(np.quantile(spread, 0.95)) if spread.size else 1.0
     bottom = min(0.0, 1.25 * float(spread.min())) if spread.size else 0.0
     y = Axis(title="Damping ratio, %", options={"range": [bottom, max(top, 1e-3)], "zeroline": True})
     return Picture(
         name="pole-zero-map",
         title="Poles and zeros, with the ellipses that hold the true ones with 95 % probability",
-        alt=f"Map of {counted(len(poles), 'pole')} and {counted(int(_shown(fit).sum()), 'zero')} over frequency and "
+        alt=f"Map of {counted(len(poles), 'pole')} and {counted(int(shown_zeros(fit).sum()), 'zero')} over frequency and "
         "damping ratio; ellipses show their uncertainty.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*fit.band_hz), y),
@@ -85,12 +84,8 @@ def _picture(fit: ModalFit, noise_from: str) -> Picture:
     )
 
 
-def _shown(fit: ModalFit) -> BoolArray:
-    return fit.zeros.identifiable & (np.abs(damping_ratio(fit.zeros.values)) < 0.999)
-
-
 def _zeros_of(fit: ModalFit, frf: int, label: str, hover: str) -> list[Trace]:
-    here = _shown(fit) & (fit.zeros.frf == frf)
+    here = shown_zeros(fit) & (fit.zeros.frf == frf)
     values = fit.zeros.values[here]
     if not len(values):
         return []
@@ -99,47 +94,28 @@ def _zeros_of(fit: ModalFit, frf: int, label: str, hover: str) -> list[Trace]:
     more: Trace = {"meta": {"frf": frf}}
     style: Trace = {"symbol": "circle-open", "size": 9, "text": kinds, "hover": hover, **more}
     dots = markers(natural_frequency_hz(values), 100 * damping_ratio(values), f"zeros {label}", colour, **style)
-    return [*_ellipses(values, _blocks(fit)[fit.n_modes :][here], f"zeros {label}", colour, **more), dots]
+    return [*_ellipses(values, root_covariances(fit)[fit.n_modes :][here], f"zeros {label}", colour, **more), dots]
 
 
-def _blocks(fit: ModalFit) -> FloatArray:
-    """Covariance of each pole and zero alone, (n, 2, 2)."""
-    place = 2 * np.arange(len(fit.covariance) // 2)
-    rows = place[:, None] + np.array([0, 1])
-    return np.asarray(fit.covariance[rows[:, :, None], rows[:, None, :]])
-
-
-def _ellipses(roots: ComplexArray, covariance: FloatArray, name: str, colour: str, **more: Any) -> list[Trace]:  # noqa: ANN401  any property of a trace
-    """Ellipses in the plane of frequency and damping ratio, to first order."""
-    rows = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)) & (np.abs(roots) > 0))[:MOST_ELLIPSES]
+def _ellipses(
+    roots: ComplexArray,
+    covariance: FloatArray,
+    name: str,
+    colour: str,
+    **more: Any,  # noqa: ANN401  any property of a trace
+) -> list[Trace]:
+    rows = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)))[:MOST_ELLIPSES]
     if not len(rows):
         return []
-    angle = np.linspace(0, 2 * np.pi, CORNERS)
-    circle = Q95_PLANE * np.stack([np.cos(angle), np.sin(angle)])
-    x, y = np.full((2, len(rows), CORNERS + 1), np.nan)
-    for place, row in enumerate(rows):
-        values, vectors = np.linalg.eigh(covariance[row])
-        step = vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * circle)
-        moved = roots[row] + step[0] + 1j * step[1]
-        x[place, :CORNERS], y[place, :CORNERS] = natural_frequency_hz(moved), 100 * damping_ratio(moved)
+    outlines = error_ellipses(roots[rows], covariance[rows])
+    hertz, ratio = (np.pad(part, ((0, 0), (0, 1)), constant_values=np.nan) for part in outlines)
     style: Trace = {"width": 1, "showlegend": False, "fill": "toself", "fillcolor": f"{colour}/0.12"}
-    return [line(x.ravel(), y.ravel(), name, colour, **style, **more)]
-
-
-def _deviations(roots: ComplexArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Propagate to standard deviations of frequency in Hz and of the damping ratio, to first order."""
-    modulus = np.where(np.abs(roots) > 0, np.abs(roots), 1.0)
-    real, imag = roots.real / modulus, roots.imag / modulus
-    slopes_f = np.stack([real, imag], 1) / (2 * np.pi)
-    slopes_d = np.stack([-(imag**2), real * imag], 1) / modulus[:, None]
-    with np.errstate(invalid="ignore"):  # zeros without a number have an infinite variance
-        both = [np.sqrt(np.einsum("ni,nij,nj->n", slopes, covariance, slopes)) for slopes in (slopes_f, slopes_d)]
-    return both[0], both[1]
+    return [line(hertz.ravel(), 100 * ratio.ravel(), name, colour, **style, **more)]
 
 
 def _mode_table(fit: ModalFit) -> Table:
     poles = fit.model.poles[: fit.n_modes]
-    hertz_std, ratio_std = _deviations(poles, _blocks(fit)[: fit.n_modes])
+    hertz_std, ratio_std = root_deviations(poles, root_covariances(fit)[: fit.n_modes])
     extra = [name for name in ("mpc", "quality") if name in fit.modes and len(fit.modes) == len(poles)]
     rows = []
     for place, pole in enumerate(poles):
@@ -162,7 +138,7 @@ def _cell(value: object) -> str:
 
 def _zero_table(fit: ModalFit) -> Table:
     zeros = fit.zeros
-    hertz_std, ratio_std = _deviations(zeros.values, _blocks(fit)[fit.n_modes :])
+    hertz_std, ratio_std = root_deviations(zeros.values, root_covariances(fit)[fit.n_modes :])
     order: IntArray = np.lexsort((np.abs(zeros.values), zeros.frf))
     rows = []
     for place in order:

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.frfs import LEAST, magnitude_title
+from frf_ipz.plotting.phases import phase_degrees
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.picture import Axis, Picture, Trace, band, frequency_axis, line, panels
 from frf_ipz.report.reference import measured_at
 from frf_ipz.report.section import Section
-from frf_ipz.report.sections.frfs import LEAST, PHASE_AXIS, magnitude_title, phase_degrees
+from frf_ipz.report.sections.frfs import PHASE_AXIS
 from frf_ipz.report.table import Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, listed, number

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import eigh
 
+from frf_ipz.plotting.targets import Target
 from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
 from frf_ipz.report.section import Section
 from frf_ipz.report.table import Table
-from frf_ipz.report.targets import Target, target_rows
 from frf_ipz.report.wording import counted, number, percent
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def build(run: RunContents) -> Section | None:
     updated = run.updated
     if updated is None:
         return None
-    rows = target_rows(run)
+    rows = run.targets()
     pictures = [_targets(rows)] if rows else []
     pictures += [_convergence(updated)] if len(updated.history) > 1 else []
     change = _along_structure(updated, run.geometry)

@@ -10,7 +10,11 @@ import numpy as np
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
-    from frf_ipz.report.contents import RunContents
+    from collections.abc import Sequence
+
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.updating.updated_model import UpdatedModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,29 +53,31 @@ class Target:
         return self.after_hz / self.measured_hz - 1
 
 
-def target_rows(run: RunContents) -> list[Target]:
-    """Give all targets of the update.
+def target_rows(updated: UpdatedModel, pairs: Pairs, labels: Sequence[FrfLabel]) -> list[Target]:
+    """Give all targets of an update.
 
     Parameters
     ----------
-    run : RunContents
-        What the run holds.
+    updated : UpdatedModel
+        The update.
+    pairs : Pairs
+        What it aimed at.
+    labels : sequence of FrfLabel
+        What the measured FRFs connect.
 
     Returns
     -------
     list of Target
-        Poles first; empty without an update, or where pairs and update do not belong together.
+        Poles first; empty where pairs and update do not belong together.
     """
-    if run.updated is None or run.pairs is None:
+    targets = pairs.targets
+    if len(targets) != len(updated.after):
         return []
-    pairs = run.pairs.targets
-    if len(pairs) != len(run.updated.after):
-        return []
-    values = np.stack([[pair.measured_value for pair in pairs], run.updated.before, run.updated.after])
+    values = np.stack([[pair.measured_value for pair in targets], updated.before, updated.after])
     hertz, ratios = natural_frequency_hz(values.astype(complex)), damping_ratio(values.astype(complex))
     return [
         Target(
-            name=root_name(pair.kind, pair.measured, str(run.labels[pair.frf]) if pair.frf >= 0 else ""),
+            name=root_name(pair.kind, pair.measured, str(labels[pair.frf]) if pair.frf >= 0 else ""),
             kind=pair.kind,
             measured_hz=float(hertz[0, place]),
             before_hz=float(hertz[1, place]),
@@ -80,7 +86,7 @@ def target_rows(run: RunContents) -> list[Target]:
             before_damping=float(ratios[1, place]),
             after_damping=float(ratios[2, place]),
         )
-        for place, pair in enumerate(pairs)
+        for place, pair in enumerate(targets)
     ]
 
 

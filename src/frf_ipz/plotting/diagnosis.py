@@ -1,0 +1,106 @@
+"""Diagnosis: where model and measurement disagree, and what explains it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.plotting.style import FAINT, UPDATED, axes_or_new, colour, label_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+
+MOST_RANKED = 12
+
+
+def plot_mismatch(diagnosis: Diagnosis, *, column: str = "before", ax: Axes | None = None) -> Axes:
+    """Draw the misfit over what noise and tolerances explain, by FRF and band.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis.
+    column : str
+        ``before`` or ``after``: of the model as it is, or with the findings.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        A map; 1 is as good as the measurement.
+    """
+    table = diagnosis.mismatch
+    names = list(dict.fromkeys(table["frf"].astype(str)))
+    bands = sorted({(float(low), float(high)) for low, high in zip(table["low_hz"], table["high_hz"], strict=True)})
+    ax = axes_or_new(ax, height_in=1.4 + 0.3 * len(names))
+    values = np.full((len(names), len(bands)), np.nan)
+    for row in table.to_dict("records"):
+        place = names.index(str(row["frf"])), bands.index((float(row["low_hz"]), float(row["high_hz"])))
+        values[place] = row[column]
+    image = ax.imshow(np.log10(np.maximum(values, 0.1)), cmap="cividis", aspect="auto", vmin=0)
+    colours = ax.figure.colorbar(image, ax=ax)
+    colours.set_label("log10 of misfit over noise", fontsize=8)
+    ax.set_xticks(range(len(bands)), [f"{low:.4g}-{high:.4g}" for low, high in bands], rotation=40, ha="right")
+    ax.set_yticks(range(len(names)), names)
+    ax.grid(visible=False)
+    return label_axes(ax, "Band, Hz", "")
+
+
+def plot_ranking(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
+    """Draw findings and alternatives by their evidence.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Bars; the findings stand out.
+    """
+    ranked = [*diagnosis.findings, *diagnosis.alternatives][:MOST_RANKED]
+    ax = axes_or_new(ax, height_in=1.0 + 0.28 * len(ranked))
+    found = len(diagnosis.findings)
+    shades = [UPDATED if place < found else FAINT for place in range(len(ranked))]
+    ax.barh(range(len(ranked)), [one.log_evidence_gain for one in ranked], color=shades)
+    ax.set_yticks(range(len(ranked)), [one.effect.replace("_", " ") for one in ranked])
+    ax.invert_yaxis()
+    return label_axes(ax, "Gain of log evidence, nats", "", legend=False)
+
+
+def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
+    """Draw the error of the FRFs before and after, on what was fitted and on what was held out.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Bars.
+    """
+    ax = axes_or_new(ax)
+    steps = {"as it is": diagnosis.before, "within tolerances": diagnosis.updated, "with the findings": diagnosis.after}
+    place = np.arange(len(steps))
+    for rank, (name, values) in enumerate(
+        (
+            ("fitted", [one.training for one in steps.values()]),
+            (f"held out ({diagnosis.held})", [one.held_out for one in steps.values()]),
+        )
+    ):
+        hatch = "//" if rank else ""
+        ax.bar(place + 0.4 * (rank - 0.5), 100 * np.array(values), 0.38, color=colour(rank), hatch=hatch, label=name)
+    ax.set_yscale("log")
+    ax.set_xticks(place, list(steps))
+    return label_axes(ax, "", "Normalised FRF error, %")
