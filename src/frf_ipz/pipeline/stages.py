@@ -15,6 +15,7 @@ from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.export import run_tables as tables
+from frf_ipz.export.mode_table import mode_table
 from frf_ipz.export.state_space import save_reduced_model, save_state_space, to_state_space
 from frf_ipz.export.tables import write_table
 from frf_ipz.fe.reduction import reduce_model
@@ -154,7 +155,7 @@ def fit(desk: Desk, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> M
             "poles.parquet": _parquet(tables.pole_table(result)),
             "zeros.parquet": _parquet(tables.zero_table(result)),
             "fit.parquet": _parquet(tables.frame_table(result.misfit, {}, meaning="misfit against noise")),
-            "modes.parquet": _parquet(tables.mode_table(result)),
+            "modes.parquet": _parquet(mode_table(result, scale_is_known=frfs.unknown_scale == "none")),
         },
     )
 
