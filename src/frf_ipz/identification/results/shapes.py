@@ -1,0 +1,134 @@
+"""Mode shapes from residues: one vector a mode over the measured DOFs.
+
+The residue of a receptance at a normal mode is ``phi_output phi_input / (2 i omega_d)``: sec. 2.6 of [Ewins2000],
+D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed., Research Studies Press, 2000.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.modes import ModeSet
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import BoolArray, ComplexArray
+    from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.identification.modal_fit import ModalFit
+
+SWEEPS = 30  # of the alternating fit of a product to the residues that were measured
+
+
+def mode_shapes(fit: ModalFit) -> ModeSet:
+    """Assemble the mode shapes of a fit.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    ModeSet
+        At all measured DOFs, unsigned and mass-normalised, where a driving point was measured; else at the sensors or
+        at the blows, whichever are more, with the largest entry 1.
+    """
+    poles = fit.model.poles[: fit.n_modes]
+    outputs = tuple(dict.fromkeys(label.output_dof.unsigned for label in fit.labels))
+    inputs = tuple(dict.fromkeys(label.input_dof.unsigned for label in fit.labels))
+    matrices, measured = _residue_matrices(fit, poles, outputs, inputs)
+    driving = [dof for dof in outputs if dof in inputs and measured[outputs.index(dof), inputs.index(dof)]]
+    dofs = tuple(dict.fromkeys((*outputs, *inputs))) if driving else max(outputs, inputs, key=len)
+    shapes = np.empty((len(dofs), len(poles)), complex)
+    for mode, matrix in enumerate(matrices):
+        left, right = _product(matrix, measured)
+        if driving:
+            left, right = _with_driving_point(left, right, outputs, inputs, driving)
+        shapes[:, mode] = _normalised(left, right, outputs, inputs, dofs, keep_size=bool(driving))
+    return ModeSet(
+        natural_frequency_hz=natural_frequency_hz(poles), damping_ratio=damping_ratio(poles), shapes=shapes, dofs=dofs
+    )
+
+
+def driving_points(labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
+    """Name the DOFs at which force and response were measured together.
+
+    Parameters
+    ----------
+    labels : sequence of FrfLabel
+        What was measured.
+
+    Returns
+    -------
+    tuple of Dof
+        Unsigned.
+    """
+    return tuple(
+        dict.fromkeys(label.output_dof.unsigned for label in labels if label.output_dof.name == label.input_dof.name)
+    )
+
+
+def _residue_matrices(
+    fit: ModalFit, poles: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...]
+) -> tuple[ComplexArray, BoolArray]:
+    """Give 2 i omega_d times the receptances' residues, (n_modes, n_outputs, n_inputs), and where they were measured."""
+    matrices = np.zeros((len(poles), len(outputs), len(inputs)), complex)
+    measured = np.zeros((len(outputs), len(inputs)), bool)
+    for column, label in enumerate(fit.labels):
+        place = outputs.index(label.output_dof.unsigned), inputs.index(label.input_dof.unsigned)
+        delay = np.exp(-poles * fit.model.delay_s[column])
+        receptance = fit.model.residues[: len(poles), column] * delay / poles**label.quantity.power
+        matrices[:, *place] = label.sign * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance
+        measured[place] = True
+    return matrices, measured
+
+
+def _product(matrix: ComplexArray, measured: BoolArray) -> tuple[ComplexArray, ComplexArray]:
+    """Find the product of two vectors that fits the measured entries best."""
+    right = matrix[np.argmax(np.sum(np.abs(matrix), axis=1))].copy()
+    left = np.zeros(len(matrix), complex)
+    for _ in range(SWEEPS):
+        left = matrix @ right.conj() / _positive(measured @ np.abs(right) ** 2)
+        right = matrix.T @ left.conj() / _positive(measured.T @ np.abs(left) ** 2)
+    return left, right
+
+
+def _positive(values: np.ndarray) -> np.ndarray:
+    return np.where(values > 0, values, np.inf)
+
+
+def _with_driving_point(
+    left: ComplexArray, right: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...], driving: list[Dof]
+) -> tuple[ComplexArray, ComplexArray]:
+    """Share the size between the two vectors so that they agree at the driving points."""
+    at_output = np.array([left[outputs.index(dof)] for dof in driving])
+    at_input = np.array([right[inputs.index(dof)] for dof in driving])
+    weight = np.vdot(at_output, at_output).real
+    ratio = np.vdot(at_output, at_input) / weight if weight > 0 else 1.0
+    factor = np.sqrt(complex(ratio) or 1.0)
+    return left * factor, right / factor
+
+
+def _normalised(
+    left: ComplexArray,
+    right: ComplexArray,
+    outputs: tuple[Dof, ...],
+    inputs: tuple[Dof, ...],
+    dofs: tuple[Dof, ...],
+    *,
+    keep_size: bool,
+) -> ComplexArray:
+    """One vector over the DOFs, its largest entry real and positive."""
+    found = dict(zip(inputs, right, strict=True)) | dict(zip(outputs, left, strict=True))
+    if not keep_size:
+        found = dict(zip(outputs, left, strict=True)) if dofs == outputs else dict(zip(inputs, right, strict=True))
+    shape = np.array([found[dof] for dof in dofs])
+    largest = shape[np.argmax(np.abs(shape))]
+    if not abs(largest) > 0:
+        return shape
+    return np.asarray(shape * (abs(largest) / largest if keep_size else 1 / largest))
