@@ -77,6 +77,22 @@ def test_records_from_rest_are_used_whole_and_give_exact_frfs(tmp_path):
     assert result.blows.used.all()
 
 
+def test_segments_would_lose_the_peaks_of_records_from_rest(tmp_path):
+    """At 0.4 % damping, segments of a quarter of the record lose a tenth of the peaks, and nothing shows it."""
+    rng = np.random.default_rng(11)
+    light = Structure(damping_ratio=(0.004, 0.004, 0.004))
+    path = write(tmp_path, [from_rest(rng, 16_384, structure=light, noise=0.3) for _ in range(3)])
+    whole, segments = estimate(path).frfs, estimate(path, segment_s=4.0).frfs
+    assert errors(whole, light).max() < 0.05
+    assert errors(segments, light).max() > 0.1
+
+
+def test_a_single_long_record_from_rest_is_cut_into_segments(tmp_path):
+    result = estimate(write(tmp_path, [from_rest(np.random.default_rng(12), 120_000)]))
+    assert "segments of" in result.choices[0]
+    assert np.isfinite(result.frfs.variance[1:-1]).all()
+
+
 def test_the_variance_of_whole_records_is_their_error(tmp_path):
     rng = np.random.default_rng(3)
     light = Structure(damping_ratio=(0.003, 0.002, 0.002))

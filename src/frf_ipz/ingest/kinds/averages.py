@@ -1,4 +1,4 @@
-"""Sums of spectra per run into FRFs per label: estimator, coherence, variance, lines that are kept."""
+"""Sums of spectra per run into FRFs per label: estimator, coherence, variance."""
 
 from __future__ import annotations
 
@@ -76,16 +76,16 @@ def assemble_frfs(test: Test, survey: Survey, averages: Mapping[Run, RunAverage]
         estimates |= _estimate(pooled, labels, options.estimator)
     ordered = [estimates[label] for label in test.labels]
     duration = survey.n_samples * survey.step_s
-    every = correlated_lines(survey.decay_1_s * duration)
     n_lines = survey.n_samples // 2 + 1
     return FrfSet(
-        frequency_hz=np.arange(n_lines)[::every] / duration,
-        values=np.column_stack([one.values[::every] for one in ordered]),
+        frequency_hz=np.arange(n_lines) / duration,
+        values=np.column_stack([one.values for one in ordered]),
         labels=test.labels,
-        variance=np.column_stack([one.variance[::every] for one in ordered]),
-        coherence=np.column_stack([one.coherence[::every] for one in ordered]),
+        variance=np.column_stack([one.variance for one in ordered]),
+        coherence=np.column_stack([one.coherence for one in ordered]),
         averages=np.array([one.count for one in ordered], np.int64),
         window_decay_1_s=survey.decay_1_s,
+        correlated_lines=correlated_lines(survey.decay_1_s * duration),
         unknown_scale=test.unknown_scale,
     )
 

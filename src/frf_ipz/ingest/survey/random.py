@@ -1,14 +1,16 @@
 """The survey of a test with a shaker: its records, and whether they are used whole or in segments.
 
 A record that starts from rest can be used whole, with an exponential window on force and response: its FRF is then free
-of leakage, however narrow the modes are, but for the motion at its end, which the window has made small. Only the first
-part of a record counts, though. A stationary record that is long against the decay of the modes is better cut into
-segments (Welch). Which it is to be is measured: segments are long enough when the share of the response that the force
-does not explain no longer falls as they are made twice as long.
+of leakage, however narrow the modes are, but for the motion at its end, which the window has made small. Where several
+records start from rest, that is what is done: segments would lose less of the data, but their peaks are too low by an
+amount that nothing in the data tells. A stationary record is cut into segments (Welch), as long as the number of
+averages allows; they are long enough when the share of the response that the force does not explain no longer falls as
+they are made twice as long.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -156,6 +158,9 @@ def _asked_segment(survey: Survey, segment_s: float) -> int:
 
 
 def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Survey:
+    rested = may_window and all(record.rested for record in survey.used)
+    if rested and all(count > 1 for count in Counter(record.run for record in survey.used).values()):
+        return _from_rest(survey, "all start from rest")
     tried = _try_segments(files, survey)
     for short, double in zip(tried[1:], tried[:-1], strict=True):
         if short.count < ENOUGH:
@@ -164,10 +169,8 @@ def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Surve
             why = f"long enough: {100 * short.unexplained:.2g} % of the response is unexplained by the force"
             return _in_segments(survey, short.length, why)
         break  # shorter ones leak more
-    if may_window and all(record.rested for record in survey.used):
-        shortest = min(record.n_samples for record in survey.used)
-        why = "all start from rest, and are too short for segments without leakage"
-        return _whole(survey, DECAY / (shortest * survey.step_s), why)
+    if rested:
+        return _from_rest(survey, "all start from rest, and are too short for segments without leakage")
     lengths = [trial.length for trial in sorted(tried, key=lambda trial: trial.unexplained)]
     length = lengths[0] if lengths else min(record.n_samples for record in survey.used) // 4
     warning = (
@@ -177,6 +180,11 @@ def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Surve
     )
     survey = _in_segments(survey, length, "the least bad")
     return replace(survey, warnings=(*survey.warnings, warning))
+
+
+def _from_rest(survey: Survey, why: str) -> Survey:
+    shortest = min(record.n_samples for record in survey.used)
+    return _whole(survey, DECAY / (shortest * survey.step_s), why)
 
 
 def _try_segments(files: RecordingFiles, survey: Survey) -> list[_Segments]:
