@@ -19,13 +19,14 @@ def chain(order=5, *, stiffness=None, damping=0.01, free=False, seed=0, between=
         springs[0] = 0.0
     K = np.diag(springs) + np.diag(np.append(springs[1:], 0.0))
     K -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+    mass = np.diag(rng.uniform(0.5, 2.0, order)) + 0.1 * (np.eye(order, k=1) + np.eye(order, k=-1))
     dofs = tuple(Dof(node, "x") for node in range(1, order + 1))
     expansion, expanded = np.eye(order), dofs
     if between:
         expansion = np.vstack([expansion, np.r_[0.5, 0.5, np.zeros(order - 2)]])
         expanded = (*dofs, Dof(99, "x"))
     return ReducedModel(
-        mass=np.diag(rng.uniform(0.5, 2.0, order)),
+        mass=mass,
         damping=damping / 300.0 * K,
         stiffness=K,
         dofs=dofs,

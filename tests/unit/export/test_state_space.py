@@ -110,6 +110,15 @@ def test_states_are_modes_of_one_size():
     assert space.state_names[:3] == ("mode 1 displacement", "mode 1 velocity", "mode 2 displacement")
 
 
+def test_a_rigid_body_mode_is_scaled_by_a_rate_that_is_not_zero():
+    stiff = chain(3, free=True)
+    exact = replace(stiff, mass=np.eye(3), damping=np.zeros((3, 3)), stiffness=np.diag([0.0, 1e4, 4e4]))
+    for one in (exact, stiff):
+        space = to_state_space(updated(one), (label(1, 1), label(2, 1)), ())
+        assert np.isfinite(space.A).all()
+        assert space.A[0, 1] >= 1e-7 * np.abs(space.A).max()
+
+
 def test_residual_flexibility_as_feedthrough_keeps_the_static_frf_and_drops_its_states():
     model = replace(chain(between=True), n_modes=3)
     options = ExportOptions(outputs="displacement", residual="feedthrough")

@@ -1,0 +1,232 @@
+"""Who belongs to whom: on structures whose truth is known, and in the cases that are easily mistaken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import linear_sum_assignment
+
+from chains import chain, label
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.frf import FrfLabel
+from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.model_roots import model_poles, model_zeros
+from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.rational import PoleResidueModel, ZeroSet
+from updating_bench.synthetic_fit import as_fit
+from updating_study import set_up
+
+SEEDS = range(500, 512)  # none of them was looked at when the constants were chosen
+LABELS = (label(2, 1), label(4, 1))
+BAND = (5.0, 120.0)
+
+
+def measured(model, labels=LABELS, *, poles=None, zeros=True, gain=1.0):
+    """The fit of a model that a perfect measurement gives: its own poles, residues and zeros."""
+    found = model_poles(model, labels)
+    chosen = range(len(found.values)) if poles is None else poles
+    values, amplitudes = found.values[list(chosen)], found.amplitudes[list(chosen)]
+    powers = np.array([one.quantity.power for one in labels])
+    residues = gain * amplitudes / (2j * np.abs(values))[:, None] * values[:, None] ** powers
+    shown = [complex_zeros(model, one) if zeros else ([], []) for one in labels]
+    roots = [values for values, _ in shown]
+    all_zeros = np.concatenate(roots).astype(complex)
+    fitted = PoleResidueModel(
+        poles=values,
+        residues=residues,
+        powers=(0,),
+        coefficients=np.zeros((1, len(labels))),
+        scale_rad_s=1.0,
+        delay_s=np.zeros(len(labels)),
+    )
+    where = np.repeat(np.arange(len(labels)), [len(one) for one in roots])
+    kinds = [kind for _, kinds in shown for kind in kinds]
+    std = np.repeat(1e-5 * np.abs(np.concatenate([values, all_zeros])), 2)
+    nothing = np.zeros((len(values), len(labels), 2, 2))
+    return as_fit(fitted, labels, BAND, all_zeros, where, kinds, np.diag(std**2), nothing)
+
+
+def complex_zeros(model, one):
+    """Those that show as antiresonances, and their kinds."""
+    found = model_zeros(model, one)
+    places = [place for place, kind in enumerate(found.kind) if kind == "complex"]
+    return found.values[places], ["complex"] * len(places)
+
+
+def test_a_model_is_paired_with_itself_throughout():
+    model = chain()
+    pairs = pair(measured(model), model)
+    assert {row.verdict for row in pairs.rows} == {Verdict.PAIRED}
+    assert pairs.warnings == ()
+    for row in pairs.rows:
+        assert_allclose(row.computed_value, row.measured_value, rtol=1e-12)
+        assert row.distance < 1e-6
+        assert "next best" in row.reason
+
+
+def test_residues_of_the_model_rebuild_its_frf():
+    model = chain(damping=0.02)
+    found = measured(model, zeros=False)
+    s = 2j * np.pi * np.linspace(2.0, 150.0, 40)
+    assert_allclose(found.model(s), model_frfs(model, LABELS, s), rtol=1e-9)
+
+
+@pytest.mark.parametrize("quantity", list(FrfQuantity))
+def test_pairing_does_not_depend_on_the_quantity(quantity):
+    labels = tuple(replace(one, quantity=quantity) for one in LABELS)
+    model = chain()
+    stiffer = replace(model, stiffness=1.15 * model.stiffness)
+    pairs = pair(measured(stiffer, labels), model)
+    assert [row.computed for row in pairs.targets if row.kind == "pole"] == list(range(5))
+
+
+def test_a_common_factor_on_all_frequencies_is_no_obstacle():
+    model = chain()
+    for factor in (0.7, 0.85, 1.2, 1.4):
+        stiffer = replace(model, stiffness=factor * model.stiffness, damping=np.sqrt(factor) * model.damping)
+        pairs = pair(measured(stiffer), model)
+        assert all(row.verdict is Verdict.PAIRED for row in pairs.rows if row.kind == "pole")
+        assert [row.computed for row in pairs.rows if row.kind == "pole"] == list(range(5))
+
+
+def test_shapes_tell_swapped_modes_apart():
+    """Two loops of one stiffness and another mass each: the heavier one has the lower frequency."""
+    model = two_loops(1.00, 1.06)
+    swapped = two_loops(1.06, 1.00)
+    pairs = pair(measured(swapped, (label(1, 1), label(2, 2)), zeros=False), model)
+    assert [(row.measured, row.computed) for row in pairs.targets] == [(0, 1), (1, 0)]
+
+
+def two_loops(first, second):
+    model = chain(2, stiffness=[1e5, 0.0])
+    return replace(model, mass=np.diag([first, second]), stiffness=1e5 * np.eye(2), damping=np.eye(2))
+
+
+def test_a_polarity_that_is_turned_is_found_and_said():
+    model = chain()
+    turned = tuple(replace(one, output_dof=replace(one.output_dof, sign=-1)) for one in LABELS)
+    fit = measured(model, LABELS)
+    pairs = pair(replace(fit, labels=turned), model)
+    assert "polarity of FRF 1, 2" in pairs.warnings[-1]
+    assert all(row.verdict is Verdict.PAIRED for row in pairs.rows)
+
+
+def test_a_mode_that_was_not_measured_is_missing_in_the_measurement():
+    model = chain()
+    pairs = pair(measured(model, poles=[0, 1, 3, 4], zeros=False), model)
+    missing = [row for row in pairs.rows if row.kind == "pole" and row.verdict is Verdict.MISSING_IN_MEASUREMENT]
+    assert [row.computed for row in missing] == [2]
+    assert [row.computed for row in pairs.targets] == [0, 1, 3, 4]
+
+
+def test_a_mode_that_the_model_lacks_is_said_and_is_no_target():
+    richer, model = chain(5), chain(5)
+    fit = measured(richer, zeros=False)
+    extra = 2j * np.pi * 200.0 - 5.0
+    poles = np.append(fit.model.poles, extra)
+    residues = np.vstack([fit.model.residues, fit.model.residues[:1]])
+    larger = replace(fit.model, poles=poles, residues=residues)
+    more = as_fit(
+        larger, LABELS, (5.0, 250.0), np.zeros(0, complex), np.zeros(0, int), [], np.eye(12), np.zeros((6, 2, 2, 2))
+    )
+    pairs = pair(more, model)
+    lonely = [row for row in pairs.rows if row.verdict is Verdict.MISSING_IN_MODEL]
+    assert [row.measured for row in lonely] == [5]
+    assert "200 Hz" in pairs.warnings[0]
+    assert len(pairs.targets) == 5
+
+
+def test_nothing_in_common_is_a_warning_with_what_to_check():
+    model = chain()
+    far = replace(model, stiffness=1e6 * model.stiffness)
+    pairs = pair(measured(far), model)
+    assert not [row for row in pairs.targets if row.kind == "pole"]
+    assert any("check units" in text for text in pairs.warnings)
+
+
+def test_a_zero_that_is_not_identifiable_is_no_target():
+    model = chain()
+    fit = measured(model)
+    known = fit.zeros.identifiable.copy()
+    known[0] = False
+    reasons = ("too far out", *[""] * (len(known) - 1))
+    pairs = pair(replace(fit, zeros=replace(fit.zeros, identifiable=known, reason=reasons)), model)
+    row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
+    assert row.verdict is Verdict.AMBIGUOUS
+    assert "too far out" in row.reason
+
+
+def test_a_zero_that_cancels_a_pole_is_no_target():
+    model = chain()
+    fit = measured(model)
+    values = fit.zeros.values.copy()
+    values[0] = fit.model.poles[1] * (1 + 1e-6)
+    pairs = pair(replace(fit, zeros=replace(fit.zeros, values=values)), model)
+    row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
+    assert "cancels the pole" in row.reason
+    assert row.verdict is Verdict.AMBIGUOUS
+
+
+def test_a_real_zero_is_no_target():
+    values = np.array([-300.0 + 0j])
+    fit = measured(chain(), zeros=False)
+    zeros = ZeroSet(values=values, frf=np.array([0]), kind=("real",), identifiable=np.array([True]), reason=("",))
+    with_zero = replace(fit, zeros=zeros, covariance=np.eye(12))
+    row = next(row for row in pair(with_zero, chain()).rows if row.kind == "zero" and row.measured == 0)
+    assert row.verdict is Verdict.AMBIGUOUS
+
+
+def test_quadruples_are_listed_once():
+    """Far from the blow a beam's zeros leave the axis; each stands for four."""
+    seeds_with = 0
+    for seed in SEEDS:
+        bench = set_up(seed)
+        for one in bench.labels:
+            zeros = model_zeros(bench.reduced, one)
+            quadruples = zeros.values[np.array(zeros.kind) == "quadruple"]
+            seeds_with += len(quadruples) > 0
+            assert np.all(quadruples.real < 0)
+            gaps = np.abs(quadruples[:, None] + quadruples.conj()) + np.eye(len(quadruples)) * 1e9
+            assert gaps.min(initial=1e9) > 1e-6
+    assert seeds_with > 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_pole_is_paired_wrongly(seed):
+    """The truth is which modes are alike: the real structure's shapes at all DOFs against the nominal ones."""
+    bench = set_up(seed)
+    nominal = type(bench.truth)(bench.case.nominal, bench.case.damping)
+    mass = bench.case.nominal.mass.toarray()
+    alike = np.abs(bench.truth.shapes.T @ mass @ nominal.shapes)
+    rows, columns = linear_sum_assignment(-alike)
+    partner = dict(zip(rows.tolist(), columns.tolist(), strict=True))
+    for row in bench.pairs.targets:
+        if row.kind == "pole":
+            real = int(np.argmin(np.abs(bench.truth.omega - abs(row.measured_value))))
+            sure = alike[real, partner[real]] > 0.8  # below, two modes have mixed and neither answer is wrong
+            found = int(np.argmin(np.abs(nominal.omega - abs(row.computed_value))))
+            assert found == partner[real] or not sure
+
+
+def test_the_slope_at_zeros_is_that_of_the_frf():
+    model = chain(damping=0.001)
+    one = FrfLabel(Dof(2, "x"), Dof(2, "x"), FrfQuantity.RECEPTANCE)
+    zeros = model_zeros(model, one)
+    step = 1e-5j * np.abs(zeros.values)
+    beside = [model_frfs(model, [one], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
+    assert np.array_equal(np.sign(beside[0] - beside[1]), zeros.slope_sign)
+
+
+def test_a_rigid_body_is_no_mode_that_could_be_measured():
+    model = chain(free=True)
+    assert np.abs(model_poles(model, LABELS).values[0]) < 1e-3
+    pairs = pair(measured(model, poles=[1, 2, 3, 4], zeros=False), model)
+    assert [(row.measured, row.computed) for row in pairs.rows if row.kind == "pole"] == [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 4),
+    ]
