@@ -21,7 +21,7 @@ def true_frfs(labels: tuple[frf_ipz.FrfLabel, ...], lines_hz: np.ndarray) -> np.
     columns = []
     for label in labels:
         rows = table[(table["output_dof"] == str(label.output_dof)) & (table["input_dof"] == str(label.input_dof))]
-        rows = rows.set_index("frequency_hz").reindex(lines_hz)
+        rows = rows.set_index("frequency_hz").reindex(lines_hz, method="nearest", tolerance=1e-3)
         columns.append(rows["real"].to_numpy() + 1j * rows["imag"].to_numpy())
     return np.stack(columns, axis=1)
 

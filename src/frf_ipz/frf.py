@@ -82,6 +82,9 @@ class FrfSet:
         back without an approximation. 0 without a window.
     unknown_scale : str
         ``none``, ``common`` or ``per_channel``: gains that are not known and may be fitted.
+    correlated_lines : int
+        Neighbouring lines whose errors are hardly independent, as under an exponential window: who counts lines as
+        evidence takes one in so many.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class FrfSet:
     averages: IntArray
     window_decay_1_s: float = 0.0
     unknown_scale: str = "none"
+    correlated_lines: int = 1
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))

@@ -58,10 +58,11 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     assert any("is cut off" in warning for warning in truncated.warnings)
 
 
-def test_lines_that_a_window_correlates_are_thinned_out(tmp_path):
+def test_lines_that_a_window_correlates_are_counted(tmp_path):
     result = estimate(hammer_campaign(tmp_path, structure=RINGING))
     decay = result.frfs.window_decay_1_s * 2.0
-    assert np.diff(result.frfs.frequency_hz) == pytest.approx(round(0.5 * decay / np.tanh(0.5 * decay)) / 2.0)
+    assert result.frfs.correlated_lines == round(0.5 * decay / np.tanh(0.5 * decay))
+    assert np.diff(result.frfs.frequency_hz) == pytest.approx(0.5)
 
 
 def test_a_recording_that_starts_long_before_the_blow_is_cut_to_it(tmp_path):

@@ -107,7 +107,8 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     if not known.all():
         noise[:, ~known] = rough_variance(frfs.values[:, ~known])
     band = options.band_hz or _signal_band(frfs, noise, usable)
-    used = usable & frfs.in_band(band, options.exclude_hz)
+    independent = np.arange(frfs.n_lines) % frfs.correlated_lines == 0
+    used = usable & independent & frfs.in_band(band, options.exclude_hz)
     if used.sum() < FEWEST_LINES:
         raise InputError(
             f"only {int(used.sum())} usable frequency lines are left in the band {band[0]:g} to {band[1]:g} Hz; "
