@@ -266,10 +266,10 @@ def _quadratic(
         mass, damping, stiffness = (rows.T @ matrix @ columns for matrix in (mass, damping, stiffness))
     order = len(mass)
     # time is scaled so that mass and stiffness are of one size: QZ is accurate relative to the norm of the whole pencil
-    scale = np.sqrt(np.linalg.norm(stiffness) / np.linalg.norm(mass))
+    norm = np.linalg.norm(stiffness) or np.linalg.norm(mass)  # what is free to move has no stiffness
+    scale = np.sqrt(norm / np.linalg.norm(mass))
     first, second = np.zeros((2, 2 * order, 2 * order))
     first[:order, order:] = second[:order, :order] = np.eye(order)
-    norm = np.linalg.norm(stiffness)
     first[order:, :order] = stiffness / -norm
     first[order:, order:] = damping * (-scale / norm)
     second[order:, order:] = mass * (scale**2 / norm)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.numerics.pencils import damped_poles, damped_zeros
+from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -107,7 +107,7 @@ def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:
     return ModelZeros(
         values=upper.values,
         kind=tuple(kind for kind, kept in zip(kinds, keep, strict=True) if kept),
-        slope_sign=_slope_sign(model, upper.values, output, force),
+        slope_sign=_slope_sign(model, upper, output, force),
     )
 
 
@@ -137,11 +137,13 @@ def _kinds(values: ComplexArray) -> tuple[list[str], BoolArray]:
     return kinds, keep
 
 
-def _slope_sign(model: ReducedModel, zeros: ComplexArray, output: FloatArray, force: FloatArray) -> FloatArray:
-    """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b, from H' = -c P^-1 P' P^-1 b."""
-    s = zeros[:, None, None]
-    dynamic = s**2 * model.mass + s * model.damping + model.stiffness
-    right = np.linalg.solve(dynamic, np.broadcast_to(force[:, None], (*zeros.shape, len(force), 1)))
-    left = np.linalg.solve(dynamic.swapaxes(1, 2), np.broadcast_to(output[:, None], right.shape))
-    slope = -(left.swapaxes(1, 2) @ (2 * s * model.mass + model.damping) @ right)[:, 0, 0]
-    return np.asarray(np.sign((1j * slope).real))
+def _slope_sign(model: ReducedModel, zeros: Roots, output: FloatArray, force: FloatArray) -> FloatArray:
+    """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b; 0 where a pole lies on the zero.
+
+    The vectors of a zero are held by the sensor and driven by the blow: P x = a b and y^T P = h c, so
+    H' = -c P^-1 P' P^-1 b = -(y^T P' x) / (a h), which needs no inverse of a P that may be singular.
+    """
+    powers = ((2, model.mass), (1, model.damping), (0, model.stiffness))
+    driven = sum(zeros.values**power * (force @ matrix @ zeros.right) for power, matrix in powers)
+    held = sum(zeros.values**power * (output @ matrix.T @ zeros.left) for power, matrix in powers)
+    return np.asarray(np.sign((-1j * zeros.slope * np.conj(driven * held)).real))

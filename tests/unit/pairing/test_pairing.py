@@ -220,6 +220,12 @@ def test_the_slope_at_zeros_is_that_of_the_frf():
     assert np.array_equal(np.sign(beside[0] - beside[1]), zeros.slope_sign)
 
 
+def test_a_zero_on_a_pole_is_no_obstacle():
+    """The second mass hangs on nothing: a double zero at 0 lies on its double pole, and P(0) is singular."""
+    model = replace(two_loops(1.0, 1.0), stiffness=np.diag([1e5, 0.0]), damping=np.diag([1.0, 0.0]))
+    assert model_zeros(model, label(1, 1)).slope_sign.tolist() == [0.0, 0.0]
+
+
 def test_a_rigid_body_is_no_mode_that_could_be_measured():
     model = chain(free=True)
     assert np.abs(model_poles(model, LABELS).values[0]) < 1e-3
