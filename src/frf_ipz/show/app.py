@@ -1,0 +1,148 @@
+"""What the page can ask for: itself, its script, the state of the run, shapes, files of the run; and changes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plotly.offline import get_plotlyjs
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route
+
+from frf_ipz.errors import FrfIpzError, InputError
+from frf_ipz.report.page import _asset as report_asset
+from frf_ipz.show.guard import Guard
+from frf_ipz.show.page import render_choices, render_page
+from frf_ipz.show.shape_drawing import draw_shape
+from frf_ipz.show.shapes import mode_shape, operating_shape
+from frf_ipz.show.workbench import Workbench
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from starlette.requests import Request
+    from starlette.types import ASGIApp
+
+SCRIPT, STYLE = "text/javascript", "text/css"
+REPORT_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def build_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
+    """Make the web application of a run.
+
+    Parameters
+    ----------
+    bench : Workbench
+        The run.
+    port : int
+        Where it will listen: requests that name another one are refused.
+    token : str
+        First part of every path.
+
+    Returns
+    -------
+    ASGI application
+        For uvicorn.
+    """
+    routes = [
+        Route("/", _answering(bench, _page)),
+        Route("/state", _answering(bench, _state)),
+        Route("/choices", _answering(bench, _choices)),
+        Route("/shape", _answering(bench, _shape)),
+        Route("/change", _answering(bench, _change), methods=["POST"]),
+        Route("/run", _answering(bench, _run), methods=["POST"]),
+        Route("/run/{path:path}", _answering(bench, _file)),
+        Route("/plotly.js", _fixed(get_plotlyjs(), SCRIPT)),
+        Route("/page.js", _fixed(report_asset("page.js"), SCRIPT)),
+        Route("/page.css", _fixed(report_asset("page.css"), STYLE)),
+        Route("/show.js", _fixed(_asset("show.js"), SCRIPT)),
+        Route("/show.css", _fixed(_asset("show.css"), STYLE)),
+    ]
+    app = Starlette(routes=[Mount(f"/{token}", routes=routes)])
+    return Guard(app, port=port, token=token)
+
+
+def _page(bench: Workbench, request: Request) -> Response:
+    del request
+    return HTMLResponse(render_page(bench))
+
+
+def _state(bench: Workbench, request: Request) -> Response:
+    del request
+    return JSONResponse({**asdict(bench.status), "stamp": bench.stamp})
+
+
+def _choices(bench: Workbench, request: Request) -> Response:
+    del request
+    return JSONResponse({"choices": render_choices(bench)})
+
+
+def _shape(bench: Workbench, request: Request) -> Response:
+    asked, run = request.query_params, bench.contents()
+    try:
+        if asked.get("mode"):
+            shape = mode_shape(run, int(asked["mode"]))
+        else:
+            shape = operating_shape(run, float(asked.get("hz", "nan")), asked.get("input", ""))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return JSONResponse(draw_shape(shape, run.geometry))
+
+
+def _change(bench: Workbench, request: Request) -> Response:
+    bench.change(request.state.wish)
+    return _choices(bench, request)
+
+
+def _run(bench: Workbench, request: Request) -> Response:
+    bench.run()
+    return _choices(bench, request)
+
+
+def _file(bench: Workbench, request: Request) -> Response:
+    """Send a file of the run; whatever lies outside, and what begins with a dot, is not there."""
+    wanted = Path(request.path_params["path"])
+    path = (bench.folder / wanted).resolve()
+    inside = path.is_relative_to(bench.folder)
+    if not inside or any(part.startswith(".") for part in wanted.parts) or not path.is_file():
+        return PlainTextResponse("There is no such file in this run.\n", 404)
+    headers = {"content-security-policy": REPORT_POLICY} if path.suffix == ".html" else {}
+    return FileResponse(path, headers=headers)
+
+
+def _answering(
+    bench: Workbench, answer: Callable[[Workbench, Request], Response]
+) -> Callable[[Request], Awaitable[Response]]:
+    """Answer in a thread, and turn errors of the user's into a sentence."""
+
+    async def endpoint(request: Request) -> Response:
+        if request.method == "POST":
+            if request.headers.get("content-type", "").split(";")[0] != "application/json":
+                return JSONResponse({"error": "changes are sent as application/json"}, 415)
+            try:
+                request.state.wish = json.loads(await request.body())
+            except ValueError:
+                return JSONResponse({"error": "this is no JSON"}, 400)
+        try:
+            return await run_in_threadpool(answer, bench, request)
+        except FrfIpzError as error:
+            return JSONResponse({"error": str(error)}, 400)
+
+    return endpoint
+
+
+def _fixed(text: str, kind: str) -> Callable[[Request], Awaitable[Response]]:
+    async def endpoint(request: Request) -> Response:
+        del request
+        return Response(text, media_type=kind, headers={"cache-control": "private, max-age=3600"})
+
+    return endpoint
+
+
+def _asset(name: str) -> str:
+    return (files("frf_ipz.show") / "assets" / name).read_text(encoding="utf-8")

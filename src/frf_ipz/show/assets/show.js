@@ -1,0 +1,324 @@
+"use strict";
+// What the user does on the page becomes a change of pipeline.toml; the server runs what depends on it, and the page follows.
+(() => {
+  const FIELDS = {
+    pin: ["hz"], strike: ["hz", "why"], leave: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
+  };
+  const MEMORY = "frf-ipz-show";
+  const SOON_MS = 400, LATER_MS = 3000;
+  const CYCLE_MS = 1600;
+  const SVG = "http://www.w3.org/2000/svg";
+  const find = (selector) => document.querySelector(selector);
+  const all = (selector) => [...document.querySelectorAll(selector)];
+  const stamp = document.body.dataset.stamp;
+  let wasRunning = false;
+  let dragmode = "zoom";
+
+  // --- Asking the server -------------------------------------------------------------------------------------------
+
+  async function ask(address, wish) {
+    const options = wish && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(wish) };
+    const answer = await fetch(address, options);
+    const kind = answer.headers.get("content-type") || "";
+    const said = kind.startsWith("application/json") ? await answer.json() : { error: await answer.text() };
+    if (!answer.ok) throw new Error(said.error || answer.statusText);
+    return said;
+  }
+
+  async function change(wish, address = "change") {
+    complain("");
+    try {
+      showChoices((await ask(address, wish)).choices);
+      wasRunning = true;
+      follow();
+    } catch (error) {
+      complain(error.message);
+    }
+  }
+
+  function complain(text) {
+    const box = find("#problem");
+    box.textContent = text;
+    box.hidden = !text;
+  }
+
+  function showChoices(html) {
+    find("#choices").innerHTML = html; // written and escaped by the server
+  }
+
+  // --- Following the run -------------------------------------------------------------------------------------------
+
+  let timer = 0;
+  async function follow() {
+    clearTimeout(timer);
+    let state;
+    try {
+      state = await ask("state");
+    } catch (error) {
+      complain("The server does not answer any more. Start 'frf-ipz show' again.");
+      return;
+    }
+    find("#status").hidden = !state.running;
+    find("#progress").value = state.fraction;
+    find("#doing").textContent = state.text;
+    document.documentElement.dataset.running = state.running;
+    if (!state.running && state.stamp !== stamp) {
+      remember();
+      location.reload();
+      return;
+    }
+    if (!state.running && wasRunning) await settled(state);
+    wasRunning = state.running;
+    timer = setTimeout(follow, state.running ? SOON_MS : LATER_MS);
+  }
+
+  async function settled(state) {
+    complain(state.error);
+    showChoices((await ask("choices")).choices);
+  }
+
+  // --- What stays when the page is read anew -----------------------------------------------------------------------
+
+  function remember() {
+    const plot = find("#stabilisation .plot");
+    const axis = plot && plot.layout && plot.layout.xaxis;
+    const form = find("#shape-form");
+    sessionStorage.setItem(MEMORY, JSON.stringify({
+      axis: axis && { type: axis.type, range: axis.range }, dragmode,
+      shape: form && Object.fromEntries(new FormData(form)), blows: Boolean(find("#blow-choices[open]")),
+    }));
+  }
+
+  const remembered = JSON.parse(sessionStorage.getItem(MEMORY) || "{}");
+  sessionStorage.removeItem(MEMORY);
+
+  // --- Pictures ----------------------------------------------------------------------------------------------------
+
+  function whenDrawn(name, then) {
+    const plot = find(`#${name} .plot`);
+    if (!plot) return;
+    const look = () => (plot.on ? then(plot) : setTimeout(look, 60));
+    look();
+  }
+
+  function listenToDiagram(plot) {
+    plot.on("plotly_click", (event) => {
+      const [point] = event.points.filter((one) => one.data.mode === "markers");
+      if (point) fillPole(point.x);
+    });
+    plot.on("plotly_selected", (event) => {
+      if (!event || !event.range || !event.range.x) return;
+      const [low, high] = event.range.x.slice(0, 2).sort((a, b) => a - b);
+      const form = find("#band-form");
+      form.elements.low_hz.value = Math.max(low, 0).toPrecision(6);
+      form.elements.high_hz.value = high.toPrecision(6);
+      form.querySelector("button").focus({ preventScroll: true });
+    });
+    plot.on("plotly_afterplot", () => setDrag(dragmode));
+    if (remembered.axis && remembered.axis.type === plot.layout.xaxis.type) {
+      const [low, high] = remembered.axis.range;
+      Plotly.relayout(plot, { "xaxis.range[0]": low, "xaxis.range[1]": high });
+    }
+    setDrag(remembered.dragmode || "zoom");
+  }
+
+  function setDrag(mode) {
+    dragmode = mode;
+    all("[data-drag]").forEach((button) => button.setAttribute("aria-pressed", button.dataset.drag === mode));
+    const plot = find("#stabilisation .plot");
+    if (plot && plot.layout && plot.layout.dragmode !== mode) Plotly.relayout(plot, { dragmode: mode, selectdirection: "h" });
+  }
+
+  function fillPole(hertz) {
+    const form = find("#pole-form");
+    form.elements.hz.value = Number(hertz).toPrecision(6);
+    form.elements.why.focus({ preventScroll: true });
+    form.classList.add("chosen");
+  }
+
+  function listenToStructure(plot) {
+    plot.on("plotly_click", (event) => {
+      const form = find("#point-form");
+      const point = event.points.find((one) => /^(node )?\d+/.test(one.text || ""));
+      if (!form || !point) return;
+      const isNode = point.text.startsWith("node ");
+      form.elements.dof.value = isNode ? `${point.text.slice(5)}:+${form.dataset.direction}` : point.text;
+      form.classList.add("chosen");
+      offerToHide();
+    });
+  }
+
+  // FRFs of a sensor are hidden by the boxes that the pictures' chooser has.
+  function boxesOfSensor() {
+    const wanted = find("#point-form").elements.dof.value.trim();
+    const row = all(".chooser tbody tr").find((one) => one.querySelector("th").textContent === wanted);
+    return row ? [...row.querySelectorAll("input")] : [];
+  }
+
+  function offerToHide() {
+    const button = find("#hide-sensor");
+    const boxes = boxesOfSensor();
+    button.disabled = !boxes.length;
+    button.textContent = boxes.length && boxes.every((box) => !box.checked)
+      ? "Show this sensor in the pictures" : "Hide this sensor in the pictures";
+  }
+
+  function hideSensor() {
+    const boxes = boxesOfSensor();
+    const show = boxes.every((box) => !box.checked);
+    boxes.forEach((box) => { box.checked = show; });
+    boxes[0].dispatchEvent(new Event("change"));
+    offerToHide();
+  }
+
+  // --- The structure in motion -------------------------------------------------------------------------------------
+
+  const moving = { shape: null, phase: 0, isPlaying: false, isSeen: false, last: 0, parts: [] };
+
+  async function loadShape() {
+    const form = find("#shape-form");
+    const values = form.elements;
+    const isOperating = values.mode.value === "";
+    find("#operating").hidden = !isOperating;
+    const asked = isOperating ? { hz: values.hz.value, input: values.input.value } : { mode: values.mode.value };
+    try {
+      moving.shape = await ask(`shape?${new URLSearchParams(asked)}`);
+      complain("");
+    } catch (error) {
+      complain(error.message);
+      return;
+    }
+    drawShape();
+    pose();
+  }
+
+  function element(name, properties, parent) {
+    const made = document.createElementNS(SVG, name);
+    Object.entries(properties).forEach(([key, value]) => made.setAttribute(key, value));
+    parent.append(made);
+    return made;
+  }
+
+  function drawShape() {
+    const { title, frame, ground, lines, motions } = moving.shape;
+    const [left, low, width, height] = frame;
+    find("#shape-title").textContent = title;
+    const label = `${title}: ${motions.map((motion) => motion.title).join("; ")}`;
+    const place = find("#shape-drawing");
+    place.textContent = "";
+    const box = { viewBox: `${left} ${-low - height} ${width} ${height}`, role: "img", "aria-label": label };
+    const drawing = element("svg", box, place);
+    const radius = 0.006 * Math.max(width, 2 * height);
+    const lineOf = (points) => lines.map(([a, b]) => `M${points[a][0]} ${-points[a][1]}L${points[b][0]} ${-points[b][1]}`).join("");
+    element("path", { class: "ground", d: lineOf(ground) }, drawing);
+    moving.parts = motions.map((motion) => {
+      const line = element("path", { class: `motion ${motion.name}` }, drawing);
+      const dots = motion.hasLines ? [] : motion.at.map((at, place) => {
+        const dot = element("circle", { class: `motion ${motion.name}`, r: radius }, drawing);
+        element("title", {}, dot).textContent = `node ${motion.nodes[place]}, ${motion.title}`;
+        return dot;
+      });
+      return { motion, line, dots, lineOf };
+    });
+    const legend = motions.map((motion) => `<li><span class="key ${motion.name}"></span></li>`).join("");
+    find("#shape-legend").innerHTML = legend;
+    all("#shape-legend li").forEach((item, place) => item.append(motions[place].title));
+  }
+
+  function pose() {
+    const [c, s] = [Math.cos(moving.phase), -Math.sin(moving.phase)];
+    for (const { motion, line, dots, lineOf } of moving.parts) {
+      const points = motion.at.map(([x, y], k) => {
+        const [a, b, p, q] = motion.move[k];
+        return [x + a * c + p * s, y + b * c + q * s];
+      });
+      const stems = () => points.map(([x, y], k) => `M${motion.at[k][0]} ${-motion.at[k][1]}L${x} ${-y}`).join("");
+      line.setAttribute("d", motion.hasLines ? lineOf(points) : stems());
+      dots.forEach((dot, k) => { dot.setAttribute("cx", points[k][0]); dot.setAttribute("cy", -points[k][1]); });
+    }
+    find("#phase").value = Math.round((moving.phase * 180) / Math.PI) % 360;
+  }
+
+  function tick(now) {
+    if (!moving.isPlaying || !moving.isSeen) return;
+    if (moving.last) moving.phase = (moving.phase + (2 * Math.PI * (now - moving.last)) / CYCLE_MS) % (2 * Math.PI);
+    moving.last = now;
+    pose();
+    requestAnimationFrame(tick);
+  }
+
+  function play(isOn, isSeen = moving.isSeen) {
+    const stood = !moving.isPlaying || !moving.isSeen;
+    Object.assign(moving, { isPlaying: isOn, isSeen });
+    const button = find("#play");
+    button.textContent = isOn ? "Pause" : "Play";
+    button.setAttribute("aria-pressed", isOn);
+    if (stood && isOn && isSeen) { moving.last = 0; requestAnimationFrame(tick); }
+  }
+
+  function startShapes() {
+    const form = find("#shape-form");
+    if (!form) return;
+    Object.entries(remembered.shape || {}).forEach(([name, value]) => {
+      const field = form.elements[name];
+      if (field.tagName !== "SELECT" || [...field.options].some((one) => one.value === value)) field.value = value;
+    });
+    form.addEventListener("change", (event) => { if (event.target.id !== "phase") loadShape(); });
+    find("#phase").addEventListener("input", (event) => {
+      play(false);
+      moving.phase = (event.target.value * Math.PI) / 180;
+      pose();
+    });
+    find("#play").addEventListener("click", () => play(!moving.isPlaying));
+    const wantsRest = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    moving.isPlaying = !wantsRest;
+    new IntersectionObserver(([entry]) => {
+      moving.isSeen = false;
+      play(moving.isPlaying, entry.isIntersecting);
+    }).observe(find("#shape"));
+    loadShape();
+  }
+
+  // --- Forms and buttons -------------------------------------------------------------------------------------------
+
+  function submit(event) {
+    event.preventDefault();
+    const kind = event.submitter && event.submitter.value;
+    if (!(kind in FIELDS)) return;
+    const fields = event.target.elements;
+    const value = (name) => (fields[name].type === "number" ? Number(fields[name].value) : fields[name].value);
+    change({ kind, ...Object.fromEntries(FIELDS[kind].map((name) => [name, value(name)])) });
+  }
+
+  function click(event) {
+    const button = event.target.closest("button");
+    if (!button) return;
+    const { change: wish, run, drag, fill, mode } = button.dataset;
+    if (wish) change(JSON.parse(wish));
+    else if (run) change({}, "run");
+    else if (drag) setDrag(drag);
+    else if (fill) fillPole(fill);
+    else if (mode !== undefined) {
+      find("#shape-form").elements.mode.value = mode;
+      loadShape();
+      find("#shapes").scrollIntoView();
+    } else if (button.id === "hide-sensor") hideSensor();
+  }
+
+  function start() {
+    document.addEventListener("submit", submit);
+    document.addEventListener("click", click);
+    document.addEventListener("change", (event) => {
+      const { blow } = event.target.dataset;
+      if (blow) change({ kind: "blow", name: blow, use: event.target.value });
+      if (event.target.name === "dof") offerToHide();
+    });
+    if (remembered.blows) find("#blow-choices").open = true;
+    whenDrawn("stabilisation", listenToDiagram);
+    whenDrawn("structure", listenToStructure);
+    startShapes();
+    follow();
+  }
+
+  start();
+})();

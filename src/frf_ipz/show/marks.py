@@ -1,0 +1,59 @@
+"""What the user has chosen, drawn into the stabilisation diagram."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.report.picture import Picture, Trace, line, outline
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.identification.options import FitOptions
+
+DIAGRAM = "stabilisation"
+
+
+def with_choices(picture: Picture, options: FitOptions) -> Picture:
+    """Draw pins, strikes and what is left out into the stabilisation diagram.
+
+    Parameters
+    ----------
+    picture : Picture
+        The diagram of the report.
+    options : FitOptions
+        What the user has chosen.
+
+    Returns
+    -------
+    Picture
+        With further lines and shaded stretches.
+    """
+    low, high = picture.layout["yaxis"]["range"]
+    strikes = [struck.hz for struck in options.strike]
+    reasons = [f"struck: {struck.why}" for struck in options.strike]
+    traces = [
+        *_uprights("pinned", "@good", options.pin_hz, ["pinned"] * len(options.pin_hz), (low, high)),
+        *_uprights("struck", "@bad", strikes, reasons, (low, high)),
+    ]
+    shapes = [outline(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
+    words = [f"{len(options.pin_hz)} pinned"] if options.pin_hz else []
+    words += [f"{len(strikes)} struck"] if strikes else []
+    words += [f"{len(options.exclude_hz)} stretches left out (shaded)"] if options.exclude_hz else []
+    note = f"{picture.note} Your choices: {', '.join(words)}." if words else picture.note
+    layout = {**picture.layout, "shapes": [*picture.layout.get("shapes", []), *shapes]}
+    return replace(picture, traces=(*picture.traces, *traces), layout=layout, note=note)
+
+
+def _uprights(
+    name: str, colour: str, frequencies: Sequence[float], texts: Sequence[str], ends: tuple[float, float]
+) -> list[Trace]:
+    if not frequencies:
+        return []
+    x, y = np.full((len(frequencies), 3), np.nan), np.full((len(frequencies), 3), np.nan)
+    x[:, :2], y[:, :2] = np.array(frequencies)[:, None], ends
+    hover = [text for text in texts for _ in range(3)]
+    return [line(x.ravel(), y.ravel(), name, colour, hover="%{x:.6g} Hz, %{text}", width=2.5, text=hover)]

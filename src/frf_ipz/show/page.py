@@ -1,0 +1,151 @@
+"""The page to work on: the report's sections with forms beside the pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html import escape
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError
+from frf_ipz.report.page import SECTIONS
+from frf_ipz.report.page import _data as page_data
+from frf_ipz.report.page import _tools as page_tools
+from frf_ipz.report.picture import Picture
+from frf_ipz.report.section import Markup, Section, render_section
+from frf_ipz.show.controls import (
+    blow_controls,
+    choices_panel,
+    command_line,
+    point_controls,
+    pole_controls,
+    shape_controls,
+)
+from frf_ipz.show.marks import DIAGRAM, with_choices
+
+if TYPE_CHECKING:
+    from frf_ipz.pipeline.config import PipelineFile
+    from frf_ipz.report.contents import RunContents
+    from frf_ipz.show.workbench import Workbench
+
+HEAD = (
+    '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+    '<meta name="viewport" content="width=device-width, initial-scale=1"><title>{name} – frf_ipz</title>'
+    '<link rel="icon" href="data:,"><link rel="stylesheet" href="page.css"><link rel="stylesheet" href="show.css">'
+    '</head><body data-stamp="{stamp}"><a class="skip" href="#overview">Skip to the results</a>'
+)
+STATUS = (
+    '<div id="status" role="status" aria-live="polite" hidden><progress id="progress" max="1" value="0"></progress>'
+    '<span id="doing"></span></div><div id="problem" role="alert" hidden></div>'
+)
+SCRIPTS = (
+    '<script src="plotly.js"></script><script src="page.js"></script><script src="show.js"></script></body></html>'
+)
+
+
+def render_page(bench: Workbench) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    bench : Workbench
+        The run.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Raises
+    ------
+    InputError
+        If a result of the run is damaged.
+    """
+    stamp = bench.stamp
+    run = bench.contents()
+    choices, _ = _choices(bench)
+    sections = page_sections(run, choices)
+    name = escape(str(run.record.get("name", "")) or "run")
+    links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
+    body = "\n".join(render_section(section) for section in sections)
+    return "\n".join(
+        [
+            HEAD.format(name=name, stamp=escape(stamp)),
+            f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div>',
+            f"{STATUS}</div>",
+            f'<header class="head"><h1>{name}</h1><div id="choices">{render_choices(bench)}</div></header>',
+            f"<main>{body}</main><footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}, ",
+            f'{escape(str(bench.folder))}. <a href="run/report.html">The report to send on</a></footer>',
+            f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
+            SCRIPTS,
+        ]
+    )
+
+
+def render_choices(bench: Workbench) -> str:
+    """Write the list of what the user has chosen.
+
+    Parameters
+    ----------
+    bench : Workbench
+        The run.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    choices, problem = _choices(bench)
+    text = "" if choices is None else bench.text()
+    return choices_panel(choices, problem, text, command_line(bench.pipeline, bench.folder))
+
+
+def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Section]:
+    """Give the report's sections, and beside their pictures what the user can change.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    choices : PipelineFile, optional
+        What the user has chosen; None where nothing can be changed.
+
+    Returns
+    -------
+    list of Section
+        In the order of the chain.
+    """
+    sections: list[Section] = []
+    for build in SECTIONS:
+        section = build(run)
+        if section is not None:
+            sections.append(section if choices is None else _with_controls(section, run, choices))
+            if section.anchor == "overview" and (run.fit is not None or run.labels):
+                sections.append(_shapes(run))
+    return sections
+
+
+def _with_controls(section: Section, run: RunContents, choices: PipelineFile) -> Section:
+    blocks = list(section.blocks)
+    if section.anchor == "stabilization" and run.fit is not None:
+        blocks = [
+            with_choices(block, choices.fit) if isinstance(block, Picture) and block.name == DIAGRAM else block
+            for block in blocks
+        ]
+        blocks.insert(1, Markup(html=pole_controls(run.fit)))
+    if section.anchor == "recordings":
+        blocks.insert(1, Markup(html=blow_controls(run, choices)))
+    if section.anchor == "overview" and run.geometry is not None:
+        blocks.append(Markup(html=point_controls(run)))
+    return replace(section, blocks=tuple(blocks))
+
+
+def _shapes(run: RunContents) -> Section:
+    lead = "How the structure moves: what was measured beside the model before and after updating."
+    return Section(anchor="shapes", title="Shapes", lead=lead, blocks=(Markup(html=shape_controls(run)),))
+
+
+def _choices(bench: Workbench) -> tuple[PipelineFile | None, str]:
+    try:
+        return bench.choices(), ""
+    except InputError as error:
+        return None, str(error)

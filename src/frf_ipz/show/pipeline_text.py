@@ -1,0 +1,110 @@
+"""The text of ``pipeline.toml``: read as the user wrote it, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from typing import TYPE_CHECKING
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.pipeline.config import PipelineFile
+from frf_ipz.toml_files import to_options
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.show.changes import Change
+
+BESIDE = ".frf-ipz-new"  # ending of the file that becomes the pipeline file once it is whole
+
+
+def changed_text(text: str, change: Change, path: Path) -> str:
+    """Apply a change to the text of a pipeline file.
+
+    Parameters
+    ----------
+    text : str
+        What the file says.
+    change : Change
+        What is wanted.
+    path : Path
+        The file, for messages.
+
+    Returns
+    -------
+    str
+        What it should say, checked.
+
+    Raises
+    ------
+    InputError
+        If the change, or what becomes of the file, makes no sense.
+    """
+    try:
+        document = tomlkit.parse(text)
+        change.apply(document)
+    except TOMLKitError as error:
+        raise FileFormatError(path, f"cannot be changed: {error}; change it in an editor") from None
+    changed = tomlkit.dumps(document)
+    parse(changed, path)
+    return changed
+
+
+def parse(text: str, path: Path) -> PipelineFile:
+    """Read the text of a pipeline file.
+
+    Parameters
+    ----------
+    text : str
+        What the file says.
+    path : Path
+        The file, for messages.
+
+    Returns
+    -------
+    PipelineFile
+        Checked.
+
+    Raises
+    ------
+    FileFormatError
+        If it is no TOML or no pipeline.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(path, f"is not valid TOML: {error}") from None
+    return to_options(table, PipelineFile, path)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace the text of a pipeline file; its line ends stay as they were.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    text : str
+        What it should say; lines end with LF.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be written.
+    """
+    target = path.resolve()
+    beside = target.with_name(target.name + BESIDE)
+    try:
+        ends = "\r\n" if b"\r\n" in target.read_bytes() else "\n"
+        with beside.open("w", encoding="utf-8", newline=ends) as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        beside.chmod(target.stat().st_mode)
+        beside.replace(target)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise FileFormatError(path, f"cannot be written: {error.strerror}") from None

@@ -1,0 +1,84 @@
+"""The server: on the loopback only, for one run, until it is stopped."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from typing import TYPE_CHECKING
+
+import uvicorn
+
+from frf_ipz.errors import InputError
+from frf_ipz.show.app import build_app
+from frf_ipz.show.workbench import Workbench
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from frf_ipz.show.workbench import Run
+
+ADDRESS = "127.0.0.1"
+TOKEN_BYTES = 24
+
+
+def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None]) -> None:
+    """Serve the page of a run until the process is interrupted.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder.
+    run : Run
+        Runs a pipeline.
+    port : int
+        Where to listen on the loopback; 0 for any that is free.
+    announce : callable
+        Told the address of the page as soon as the server listens.
+
+    Raises
+    ------
+    InputError
+        If there is no run in the folder, or the port is taken.
+    """
+    bench = Workbench(folder, run)
+    with listen(port) as listener:
+        taken = int(listener.getsockname()[1])
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+        app = build_app(bench, port=taken, token=token)
+        config = uvicorn.Config(app, log_level="warning", lifespan="off", ws="none", timeout_graceful_shutdown=2)
+        announce(f"http://{ADDRESS}:{taken}/{token}/")
+        try:
+            uvicorn.Server(config).run(sockets=[listener])
+        finally:
+            bench.close()
+
+
+def listen(port: int) -> socket.socket:
+    """Listen on the loopback.
+
+    Parameters
+    ----------
+    port : int
+        0 for any that is free.
+
+    Returns
+    -------
+    socket
+        Connections wait in it from now on.
+
+    Raises
+    ------
+    InputError
+        If the port cannot be had.
+    """
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listener.bind((ADDRESS, port))
+        listener.listen()
+    except (OSError, OverflowError) as error:
+        listener.close()
+        raise InputError(
+            f"port {port} of {ADDRESS} cannot be used ({error}); leave out --port to take a free one"
+        ) from None
+    return listener

@@ -1,0 +1,196 @@
+"""A run's folder and its pipeline file: what is there, what the user changes, and the run that follows from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Protocol
+
+from frf_ipz.errors import FrfIpzError, InputError
+from frf_ipz.report.contents import RunContents, read_contents
+from frf_ipz.runs.folder import RECORD, RunFolder, read_run
+from frf_ipz.show.changes import to_change
+from frf_ipz.show.pipeline_text import changed_text, parse, write_text
+from frf_ipz.show.worker import Worker
+from frf_ipz.toml_files import read_text
+
+if TYPE_CHECKING:
+    from frf_ipz.pipeline.config import PipelineFile
+    from frf_ipz.progress import Progress
+    from frf_ipz.show.worker import Status
+
+STOP_S = 5.0  # how long a run gets to notice that the server ends
+
+
+class Run(Protocol):
+    """Runs a pipeline file into a folder, as `pipeline.run.run_pipeline` does."""
+
+    def __call__(self, path: Path, out: Path, *, progress: Progress) -> RunFolder:
+        """Run.
+
+        Parameters
+        ----------
+        path : Path
+            The pipeline file.
+        out : Path
+            The run's folder.
+        progress : Progress
+            Told how far it is.
+
+        Returns
+        -------
+        RunFolder
+            What the folder holds then.
+        """
+
+
+class Workbench:
+    """A run to look at and to work on.
+
+    Every change is written to the pipeline file, and what depends on it is run anew. A change that the run refuses is
+    taken back, so that the file never asks for what cannot be done.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder.
+    run : Run
+        Runs a pipeline.
+
+    Raises
+    ------
+    InputError
+        If there is no run in the folder.
+    """
+
+    def __init__(self, folder: Path, run: Run) -> None:
+        self.folder = folder.resolve()
+        self.pipeline = Path(str(read_run(self.folder).record.get("pipeline", "")))
+        self._run = run
+        self._changing = Lock()
+        self._before: str | None = None
+        self._written: str | None = None
+        self._worker = Worker(self._work)
+
+    @property
+    def status(self) -> Status:
+        """How far the run is that is at work."""
+        return self._worker.status
+
+    @property
+    def stamp(self) -> str:
+        """Another one whenever the folder holds other results."""
+        try:
+            return str((self.folder / RECORD).stat().st_mtime_ns)
+        except OSError:
+            return ""
+
+    def contents(self) -> RunContents:
+        """Read what the folder holds.
+
+        Returns
+        -------
+        RunContents
+            Results of all stages.
+
+        Raises
+        ------
+        InputError
+            If a file is damaged.
+        """
+        return read_contents(read_run(self.folder))
+
+    def text(self) -> str:
+        """Read the pipeline file.
+
+        Returns
+        -------
+        str
+            What it says.
+
+        Raises
+        ------
+        InputError
+            If it is gone.
+        """
+        if not self.pipeline.is_file():
+            raise InputError(f"{self.pipeline}: the pipeline file of this run is gone, so nothing can be changed")
+        return read_text(self.pipeline)
+
+    def choices(self) -> PipelineFile:
+        """Read what the user has chosen.
+
+        Returns
+        -------
+        PipelineFile
+            All sections of the pipeline file.
+
+        Raises
+        ------
+        InputError
+            If the file is gone or wrong.
+        """
+        return parse(self.text(), self.pipeline)
+
+    def change(self, wish: object) -> None:
+        """Write a change to the pipeline file, and run what depends on it.
+
+        Parameters
+        ----------
+        wish : object
+            A table with its ``kind`` and what that kind takes.
+
+        Raises
+        ------
+        InputError
+            If it makes no sense: then nothing has changed.
+        """
+        with self._changing:
+            text = self.text()
+            changed = changed_text(text, to_change(wish, self.pipeline), self.pipeline)
+            if changed != text:
+                if text != self._written:
+                    self._before = text
+                write_text(self.pipeline, changed)
+                self._written = changed
+            self._worker.start()
+
+    def run(self) -> None:
+        """Run the pipeline file as it stands."""
+        self._worker.start()
+
+    def wait(self, timeout_s: float | None = None) -> None:
+        """Wait for the run that is at work.
+
+        Parameters
+        ----------
+        timeout_s : float, optional
+            How long at most, s.
+        """
+        self._worker.wait(timeout_s)
+
+    def close(self) -> None:
+        """Give up what is at work; the folder keeps what it held."""
+        self._worker.stop(STOP_S)
+
+    def _work(self, progress: Progress) -> None:
+        with self._changing:
+            asked = self._written
+        try:
+            self._run(self.pipeline, self.folder, progress=progress)
+        except FrfIpzError as error:
+            raise InputError(f"{error}{self._take_back()}") from None
+        with self._changing:
+            if self._written == asked:
+                self._before = self._written = None
+            else:
+                self._before = asked
+
+    def _take_back(self) -> str:
+        """Restore the pipeline file, unless somebody else has changed it since."""
+        with self._changing:
+            before, written, self._before, self._written = self._before, self._written, None, None
+            if before is None or not self.pipeline.is_file() or read_text(self.pipeline) != written:
+                return ""
+            write_text(self.pipeline, before)
+        return " (the change was taken back)"
