@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 from proof_tools.plan import Folders, Order
@@ -41,7 +42,8 @@ def make_cases(orders: Sequence[Order], folders: Folders, *, workers: int, step:
     missing = [order for order in orders if not is_made(order.name, folders)]
     for _ in range(len(orders) - len(missing)):
         step()
-    with ProcessPoolExecutor(workers) as pool:
+    # not forked: the progress bar has a thread
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         for done in as_completed([pool.submit(make_one, order, folders) for order in missing]):
             done.result()
             step()

@@ -76,9 +76,22 @@ def test_the_right_effect_at_its_place(truth, diagnosis):
 def test_an_interval_that_misses_does_not_cover(truth, diagnosis):
     said = diagnosis("explained", finding(MASS, parameters={"mass_kg": 0.0205}, std=0.01))
     assert not judge(truth(MASS), said, Layout()).parameters[0].covered
-    number = {"value": 0.0205, "std": 0.0, "ci95": [0.019, None]}
+
+
+@pytest.mark.parametrize(
+    ("interval", "covered"),
+    [
+        ([0.019, 0.021], True),
+        ([0.0201, 0.021], False),
+        ([0.019, None], True),
+        ([None, 0.021], True),
+        ([None, 0.019], False),
+    ],
+)
+def test_an_interval_that_is_given_counts_and_may_be_open(truth, diagnosis, interval, covered):
+    number = {"value": 0.0205, "std": 0.0, "ci95": interval}
     said = diagnosis("explained", finding(MASS) | {"parameters": {"mass_kg": number}})
-    assert judge(truth(MASS), said, Layout()).parameters[0].covered
+    assert judge(truth(MASS), said, Layout()).parameters[0].covered is covered
 
 
 def test_a_wrong_name_is_not_right(truth, diagnosis):
@@ -220,6 +233,7 @@ def test_what_is_outside_the_catalogue(truth, diagnosis):
     assert flagged.substitute_nats == 2e3
     assert flagged.flagged_place is None  # it is linear
     assert not is_wrong_name(flagged)
+    assert not judge(answer, diagnosis("explained", finding(SKEW)), Layout()).right  # "unknown" names nothing
     assert is_wrong_name(judge(answer, diagnosis("explained", finding(MASS, probability=0.95)), Layout()))
     assert not is_wrong_name(judge(answer, diagnosis("explained", finding(MASS, probability=0.6)), Layout()))
 
