@@ -1,0 +1,89 @@
+"""How much of a response is left at its end, and the noise under it."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.ingest.signals.decay import measure_decay, noise_power
+from frf_ipz.ingest.signals.windows import correlated_lines
+
+STEP_S, N_SAMPLES = 1 / 4096, 16384
+TIME = np.arange(N_SAMPLES) * STEP_S
+DURATION_S = N_SAMPLES * STEP_S
+
+
+def ringing(frequency_hz, left, amplitude=1.0):
+    return amplitude * left ** (TIME / DURATION_S) * np.sin(2 * np.pi * frequency_hz * TIME)
+
+
+@pytest.mark.parametrize("left", [0.3, 0.03, 3e-3])
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_what_is_left_of_a_mode(left, noise):
+    response = ringing(211.3, left) + noise * np.random.default_rng(1).standard_normal(N_SAMPLES)
+    decay = measure_decay(response, STEP_S, 2)
+    assert decay.left == pytest.approx(left, rel=0.05)
+    assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
+
+
+def test_the_slowest_of_several_modes_counts():
+    response = ringing(90.0, 1e-4) + ringing(211.3, 0.02) + ringing(700.0, 1e-3)
+    decay = measure_decay(response, STEP_S, 2)
+    assert decay.left == pytest.approx(0.02, rel=0.05)
+    assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
+
+
+def test_modes_below_the_noise_and_noise_alone_do_not_ring():
+    rng = np.random.default_rng(2)
+    assert measure_decay(rng.standard_normal(N_SAMPLES), STEP_S, 2).left == 0.0
+    response = ringing(211.3, 1e-12) + 1e-3 * rng.standard_normal(N_SAMPLES)
+    assert measure_decay(response, STEP_S, 2).left == 0.0
+
+
+def test_hum_does_not_ring_down():
+    response = ringing(211.3, 1e-4) + ringing(150.0, 0.95, 0.05)
+    assert measure_decay(response, STEP_S, 2).left < 1e-3
+    mode = ringing(211.3, 1e-4) + ringing(163.0, 0.95, 0.05)
+    assert measure_decay(mode, STEP_S, 2).left > 0.5
+
+
+def test_the_noise_is_measured_under_a_ringing_response():
+    response = ringing(211.3, 0.1) + 0.01 * np.random.default_rng(3).standard_normal(N_SAMPLES)
+    assert measure_decay(response, STEP_S, 2).noise == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_slow_mode_that_is_small_as_an_acceleration_counts_by_its_velocity():
+    response = ringing(900.0, 1e-6, 1.0) + ringing(12.0, 0.2, 6e-3)
+    assert measure_decay(response, STEP_S, 2).frequency_hz == pytest.approx(12.0, abs=1.0)
+    weak = ringing(900.0, 1e-6, 1.0) + ringing(12.0, 0.2, 6e-6)
+    assert measure_decay(weak, STEP_S, 2).left < 0.1
+
+
+def test_the_noise_power_follows_its_colour():
+    rng = np.random.default_rng(4)
+    white = rng.standard_normal(N_SAMPLES + 1)
+    lines = np.array([100.0, 1000.0, 1900.0])
+    expected = np.abs(1 - 0.9 * np.exp(-2j * np.pi * lines * STEP_S)) ** 2
+    found = noise_power(white[1:] - 0.9 * white[:-1], STEP_S, lines)
+    np.testing.assert_allclose(found, expected, rtol=0.5)  # the median of 51 lines varies by 20 %
+
+
+def test_signals_that_are_too_short_tell_nothing():
+    assert measure_decay(np.ones(100), STEP_S, 2).left == 0.0
+    assert np.isnan(noise_power(np.ones(100), STEP_S, np.array([1.0]))).all()
+
+
+def test_windowed_noise_is_independent_on_the_lines_that_are_kept():
+    """Monte Carlo: lines apart by what `correlated_lines` says hardly correlate, neighbours do."""
+    rng = np.random.default_rng(5)
+    decay, n_samples = 8.0, 1024
+    window = np.exp(-decay * np.arange(n_samples) / n_samples)
+    spectra = np.fft.rfft(rng.standard_normal((2000, n_samples)) * window)[:, 100:200]
+    step = correlated_lines(decay)
+    power = np.mean(np.abs(spectra) ** 2)
+
+    def correlation(apart):
+        return abs(np.mean(spectra[:, apart:] * spectra[:, :-apart].conj())) / power
+
+    assert step == 4
+    assert correlation(1) > 0.9
+    assert correlation(step) < 0.6
+    assert correlated_lines(0.0) == 1

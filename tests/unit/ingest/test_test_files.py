@@ -1,0 +1,105 @@
+"""What `test.toml` says: channels, DOFs, files, masses of sensors."""
+
+import pytest
+
+from frf_ipz.dofs import Dof
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recordings import Recordings, Trace
+from frf_ipz.ingest.survey.choice import is_named
+from frf_ipz.ingest.test_file import read_test, run_labels
+from synthetic_campaign import Structure, blow, hammer_campaign, write_csv, write_test
+
+ROVING = """
+[[hit]]
+dof = "7:+z"
+files = ["a/*.csv"]
+[[hit]]
+dof = "7:+z"
+files = ["b/*.csv", "b/1.csv"]
+output_dofs = { acc_2 = "5:-y" }
+"""
+
+
+@pytest.fixture
+def roving(tmp_path):
+    signals = blow(Structure(), n_samples=256)
+    for name in ("a/1", "b/1", "b/2", "b/3"):
+        write_csv(tmp_path / f"{name}.csv", signals, 1 / 2048)
+    path = write_test(
+        tmp_path, ROVING, head='name = "a shelf"\nnominal_damping_ratio = 0.002\nunknown_scale = "common"'
+    )
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('dof = "2:+z"', 'dof = "2:+z"\nmass_kg = 0.008'), encoding="utf-8")
+    return path
+
+
+def test_what_a_test_says(roving):
+    test = read_test(roving)
+    assert (test.name, test.kind, test.nominal_damping_ratio) == ("a shelf", "hammer", 0.002)
+    assert test.unknown_scale == "common"
+    assert test.input_channel.column == "force"
+    assert [channel.column for channel in test.output_channels] == ["acc_1", "acc_2"]
+    assert [str(dof) for dof in test.output_dofs] == ["1:+z", "2:+z", "5:-y"]
+    assert test.input_dofs == (Dof(7, "z", 1),)
+    assert [file.name for file in test.files] == ["1.csv", "1.csv", "2.csv", "3.csv"]
+    assert all(file.is_absolute() for file in test.files)
+
+
+def test_a_test_without_a_name_is_called_after_its_folder(tmp_path):
+    path = hammer_campaign(tmp_path / "shelf", heights=(100.0,), n_samples=256)
+    assert read_test(path).name == "shelf"
+
+
+def test_a_roving_sensor_gives_its_own_labels(roving):
+    test = read_test(roving)
+    assert [str(label) for label in run_labels(test.channels, test.runs[1])] == ["1:+z / 7:+z", "5:-y / 7:+z"]
+    assert [str(label) for label in test.labels] == ["1:+z / 7:+z", "2:+z / 7:+z", "5:-y / 7:+z"]
+    assert test.labels[2].sign == -1
+
+
+def test_the_mass_of_a_sensor_sits_where_the_sensor_sits(roving):
+    test = read_test(roving)
+    reference, first, second = test.labels
+    assert test.masses_with(first) == {2: pytest.approx(0.008)}
+    assert test.masses_with(second) == {5: pytest.approx(0.008)}
+    assert test.masses_with(reference) == {2: pytest.approx(0.002), 5: pytest.approx(0.006)}  # 1 and 3 recordings
+    assert test.sensor_masses == {2: pytest.approx(0.002), 5: pytest.approx(0.006)}
+
+
+def test_sensors_at_one_node_weigh_together(tmp_path):
+    path = hammer_campaign(tmp_path, heights=(100.0,), n_samples=256)
+    text = path.read_text(encoding="utf-8").replace('dof = "2:+z"', 'dof = "1:+x"')
+    path.write_text(text.replace('unit = "m/s^2"', 'unit = "m/s^2"\nmass_kg = 0.003'), encoding="utf-8")
+    assert read_test(path).sensor_masses == {1: pytest.approx(0.006)}
+
+
+def test_tests_that_say_the_same_have_the_same_text(roving):
+    assert repr(read_test(roving)) == repr(read_test(roving))
+
+
+def test_traces_are_drawn_of_every_force_and_some_responses(roving):
+    result = estimate_frfs(read_test(roving), IngestOptions())
+    assert isinstance(result, Recordings)
+    assert all(isinstance(trace, Trace) for trace in result.traces)
+    forces = [trace for trace in result.traces if trace.unit == "N"]
+    responses = [trace for trace in result.traces if trace.unit == "m/s^2"]
+    assert [trace.name for trace in forces] == list(result.blows.blow)
+    assert {trace.channel for trace in responses} == {"acc_1", "acc_2"}
+    assert max(trace.values.max() for trace in forces) == pytest.approx(100.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted", "expected"),
+    [
+        ("hits/p_1.csv", "hits/p_1.csv", True),
+        ("hits/p_1.csv", "p_1.csv", True),
+        ("hits/p_1.csv", "1.csv", False),
+        ("hits/p_1.csv#2", "p_1.csv", True),
+        ("hits/p_1.csv#2", "hits/p_1.csv#2", True),
+        ("hits/p_1.csv#2", "p_1.csv#1", False),
+        ("hits/p_1.csv", "other/p_1.csv", False),
+    ],
+)
+def test_blows_are_named_by_the_end_of_their_path(name, wanted, expected):
+    assert is_named(name, [wanted]) is expected
