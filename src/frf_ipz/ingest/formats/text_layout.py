@@ -20,6 +20,7 @@ TWO_NUMBERS = re.compile(r"\d\s+[+-]?[\d.]")
 DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eE][+-]?\d+)?$")
 NAME_AND_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]$")
 MAX_HEADER = 200  # lines
+SAMPLE = MAX_HEADER + 50  # lines that tell the delimiter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +93,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
     whole = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
     lines = [line.rstrip("\r") for line in decode(whole.removeprefix(BOM)).split("\n")]
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
-    delimiter = _delimiter([line for _, line in rows])
+    delimiter = _delimiter([line for _, line in rows[:SAMPLE]])
     first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
     if first is None or first > MAX_HEADER + skip_rows:
         raise FileFormatError(path, "holds no line that begins with a number; expected is a table of numbers")
