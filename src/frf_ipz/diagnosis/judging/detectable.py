@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
     from frf_ipz.diagnosis.search.polish import Fit
 
-PLACES = 3  # of each effect, spread over the structure
-STEPS = 7  # halvings of the range
+PLACES = 2  # of each effect, spread over the structure
+STEPS = 5  # halvings of the range
 
 
 def detectable_sizes(bench: Bench, null: Fit, needed_nats: float) -> dict[str, dict[str, float]]:

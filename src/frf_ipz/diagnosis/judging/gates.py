@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Gate
+from frf_ipz.diagnosis.measured.forces import window_energies
 from frf_ipz.diagnosis.measured.from_blows import Survey
 from frf_ipz.diagnosis.observations import spectra
 
@@ -76,11 +77,7 @@ def _difference(survey: Survey, pair: tuple[Blow, Blow, int], s: ComplexArray) -
     strong, weak, place = pair
     (force_a, out_a), (force_b, out_b) = spectra((strong, weak), s)
     frequency = s.imag / (2 * np.pi)
-    kept_s = (
-        sum((p.stop - p.start) * p.blow.step_s for p in survey.pulses[place]) / len(survey.pulses[place])
-        if (survey.pulses)
-        else 0.0
-    )
+    kept_s = np.mean([window_energies(s, pulse) for pulse in survey.pulses[place]], axis=0)
     per_force = 1 / np.abs(force_a) ** 2 + 1 / np.abs(force_b) ** 2
     total, count = 0.0, 0
     for column, sensor in enumerate(strong.sensors):

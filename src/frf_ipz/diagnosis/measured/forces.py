@@ -108,3 +108,21 @@ def window_energy(s: ComplexArray, pulse: Pulse) -> ComplexArray:
     rate = s[:, None] + s[None, :].conj()
     first, last = pulse.start * pulse.blow.step_s, pulse.stop * pulse.blow.step_s
     return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)
+
+
+def window_energies(s: ComplexArray, pulse: Pulse) -> FloatArray:
+    """Give the variance that noise of density 1 within the pulse's stretch has on lines.
+
+    Parameters
+    ----------
+    s, pulse
+        As for `window_energy`.
+
+    Returns
+    -------
+    (n_points,) array
+        s.
+    """
+    rate = 2 * s.real
+    first, last = pulse.start * pulse.blow.step_s, pulse.stop * pulse.blow.step_s
+    return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)

@@ -10,8 +10,8 @@ from scipy.fft import next_fast_len
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.contour import COARSE_WIDTH, Resonances, find_resonances
-from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energy
-from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
+from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energies, window_energy
+from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer import Measured
 from frf_ipz.diagnosis.observations import Blow, Observations, spectra
 from frf_ipz.frf import FrfLabel
@@ -34,7 +34,7 @@ class Survey:
     groups : tuple of tuple of Blow
         Blows with the same place and the same sensors, forces without noise around them.
     pulses : tuple of tuple of Pulse
-        The stretches of the forces that were kept; empty for shakers.
+        The stretches of the forces that were kept; all of them for shakers.
     force : Noise
         Of the force channel.
     responses : dict of str to Noise
@@ -68,13 +68,14 @@ def survey(observations: Observations) -> Survey:
     """
     is_hammer = observations.kind == "hammer"
     groups, pulses = _prepared(observations)
-    noise = Noise(white=0.0)
-    if is_hammer:
-        flat = tuple(p for group in pulses for p in group)
-        noise = force_noise(tuple(b for group in _groups(observations) for b in group), flat)
     decay = ENOUGH / min(blow.duration_s for group in groups for blow in group)
     line_sets = [_lines(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
+    if is_hammer:
+        flat = tuple(p for group in pulses for p in group)
+        noise = force_noise(tuple(b for group in _groups(observations) for b in group), flat)
+    else:
+        noise = _noise_of_records(groups, line_sets)
     responses = _response_noise(groups, pulses, line_sets, noise)
     return Survey(
         groups=groups,
@@ -111,7 +112,8 @@ def _prepared(
     """Blows of each place, and the pulses of hammers."""
     groups = _groups(observations)
     if observations.kind != "hammer":
-        return groups, ()
+        whole = tuple(tuple(Pulse(blow=blow, start=0, stop=blow.n_samples) for blow in group) for group in groups)
+        return groups, whole
     pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
     return tuple(tuple(pulse.blow for pulse in group) for group in pulses), pulses
 
@@ -155,6 +157,12 @@ class _Lines:
         crossed = (self.responses * self.force.conj()[:, :, None]).sum(1)
         return np.asarray(crossed / self.power[:, None])
 
+    @property
+    def unexplained(self) -> FloatArray:
+        """Energy of each response, (n_lines, n_sensors), that the FRF of all blows does not explain."""
+        residual = self.responses - self.values[:, None, :] * self.force[:, :, None]
+        return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
+
 
 def _lines(group: tuple[Blow, ...], band_hz: tuple[float, float], decay: float) -> _Lines:
     """Uniform lines by FFT; blows of a group may differ in length, the shortest counts."""
@@ -181,18 +189,34 @@ def _response_noise(
             if channel not in names or len(group) < 2:
                 continue
             sensor = names.index(channel)
-            residual = lines.responses[:, :, sensor] - lines.values[:, sensor, None] * lines.force
-            energy = (np.abs(residual) ** 2).sum(1) / (len(group) - 1)
-            kept_s = np.mean([(p.stop - p.start) * p.blow.step_s for p in pulses[place]]) if pulses else 0.0
+            energy = lines.unexplained[:, sensor]
+            kept_s = np.mean([window_energies(lines.s, pulse) for pulse in pulses[place]], axis=0)
             known = np.abs(lines.values[:, sensor]) ** 2 * noise.density(lines.frequency_hz) * kept_s
-            rate = 2 * lines.s.real
-            gain = (1 - np.exp(-rate * _duration_s(group))) / rate
-            stacks.append((lines.frequency_hz, energy, gain, known))
+            stacks.append((lines.frequency_hz, energy, _gain(group, lines), known))
         if stacks:
             found[channel] = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
         else:
             found[channel] = _noise_of_single(groups, pulses, line_sets, channel)
     return found
+
+
+def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[_Lines]) -> Noise:
+    """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
+    found = [
+        fit_force_noise(
+            lines.frequency_hz, lines.unexplained[:, sensor], _gain(group, lines), np.abs(lines.values[:, sensor]) ** 2
+        )
+        for group, lines in zip(groups, line_sets, strict=True)
+        if len(group) > 1
+        for sensor in range(len(group[0].sensors))
+    ]
+    return Noise(white=float(np.median(found)) if found else 0.0)
+
+
+def _gain(group: tuple[Blow, ...], lines: _Lines) -> FloatArray:
+    """Energy on each line of noise of density 1 over the whole record."""
+    rate = 2 * lines.s.real
+    return np.asarray((1 - np.exp(-rate * _duration_s(group))) / rate)
 
 
 def _noise_of_single(
@@ -205,11 +229,9 @@ def _noise_of_single(
         if channel not in names:
             continue
         sensor = names.index(channel)
-        rate = 2 * lines.s.real
-        gain = (1 - np.exp(-rate * _duration_s(group))) / rate
-        energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / gain
+        energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / _gain(group, lines)
         white = max(white, UNREPEATED**2 * float(np.median(energy)))
-        before = group[0].responses[sensor, : pulses[place][0].start] if pulses else np.zeros(0)
+        before = group[0].responses[sensor, : pulses[place][0].start]
         if len(before) >= BEFORE:
             white = max(white, float(np.var(before)) * group[0].step_s)
     return Noise(white=white)
@@ -289,7 +311,7 @@ def _record_noise(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexAr
 def _common(found: Survey, place: int, points: _Lines) -> ComplexArray:
     """Errors that the force's noise puts on all FRFs of a place, as independent columns."""
     n = len(points.frequency_hz)
-    if not found.pulses or found.force.white == 0:
+    if found.force.white == 0:
         return np.zeros((n, 0), np.complex128)
     s = points.s
     root = np.sqrt(found.force.density(points.frequency_hz))

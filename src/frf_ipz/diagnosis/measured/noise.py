@@ -69,10 +69,35 @@ def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, kn
     Noise
         Not negative; at least a trace of white noise.
     """
+    found = _fit(np.stack([gain, gain / frequency_hz], 1), energy, known)
+    white = max(float(found[0]), SMALLEST * float(np.median(energy / gain)))
+    return Noise(white=white, pink=float(found[1]))
+
+
+def fit_force_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, squared_frf: FloatArray) -> float:
+    """Fit noise of the force that residuals of a response show through its FRF.
+
+    Parameters
+    ----------
+    frequency_hz, energy, gain
+        As for `fit_noise`.
+    squared_frf : (n,) array
+        Squared modulus of the FRF.
+
+    Returns
+    -------
+    float
+        Density of white noise, N^2 s.
+    """
+    shape = np.stack([gain, gain / frequency_hz, gain * squared_frf], 1)
+    return float(_fit(shape, energy, np.zeros_like(energy))[2])
+
+
+def _fit(shape: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray:
     left = np.maximum(energy - known, 0.0)
-    shape = np.stack([gain, gain / frequency_hz], 1)
     model = np.full(len(energy), max(float(np.median(left)), SMALLEST * float(energy.max(initial=1e-300))))
-    found = np.array([float(np.median(left / gain)), 0.0])
+    found = np.zeros(shape.shape[1])
+    found[0] = float(np.median(left / shape[:, 0]))
     for _ in range(ROUNDS):
         total = model + known
         use = energy < OUTLIER * total
@@ -82,5 +107,4 @@ def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, kn
         scale = shape[use].max(0)
         found = nnls(shape[use] / scale * weight[:, None], (energy - known)[use] * weight)[0] / scale
         model = np.maximum(shape @ found, SMALLEST * energy.max())
-    white = max(float(found[0]), SMALLEST * float(np.median(energy / gain)))
-    return Noise(white=white, pink=float(found[1]))
+    return found

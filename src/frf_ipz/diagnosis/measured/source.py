@@ -10,10 +10,10 @@ import numpy as np
 from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.transfer import points_of
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, IntArray
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.observations import Blow, Observations
 
@@ -110,30 +110,4 @@ def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey) -> S
         held_out=points_of(near, np.flatnonzero(held)),
         survey=found,
         held="lines",
-    )
-
-
-def points_of(measured: Measured, kept: IntArray) -> Measured:
-    """Keep some points of a contour.
-
-    Parameters
-    ----------
-    measured : Measured
-        Transfer functions.
-    kept : (n,) int array
-        Which points.
-
-    Returns
-    -------
-    Measured
-        Those points.
-    """
-    s: ComplexArray = measured.s[kept]
-    return replace(
-        measured,
-        s=s,
-        values=measured.values[kept],
-        size=measured.size[kept],
-        covariance=measured.covariance[:, kept[:, None], kept],
-        common=tuple(shared[kept] for shared in measured.common),
     )

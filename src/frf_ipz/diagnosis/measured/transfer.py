@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -52,6 +52,32 @@ class Measured:
     def frequency_hz(self) -> FloatArray:
         """Frequencies of the points, Hz."""
         return np.asarray(self.s.imag / (2 * np.pi))
+
+
+def points_of(measured: Measured, kept: IntArray) -> Measured:
+    """Keep some points of a contour.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions.
+    kept : (n,) int array
+        Which points.
+
+    Returns
+    -------
+    Measured
+        Those points.
+    """
+    s: ComplexArray = measured.s[kept]
+    return replace(
+        measured,
+        s=s,
+        values=measured.values[kept],
+        size=measured.size[kept],
+        covariance=measured.covariance[:, kept[:, None], kept],
+        common=tuple(shared[kept] for shared in measured.common),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.search.bench import Bench, weights_of
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
 from frf_ipz.diagnosis.search.refine import refine
+from frf_ipz.diagnosis.search.score import score_on
 from frf_ipz.diagnosis.search.sketches import Start
 from frf_ipz.diagnosis.search.wide import best_start, close_search, wide_search
 
@@ -20,7 +21,11 @@ Fits: TypeAlias = dict[tuple[object, ...], Fit]
 
 REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
 NEARLY_RIGHT = 20.0  # sum of squares over the number of values: small effects are looked for on top of such a fit
-CLOSE_EACH = 2  # places of an effect that are fitted after the close search
+VERY_NEARLY = 2.0  # the same: nothing large can be missing
+SMALL_PULL = 200.0  # and this little is explained by what cannot be known
+CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
+PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
+CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 PLACES_EACH = 3  # of an effect that are refined
 NEAR = 2  # nodes or elements: places so near count as one there
 FITTED = 12  # hypotheses that are fitted exactly
@@ -81,22 +86,34 @@ def search(bench: Bench, base: Fit) -> Ranking:
     Ranking
         All that was fitted.
     """
-    starts = wide_search(bench, base)
-    fits = _fitted(bench, base, _refined(bench, base, starts))
-    if base.misfit < NEARLY_RIGHT * len(bench.data.measured.values.ravel()):
-        _add_close(bench, base, fits)
+    size = 2 * bench.data.measured.values.size
+    n_tried, fits = 0, {}
+    if base.misfit > VERY_NEARLY * size or base.pull > SMALL_PULL:
+        starts = wide_search(bench, base)
+        n_tried += len(starts)
+        fits = _fitted(bench, base, _refined(bench, base, starts))
+    if base.misfit < NEARLY_RIGHT * size:
+        n_tried += _add_close(bench, base, fits)
     _climb_all(bench, base, fits)
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    return Ranking(base=base, fits=tuple(ranked), n_tried=len(starts))
+    return Ranking(base=base, fits=tuple(ranked), n_tried=n_tried)
 
 
-def _add_close(bench: Bench, base: Fit, fits: Fits) -> None:
-    """Fit small effects from where the base is."""
-    for start in _spread(close_search(bench, base), CLOSE_EACH):
-        hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-        values = np.concatenate([base.values, start.values])
-        fit = polish(hypothesis, bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2)
-        _keep(fits, fit)
+def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
+    """Fit small effects from where the base is, if one linear step promises something."""
+    score = score_on(bench, base)
+    found = close_search(bench, base)
+    starts = _spread(found, CLOSE_EACH)
+    hypotheses = [bench.suppose((*base.hypothesis.causes, start.cause)) for start in starts]
+    gains = np.array([score.gain(one, start.values) for one, start in zip(hypotheses, starts, strict=True)])
+    for place in np.argsort(-gains)[:CLOSE_FITTED]:
+        if gains[place] > max(PROMISING, gains.max() - HOPELESS) or place == int(np.argmax(gains)):
+            values = np.concatenate([base.values, starts[place].values])
+            fit = polish(
+                hypotheses[place], bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2
+            )
+            _keep(fits, fit)
+    return len(found)
 
 
 def _keep(fits: Fits, fit: Fit) -> None:

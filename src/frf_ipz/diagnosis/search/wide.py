@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.measured.transfer import points_of
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.refine import robust_misfit
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
 CLOSE_ERROR = 1e-3  # the same near the axis
+CLOSE_POINTS = 90  # of the contour near the axis that are enough for a first look
 
 
 def wide_search(bench: Bench, base: Fit) -> list[Start]:
@@ -60,8 +62,10 @@ def close_search(bench: Bench, base: Fit) -> list[Start]:
     list of Start
         The best values of each cause, by rising cost.
     """
-    near = replace(bench.specimen, contour=bench.data.measured.s)
-    return _search(bench, near, bench.data.measured, base, base.unknown, CLOSE_ERROR)
+    measured = bench.data.measured
+    thinned = points_of(measured, np.arange(0, len(measured.s), -(-len(measured.s) // CLOSE_POINTS)))
+    near = replace(bench.specimen, contour=thinned.s)
+    return _search(bench, near, thinned, base, base.unknown, CLOSE_ERROR)
 
 
 def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
