@@ -194,7 +194,7 @@ def save_state_space(model: StateSpaceModel, path: Path) -> None:
         path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
     else:
         texts = {name: np.array(values[name], dtype=object) for name in NAMES}
-        savemat(path, {**values, **texts}, appendmat=False)
+        savemat(path, {**values, **texts})
 
 
 def read_state_space(path: Path) -> StateSpaceModel:
@@ -219,7 +219,7 @@ def read_state_space(path: Path) -> StateSpaceModel:
         if _suffix(path) == ".json":
             values = json.loads(path.read_text(encoding="utf-8"))
         else:
-            values = loadmat(path, appendmat=False)
+            values = loadmat(path)
         names = {name: tuple(str(_text(text)) for text in np.ravel(values[name])) for name in NAMES}
         sizes = [len(names[name]) for name in ("state_names", "input_names", "output_names")]
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in _shapes(*sizes).items()}

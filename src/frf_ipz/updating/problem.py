@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.updating.parameters import ParameterBasis
+from frf_ipz.updating.tracking import WantedRoots
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -68,6 +70,31 @@ class UpdateProblem:
         """
         label = self.labels[frf]
         return self.model.row(label.output_dof), self.model.row(label.input_dof)
+
+    def roots_near(self, model: ReducedModel, near: ComplexArray) -> ComplexArray:
+        """Find poles and zeros of a model nearest to given ones.
+
+        Parameters
+        ----------
+        model : ReducedModel
+            The model, changed or not.
+        near : (n,) complex array
+            One for each target, rad/s.
+
+        Returns
+        -------
+        (n,) complex array
+            The model's, one to one, imaginary part > 0, rad/s.
+        """
+        wanted = WantedRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
+        values = np.zeros(len(near), complex)
+        for number, roots in wanted.damped(model.mass, model.damping, model.stiffness).items():
+            places = np.flatnonzero(wanted.frf == number)
+            upper = roots.values[roots.values.imag > 0]
+            distance = np.abs(near[places][:, None] - upper) / np.abs(near[places])[:, None]
+            rows, columns = linear_sum_assignment(distance)
+            values[places[rows]] = upper[columns]
+        return values
 
 
 def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: ParameterBasis | None) -> UpdateProblem:

@@ -16,14 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
 from frf_ipz.updating.published.loop import LoopResult, published_loop
 from frf_ipz.updating.published.parameters import iterate_parameters
 from frf_ipz.updating.published.step import PublishedStep, StepSettings
-from frf_ipz.updating.tracking import WantedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
 if TYPE_CHECKING:
@@ -86,7 +84,7 @@ def _phase(
     *,
     damping: bool,
 ) -> LoopResult:
-    computed = _roots_near(problem, model, problem.computed)
+    computed = problem.roots_near(model, problem.computed)
     settings = StepSettings(
         alpha=options.alpha,
         beta=options.beta,
@@ -177,7 +175,7 @@ def _updated(
         status=status,
         history=history[["phase", *history.columns.drop("phase")]],
         before=problem.computed,
-        after=_roots_near(problem, model, problem.values),
+        after=problem.roots_near(model, problem.values),
         ensemble=np.zeros((0, 3, order, order)),
         unmet=unmet,
         warnings=(warning,) if asymmetry > ROUNDING else (),
@@ -190,15 +188,3 @@ ROUNDING = 1e-10  # of eta: a symmetric matrix after many sums
 def _asymmetry(matrix: FloatArray) -> float:
     """Measure of eq. (42): how far from symmetric."""
     return float(np.linalg.norm(matrix - matrix.T, 2) / np.linalg.norm(matrix + matrix.T, 2))
-
-
-def _roots_near(problem: UpdateProblem, model: ReducedModel, near: ComplexArray) -> ComplexArray:
-    """Poles and zeros of a model nearest to given ones."""
-    wanted = WantedRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
-    values = np.zeros(len(near), complex)
-    for number, roots in wanted.damped(model.mass, model.damping, model.stiffness).items():
-        places = np.flatnonzero(wanted.frf == number)
-        upper = roots.values[roots.values.imag > 0]
-        rows, columns = linear_sum_assignment(np.abs(np.log(np.abs(near[places])[:, None] / np.abs(upper))))
-        values[places[rows]] = upper[columns]
-    return values

@@ -162,7 +162,7 @@ def _updated(
         status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
         history=pd.DataFrame([{"phase": name, **row} for name, result in history for row in result.rows]),
         before=problem.computed,
-        after=tracked,
+        after=problem.roots_near(model, tracked),
         ensemble=draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble),
         unmet=unmet_targets(posterior.stiffness_result, problem.names, left_out),
     )

@@ -1,0 +1,187 @@
+"""`minimal-change`: what it reaches, what it keeps, what it says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.numerics.pencils import damped_poles, undamped_poles
+from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, structural_basis
+from frf_ipz.updating.regions import reduced_regions
+from frf_ipz.updating.update import update_model
+from frf_ipz.updating.updated_model import UpdateStatus
+from updating_bench.random_structures import random_case, scaled
+from updating_bench.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
+from updating_study import set_up
+
+SEEDS = (3, 7, 11, 21)  # structures with one to four FRFs, one of them free to fly
+WITHIN_NOISE = 4.0  # standard deviations: hardly one of a hundred targets lies beyond
+
+
+@pytest.fixture(params=SEEDS, scope="module")
+def bench(request):
+    return set_up(request.param)
+
+
+@pytest.fixture(scope="module")
+def updated(bench):
+    basis = structural_basis(bench.case.nominal, bench.reduced)
+    return update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+
+
+def deviations(bench):
+    """Standard deviations of the modulus of every target, relative."""
+    places = [pair.measured + (bench.fit.n_modes if pair.kind == "zero" else 0) for pair in bench.pairs.targets]
+    values = np.array([pair.measured_value for pair in bench.pairs.targets])
+    blocks = np.array([bench.fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in places])
+    gradient = np.stack([values.real, values.imag], 1) / np.abs(values)[:, None] ** 2
+    return np.sqrt(np.einsum("ki,kij,kj->k", gradient, blocks, gradient))
+
+
+def test_targets_are_met_as_far_as_their_noise_deserves(bench, updated):
+    assert updated.status is UpdateStatus.CONVERGED
+    values = np.array([pair.measured_value for pair in bench.pairs.targets])
+    off = np.abs(np.log(np.abs(updated.after) / np.abs(values)))
+    assert np.all(off < WITHIN_NOISE * deviations(bench) + 1e-4)
+    before = np.abs(np.log(np.abs(updated.before) / np.abs(values)))
+    assert off.max() < before.max() / 10
+
+
+def test_matrices_stay_symmetric_and_positive(updated):
+    for matrices in ([updated.model.mass, updated.model.damping, updated.model.stiffness], *updated.ensemble[:20]):
+        for matrix in matrices:
+            assert np.array_equal(matrix, matrix.T)
+            assert np.linalg.eigvalsh(matrix)[0] > -1e-9 * np.linalg.norm(matrix)
+        assert np.linalg.eigvalsh(matrices[0])[0] > 0
+
+
+def test_the_mass_stays_as_it_was(bench, updated):
+    assert np.abs(updated.model.mass - bench.reduced.mass).max() < 1e-9 * np.abs(bench.reduced.mass).max()
+
+
+def test_what_is_said_is_what_the_matrices_have(bench, updated):
+    poles = damped_poles(updated.model.mass, updated.model.damping, updated.model.stiffness).values
+    for row, value in zip(bench.pairs.targets, updated.after, strict=True):
+        if row.kind == "pole":
+            assert np.abs(poles - value).min() < 1e-7 * abs(value)
+
+
+def test_the_ensemble_has_the_measured_poles_within_their_noise(bench, updated):
+    std = deviations(bench)
+    for place, row in enumerate(bench.pairs.targets[:3]):
+        near = []
+        for mass, _, stiffness in updated.ensemble:
+            omega = np.sqrt(np.maximum(undamped_poles(mass, stiffness).values.real, 0))
+            near.append(omega[np.argmin(np.abs(omega - abs(row.measured_value)))])
+        assert abs(np.mean(near) / abs(row.measured_value) - 1) < 6 * std[place] + 1e-4
+        assert np.std(near) / abs(row.measured_value) < 3 * std[place] + 1e-4
+
+
+def free_case():
+    """A structure that hangs free, with the truth beside it."""
+    for seed in range(100):
+        case = random_case(seed)
+        values = np.linalg.eigvalsh(case.nominal.stiffness.toarray())
+        if values[0] < 1e-9 * values[-1] / len(values):
+            return seed
+    raise AssertionError
+
+
+def test_rigid_body_modes_stay():
+    bench = set_up(free_case())
+    basis = structural_basis(bench.case.nominal, bench.reduced)
+    updated = update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+    for model in (bench.reduced, updated.model):
+        values = np.abs(undamped_poles(model.mass, model.stiffness).values.real)
+        assert np.count_nonzero(values < 1e-6 * np.abs(bench.fit.model.poles[0]) ** 2) >= 2
+
+
+def test_the_same_seed_gives_the_same_ensemble_and_another_another():
+    bench = set_up(3)
+    first, again = (update_model(bench.reduced, bench.fit, bench.pairs) for _ in range(2))
+    other = update_model(bench.reduced, bench.fit, bench.pairs, UpdateOptions(seed=1, ensemble=7))
+    assert np.array_equal(first.ensemble, again.ensemble)
+    assert len(other.ensemble) == 7
+    assert not np.array_equal(first.ensemble[:7], other.ensemble)
+
+
+def test_without_targets_the_model_is_left_alone():
+    bench = set_up(3)
+    updated = update_model(bench.reduced, bench.fit, Pairs(rows=()))
+    assert updated.status is UpdateStatus.NOTHING_TO_DO
+    assert updated.model is bench.reduced
+    assert updated.warnings
+
+
+def test_a_target_that_all_others_contradict_is_left_out_and_said():
+    bench = set_up(11)
+    rows = list(bench.pairs.rows)
+    place = next(k for k, row in enumerate(rows) if row in bench.pairs.targets and row.kind == "pole" and k > 0)
+    rows[place] = replace(rows[place], measured_value=1.25 * rows[place].measured_value)
+    basis = structural_basis(bench.case.nominal, bench.reduced)
+    updated = update_model(bench.reduced, bench.fit, replace(bench.pairs, rows=tuple(rows)), basis=basis)
+    assert len(updated.unmet) == 1
+    assert "contradict it" in updated.unmet[0]
+    assert f"{abs(rows[place].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
+    honest = update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+    assert not honest.unmet
+
+
+def test_noisier_targets_are_met_less():
+    bench = set_up(11)
+    loud = replace(bench.fit, covariance=1e4 * bench.fit.covariance)
+    near = [update_model(bench.reduced, fit, bench.pairs) for fit in (bench.fit, loud)]
+    values = np.array([row.measured_value for row in bench.pairs.targets])
+    error = [np.abs(np.log(np.abs(each.after) / np.abs(values))).max() for each in near]
+    assert error[1] > 3 * error[0]
+    assert near[1].history.size_of_change.iloc[0] < near[0].history.size_of_change.iloc[0]
+
+
+def chosen_parameters(bench, elements):
+    """One factor for a stretch of elements and nothing else, as a diagnosis would name it."""
+    regions = reduced_regions(bench.case.nominal, bench.reduced)
+    stiffness = sum(regions[k].stiffness for k in elements)[None]
+    nothing = np.zeros_like(stiffness)
+    return ParameterBasis(
+        names=("stiffness of the stretch",),
+        mass=nothing,
+        damping=nothing,
+        stiffness=stiffness,
+        logarithmic=np.array([True]),
+        terms=(PriorTerm(name="the stretch", root=np.eye(1), std=0.5),),
+        regions=(replace(regions[elements[0]], stiffness=stiffness[0]),),
+        chosen=True,
+    )
+
+
+@pytest.mark.parametrize("method", ["minimal-change", "ipz"])
+def test_parameters_that_a_diagnosis_has_chosen_find_the_truth(method):
+    case = random_case(21)
+    elements = range(3, 9)
+    factors = np.ones(len(case.nominal.parts))
+    factors[list(elements)] = 0.8
+    truth, labels = Truth(scaled(case.nominal, factors), case.damping), labels_of(case)
+    band = band_of(truth, case.n_modes)
+    ends = {"actuators": case.blows, "sensors": case.sensors, "points": case.points}
+    reduced = reduce_model(case.nominal, ReduceOptions(), band_hz=band, **ends)
+    fit = synthetic_fit(truth, labels, band, noise=1e-4, rng=np.random.default_rng(0))
+    bench = replace(set_up(21), reduced=reduced, fit=fit, pairs=pair(fit, reduced))
+    options = UpdateOptions(method=method, damping=method == "minimal-change", delta=1e-9, max_iterations=60)
+    updated = update_model(bench.reduced, bench.fit, bench.pairs, options, basis=chosen_parameters(bench, elements))
+    found = updated.history[updated.history.phase != "damping"].iloc[-1]["stiffness of the stretch"]
+    factor = found if method == "minimal-change" else np.exp(found)
+    assert_allclose(factor, 0.8, rtol=0.01)  # the reduction basis is that of the nominal model
+
+
+def test_the_history_tells_every_iteration(updated):
+    assert set(updated.history.columns) >= {"phase", "iteration", "misfit", "step"}
+    assert list(updated.history.phase.unique())[:2] == ["stiffness", "damping"]
+    stretch = [name for name in updated.history.columns if name.startswith("stiffness of element")]
+    assert stretch
+    assert updated.history[updated.history.phase == "stiffness"][stretch].notna().all().all()

@@ -1,0 +1,163 @@
+"""What an update may change: matrices that add up, and a prior that means what it says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chains import chain
+from fe_models import beam
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import ShapeError
+from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.updating.parameters import (
+    FREE_STD,
+    GLOBAL_STD,
+    STRETCH_STD,
+    generic_basis,
+    join,
+    structural_basis,
+    unwhiten,
+)
+from frf_ipz.updating.regions import MAX_REGIONS, reduced_regions
+
+EXACT = 1e-9  # relative: sums of a few hundred products
+
+
+@pytest.fixture(scope="module")
+def full():
+    return beam(modal_ratio=0.001, left="clamped")
+
+
+def reduced(full):
+    ends = {"actuators": [Dof(5, "z")], "sensors": [Dof(21, "z")], "points": [Dof(12, "z")]}
+    return reduce_model(full, ReduceOptions(modes=4), band_hz=(10.0, 500.0), **ends)
+
+
+def covariance(terms, stds):
+    return sum(std**2 * term.root @ term.root.T for term, std in zip(terms, stds, strict=True))
+
+
+def test_the_parts_together_are_the_whole_stiffness_and_mass(full):
+    model = reduced(full)
+    regions = reduced_regions(full, model)
+    assert len(regions) == 20
+    assert_allclose(sum(region.stiffness for region in regions), model.stiffness, rtol=EXACT, atol=1e-9 * 1e6)
+    total = sum(region.mass for region in regions)
+    assert np.abs(total - model.mass).max() < EXACT * np.abs(model.mass).max()
+
+
+def test_a_region_sits_where_its_element_is(full):
+    region = reduced_regions(full, reduced(full))[3]
+    assert region.nodes == (4, 5)
+    assert_allclose(region.coordinates_m[0], 3.5 * 0.4995 / 20, rtol=1e-12)
+    assert region.name == "element 4"
+
+
+def test_many_parts_are_taken_together_without_losing_any():
+    full = beam(elements=400, left="clamped")
+    model = reduced(full)
+    regions = reduced_regions(full, model)
+    assert len(regions) == MAX_REGIONS
+    assert_allclose(np.trace(sum(region.stiffness for region in regions)), np.trace(model.stiffness), rtol=1e-6)
+    assert max(len(region.nodes) for region in regions) <= 5
+
+
+def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(full):
+    model = reduced(full)
+    basis = structural_basis(full, model)
+    theta = np.where(basis.logarithmic, np.log(1.2), 0.0)
+    changed = np.tensordot(basis.amounts(theta), basis.stiffness, 1)
+    assert np.abs(changed - 0.2 * model.stiffness).max() < EXACT * np.abs(model.stiffness).max()
+
+
+def test_masses_change_only_when_asked(full):
+    model = reduced(full)
+    assert not structural_basis(full, model).mass.any()
+    basis = structural_basis(full, model, mass=True)
+    of_mass = np.array([name.startswith("mass of") for name in basis.names])
+    assert of_mass.sum() == 20
+    assert not basis.stiffness[of_mass].any()
+    assert np.abs(basis.mass[of_mass].sum(0) - model.mass).max() < EXACT * np.abs(model.mass).max()
+
+
+def test_without_parts_the_generic_parameters_are_used(full):
+    model = reduced(full)
+    basis = structural_basis(replace(full, parts=()), model)
+    assert basis.names == generic_basis(model).names
+
+
+def test_generic_parameters_span_every_symmetric_change():
+    model = chain(4)
+    basis = generic_basis(model)
+    assert len(basis.names) == 10
+    flat = basis.stiffness.reshape(10, -1)
+    assert np.linalg.matrix_rank(flat) == 10
+    assert np.array_equal(basis.stiffness, basis.stiffness.transpose(0, 2, 1))
+
+
+def test_a_generic_change_is_relative_to_the_two_frequencies():
+    model = chain(4)
+    roots = undamped_poles(model.mass, model.stiffness)
+    shapes, omega = roots.right.real, np.sqrt(roots.values.real)
+    basis = generic_basis(model)
+    inside = shapes.T @ basis.stiffness[basis.names.index("stiffness 1-3")] @ shapes
+    expected = np.zeros((4, 4))
+    expected[0, 2] = expected[2, 0] = omega[0] * omega[2]
+    assert np.abs(inside - expected).max() < EXACT * expected.max()
+
+
+def test_rigid_body_modes_stay_where_they_are():
+    model = chain(4, free=True)
+    basis = generic_basis(model)
+    rigid = np.ones(4)
+    assert np.abs(basis.stiffness @ rigid).max() < 1e-6 * np.abs(model.stiffness).max()
+
+
+def test_the_prior_is_what_it_says(full):
+    basis = structural_basis(full, reduced(full))
+    names = [term.name for term in basis.terms]
+    assert names[0] == "a factor on the stiffness"
+    stds = np.array([term.std for term in basis.terms])
+    prior = covariance(basis.terms, stds)[:20, :20]
+    assert_allclose(np.diag(prior), GLOBAL_STD**2 + 2 * STRETCH_STD**2, rtol=1e-6)
+    assert prior[0, 1] > prior[0, 5] > prior[0, 19] > GLOBAL_STD**2
+
+
+def test_the_generic_prior_is_the_same_in_rotated_coordinates():
+    """Two modes of one frequency may be mixed at will: the prior of the change must not notice."""
+    rng = np.random.default_rng(0)
+    root = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    basis = generic_basis(replace(chain(3), mass=np.eye(3), stiffness=1e4 * np.eye(3)), common=False)
+    stds = np.array([FREE_STD])
+    whitened = rng.standard_normal((20000, 6))
+    members = np.tensordot(unwhiten(basis.terms, stds, whitened), basis.stiffness, 1)
+    turned = root.T @ members @ root
+    spread = [np.einsum("kab,kcd->abcd", each, each) / len(each) for each in (members, turned)]
+    assert np.abs(spread[0] - spread[1]).max() < 0.05 * np.abs(spread[0]).max()
+
+
+def test_slopes_are_the_derivatives_of_the_amounts(full):
+    basis = structural_basis(full, reduced(full))
+    theta = np.random.default_rng(0).normal(0, 0.1, len(basis.names))
+    step = 1e-6
+    expected = (basis.amounts(theta + step) - basis.amounts(theta - step)) / (2 * step)
+    assert_allclose(basis.slopes(theta), expected, rtol=1e-8)
+
+
+def test_joined_parameters_have_independent_priors():
+    one, other = generic_basis(chain(3)), generic_basis(chain(3), std=0.2, common=False)
+    both = join(one, other)
+    stds = np.array([term.std for term in both.terms])
+    prior = covariance(both.terms, stds)
+    assert not prior[:6, 6:].any()
+    assert_allclose(prior[:6, :6], covariance(one.terms, stds[:2]), rtol=1e-12)
+    assert_allclose(prior[6:, 6:], covariance(other.terms, stds[2:]), rtol=1e-12)
+
+
+def test_shapes_that_disagree_are_refused():
+    with pytest.raises(ShapeError, match="marks of logarithmic"):
+        replace(generic_basis(chain(3)), logarithmic=np.zeros(2, bool))

@@ -1,0 +1,89 @@
+"""The phases of a minimal change: their sensitivities against differences, whatever the model and the parameters."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.updating.methods import minimal_change
+from frf_ipz.updating.minimal.gauss_newton import iterate
+from frf_ipz.updating.minimal.modal_frame import frame_of, modal_frame
+from frf_ipz.updating.parameters import generic_basis, structural_basis
+from frf_ipz.updating.problem import make_problem
+from updating_study import set_up
+
+STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
+SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
+SEEDS = (3, 11, 21)  # a plate, frames and beams
+
+
+@pytest.fixture(params=SEEDS, scope="module")
+def bench(request):
+    return set_up(request.param)
+
+
+@pytest.fixture(params=["parts", "parts and masses", "any stiffness"])
+def problem(request, bench):
+    basis = {
+        "parts": lambda: structural_basis(bench.case.nominal, bench.reduced),
+        "parts and masses": lambda: structural_basis(bench.case.nominal, bench.reduced, mass=True),
+        "any stiffness": lambda: generic_basis(bench.reduced),
+    }[request.param]()
+    return make_problem(bench.reduced, bench.fit, bench.pairs, basis)
+
+
+def stiffness_phase(problem):
+    return minimal_change._stiffness_phase(problem, frame_of(problem.model))
+
+
+def differences(value, count):
+    """Central differences of a vector by parameters of the order of 1."""
+    columns = []
+    for place in range(count):
+        step = STEP * np.eye(count)[place]
+        columns.append((value(step) - value(-step)) / (2 * STEP))
+    return np.array(columns).T
+
+
+def test_stiffness_slopes_against_differences(problem):
+    phase = stiffness_phase(problem)
+    start = phase.nominal_roots(problem.computed)
+    theta = 0.01 * np.random.default_rng(0).standard_normal(len(phase.basis.names))
+    there = phase.roots(theta, start)
+    found = phase.slopes(theta, there)
+    expected = -differences(lambda step: phase.errors(phase.roots(theta + step, there)), len(theta))
+    assert np.abs(found - expected).max() < SLOPES * np.abs(expected).max()
+
+
+def test_damping_slopes_against_differences(bench):
+    basis = structural_basis(bench.case.nominal, bench.reduced)
+    problem = make_problem(bench.reduced, bench.fit, bench.pairs, basis)
+    frame = frame_of(problem.model)
+    phase = minimal_change._stiffness_phase(problem, frame)
+    result = iterate(phase, phase.nominal_roots(problem.computed))
+    damping = minimal_change._damping(problem, frame, modal_frame(*phase.matrices(result.theta)), phase, result)
+    count = damping.terms[0].root.shape[0]
+    theta = 0.02 * np.random.default_rng(1).standard_normal(count)
+    found = damping.slopes(theta, damping.roots(theta))
+    expected = -differences(lambda step: damping.errors(damping.roots(theta + step)), count)
+    assert np.abs(found - expected).max() < 10 * SLOPES * np.abs(expected).max()
+
+
+def test_an_indefinite_stiffness_is_refused(problem):
+    phase = stiffness_phase(problem)
+    start = phase.nominal_roots(problem.computed)
+    theta = np.where(phase.basis.logarithmic, 0.0, -5.0)
+    if not phase.basis.logarithmic.any():
+        assert phase.roots(theta, start) is None
+
+
+def test_roots_are_followed_through_a_crossing(problem):
+    """A large change keeps every target's root its own: the vectors tell, not the order."""
+    phase = stiffness_phase(problem)
+    near = phase.nominal_roots(problem.computed)
+    direction = np.random.default_rng(2).standard_normal(len(phase.basis.names))
+    direction /= np.abs(direction).max()
+    small = 0.002
+    for step in range(1, 20):
+        before, near = near, phase.roots(small * step * direction, near)
+        slope = phase.slopes(small * (step - 1) * direction, before) @ direction
+        moved = phase.errors(before) - phase.errors(near)
+        assert np.abs(moved - small * slope).max() < 0.2 * max(np.abs(small * slope).max(), small)
