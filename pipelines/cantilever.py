@@ -37,8 +37,15 @@ def compare(run: frf_ipz.RunFolder) -> pd.DataFrame:
         "after updating": prediction.values,
     }
     truth = true_frfs(prediction.labels, prediction.frequency_hz)
-    tables = [frf_ipz.compare_frfs(truth, values).to_frame(prediction.labels) for values in models.values()]
-    return pd.concat(dict(zip(models, tables, strict=True)), names=["model"]).reset_index(level=0)
+    names = [*prediction.labels, "all"]
+    tables = {}
+    for model, values in models.items():
+        one, pooled = (
+            frf_ipz.compare_frfs(truth, values),
+            frf_ipz.compare_frfs(truth.reshape(-1, 1), values.reshape(-1, 1)),
+        )
+        tables[model] = pd.concat([one.to_frame(names[:-1]), pooled.to_frame(names[-1:])])
+    return pd.concat(tables, names=["model"]).reset_index(level=0)
 
 
 def main(out: Path) -> None:

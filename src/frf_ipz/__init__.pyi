@@ -2,6 +2,7 @@ from .dofs import Dof as Dof
 from .dofs import parse_dof as parse_dof
 from .errors import FrfIpzError as FrfIpzError
 from .errors import InputError as InputError
+from .export.options import ExportOptions as ExportOptions
 from .export.state_space import load_state_space as load_state_space
 from .export.state_space import save_state_space as save_state_space
 from .export.state_space import to_state_space as to_state_space

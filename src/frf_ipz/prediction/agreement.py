@@ -42,13 +42,13 @@ class Agreement:
     median_db: FloatArray
     largest_db: FloatArray
 
-    def to_frame(self, labels: Sequence[FrfLabel]) -> pd.DataFrame:
+    def to_frame(self, labels: Sequence[FrfLabel | str]) -> pd.DataFrame:
         """Give a table.
 
         Parameters
         ----------
-        labels : sequence of FrfLabel
-            What each FRF connects.
+        labels : sequence of FrfLabel or str
+            What each FRF is called.
 
         Returns
         -------
