@@ -63,6 +63,27 @@ def percent(ratio: float, digits: int = 3) -> str:
     return f"{number(100 * ratio, digits)} %" if math.isfinite(ratio) else NOTHING
 
 
+def small_percent(ratio: float) -> str:
+    """Write a small ratio in percent, without digits that nobody needs.
+
+    Parameters
+    ----------
+    ratio : float
+        1 is 100 %.
+
+    Returns
+    -------
+    str
+        Two digits, or that it is below 0.001 %.
+
+    Examples
+    --------
+    >>> small_percent(0.0123), small_percent(1e-9)
+    ('1.2 %', '< 0.001 %')
+    """
+    return "< 0.001 %" if abs(ratio) < 1e-5 else percent(ratio, 2)
+
+
 def with_error(value: float, std: float, digits: int = 6) -> str:
     """Write a number with its standard deviation, to the digits that the latter supports.
 

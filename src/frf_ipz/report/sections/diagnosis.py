@@ -102,12 +102,7 @@ def _heat(
         "zmin": 0,
         "zmax": top,
         "colorscale": "Cividis",
-        "showscale": rank == 0,
-        "colorbar": {
-            "title": {"text": "misfit / noise"},
-            "tickvals": [0, 1, 2, 3],
-            "ticktext": ["1", "10", "100", "1000"],
-        },
+        "showscale": False,
         "yaxis": "y" if rank == 0 else "y2",
     }
 

@@ -14,7 +14,7 @@ from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
 from frf_ipz.report.reference import measured_at
 from frf_ipz.report.section import Markup, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
-from frf_ipz.report.wording import counted, listed, number, percent
+from frf_ipz.report.wording import counted, listed, number, percent, small_percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,15 +100,14 @@ def _of_update(run: RunContents) -> str:
     before, after = (
         max(abs(value) for value in errors) for errors in zip(*[(r.before, r.after) for r in rows], strict=True)
     )
-    word = "all" if len(rows) > 1 else "the"
-    text = (
-        f"The updated model meets {word} {counted(len(rows), 'measured pole or zero', 'paired poles and zeros')} "
-        f"within {percent(after, 2)} in frequency (before: {percent(before, 2)})"
-    )
+    kinds = {kind: sum(row.kind == kind for row in rows) for kind in ("pole", "zero")}
+    paired = " and ".join(counted(count, f"measured {kind}") for kind, count in kinds.items() if count)
+    text = f"The updated model has {paired} right within {percent(max(after, 1e-5), 2)} in frequency"
+    text += f" (before: {percent(before, 2)})"
     width = _half_width_db(run)
     points = [str(dof) for dof in run.points]
     if points and np.isfinite(width):
-        text += f", and predicts {listed(points, 3)} to ±{number(width, 2)} dB"
+        text += f", and predicts {listed(points, 3)} to ±{number(width, 2)} dB (90 % band, median)"
     return text + "."
 
 
@@ -172,18 +171,24 @@ def _target_card(run: RunContents) -> Card:
     if not rows:
         return Card("Worst target", "none", "no measured pole or zero has a counterpart in the model")
     worst = max(rows, key=lambda row: abs(row.after))
-    meaning = f"{worst.name} at {number(worst.measured_hz)} Hz; before: {percent(worst.before, 2)}"
-    return Card("Worst target after updating", percent(abs(worst.after), 2), meaning)
+    meaning = f"{worst.name} at {number(worst.measured_hz)} Hz; before: {small_percent(worst.before)}"
+    return Card("Worst target after updating", small_percent(worst.after), meaning)
 
 
 def _missing_card(run: RunContents) -> Card:
     if run.diagnosis is not None:
         figure, meaning = said_in_short(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
-    rows = [] if run.pairs is None else [row for row in run.pairs.rows if row.measured >= 0]
-    open_rows = [row for row in rows if row.verdict is not Verdict.PAIRED]
-    figure = f"{len(open_rows)} of {len(rows)}" if open_rows else "nothing seen"
-    return Card("Missing in the model", figure, "measured poles and zeros without a counterpart; no diagnosis was run")
+    rows = () if run.pairs is None else run.pairs.rows
+    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
+    lacking = counts[Verdict.MISSING_IN_MODEL]
+    figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "nothing seen"
+    unsure = counts[Verdict.AMBIGUOUS]
+    meaning = (
+        "measured without a counterpart" if lacking else "all measured poles and zeros that can be told are paired"
+    )
+    meaning += f"; {unsure} cannot be told" if unsure else ""
+    return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run")
 
 
 def _half_width_db(run: RunContents) -> float:

@@ -65,15 +65,12 @@ def _picture(fit: ModalFit, noise_from: str) -> Picture:
     traces.append(markers(natural_frequency_hz(poles), 100 * damping_ratio(poles), "poles", "@ink", **style))
     for frf, label in enumerate(fit.labels):
         traces += _zeros_of(fit, frf, str(label), hover)
-    spread = 100 * np.concatenate([damping_ratio(poles), damping_ratio(fit.zeros.values[shown_zeros(fit)])])
-    top = 1.25 * float(np.quantile(spread, 0.95)) if spread.size else 1.0
-    bottom = min(0.0, 1.25 * float(spread.min())) if spread.size else 0.0
-    y = Axis(title="Damping ratio, %", options={"range": [bottom, max(top, 1e-3)], "zeroline": True})
+    y = Axis(title="Damping ratio, %", options={"range": _damping_range(fit), "zeroline": True})
     return Picture(
         name="pole-zero-map",
         title="Poles and zeros, with the ellipses that hold the true ones with 95 % probability",
-        alt=f"Map of {counted(len(poles), 'pole')} and {counted(int(shown_zeros(fit).sum()), 'zero')} over frequency and "
-        "damping ratio; ellipses show their uncertainty.",
+        alt=f"Map of {counted(len(poles), 'pole')} and {counted(int(shown_zeros(fit).sum()), 'zero')} over frequency "
+        "and damping ratio; ellipses show their uncertainty.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*fit.band_hz), y),
         note=f"Crosses: poles; circles: zeros of each FRF. The uncertainty comes from {noise_from}; zoom in to see "
@@ -82,6 +79,15 @@ def _picture(fit: ModalFit, noise_from: str) -> Picture:
         height_px=440,
         is_over_frequency=True,
     )
+
+
+def _damping_range(fit: ModalFit) -> list[float]:
+    """Choose what the map shows at first: all poles, and the zeros but for a few far ones, percent."""
+    poles = 100 * damping_ratio(fit.model.poles[: fit.n_modes])
+    zeros = 100 * damping_ratio(fit.zeros.values[shown_zeros(fit)])
+    low, high = np.quantile(zeros, [0.1, 0.9]) if zeros.size else (0.0, 0.0)
+    top = max(float(high), float(poles.max(initial=1e-3)))
+    return [min(1.2 * float(low), -0.06 * top), 1.2 * top]
 
 
 def _zeros_of(fit: ModalFit, frf: int, label: str, hover: str) -> list[Trace]:
@@ -146,7 +152,10 @@ def _zero_table(fit: ModalFit) -> Table:
         numbers = ["–", "–"]
         if known:
             hertz, ratio = float(natural_frequency_hz(root)), float(damping_ratio(root))
-            numbers = [with_error(hertz, hertz_std[place], 7), with_error(100 * ratio, 100 * ratio_std[place], 5)]
+            damping = with_error(100 * ratio, 100 * ratio_std[place], 5)
+            if zeros.kind[place] == "real":
+                damping = f"{'left' if root.real < 0 else 'right'} half plane"
+            numbers = [with_error(hertz, hertz_std[place], 7), damping]
         rows.append([str(fit.labels[zeros.frf[place]]), zeros.kind[place], *numbers, zeros.reason[place]])
     columns = ("FRF (sensor / blow)", "kind", "frequency, Hz", "damping ratio, %", "why without a number")
     marked = frozenset(np.flatnonzero(~zeros.identifiable[order]).tolist())

@@ -12,7 +12,7 @@ from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, number, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import pandas as pd
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 MOST_TRACES = 60  # drawn; more cover each other and make the page large
+MOST_PANELS = 4  # channels with a panel each; more share one
+LEGEND_NOTE = "Click a name in the legend to hide or show a blow; dotted: left out. Drag to zoom."
 SHOWN_AT_FIRST = 12  # blows; the others are a click in the legend away
 
 
@@ -43,63 +45,87 @@ def build(run: RunContents) -> Section | None:
     blows = recordings.blows
     used = int(blows["used"].astype(bool).sum())
     lead = f"{counted(len(blows), 'blow or record', 'blows or records')}, {used} used."
-    picture = _traces(recordings)
     return Section(
         anchor="recordings",
         title="Blows",
         lead=lead,
-        blocks=(*([picture] if picture else []), _table(blows)),
+        blocks=(*_pictures(recordings), _table(blows)),
         notes=recordings.warnings,
         choices=recordings.choices,
     )
 
 
-def _traces(recordings: Recordings) -> Picture | None:
+def _pictures(recordings: Recordings) -> list[Picture]:
     traces = recordings.traces[:MOST_TRACES]
     if not traces:
-        return None
-    names = list(dict.fromkeys(trace.name for trace in traces))
+        return []
     force = traces[0].channel
-    responses = list(dict.fromkeys(trace.channel for trace in traces if trace.channel != force))
-    units = {trace.channel: trace.unit for trace in traces}
-    left_out = set(recordings.blows.loc[~recordings.blows["used"].astype(bool), "blow"])
+    pulses = [trace for trace in traces if trace.channel == force]
+    responses = [trace for trace in traces if trace.channel != force]
+    return [_pulses(pulses, recordings.blows), *([_responses(responses, recordings.blows)] if responses else [])]
+
+
+def _pulses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
+    triggers = dict(zip(blows["blow"], blows["trigger_s"], strict=True)) if "trigger_s" in blows else {}
+    shifts = {name: float(time) for name, time in triggers.items() if np.isfinite(time)}
+    aligned = all(shifts.get(trace.name, 0.0) > 0 for trace in traces)
     drawn = [
-        _curve(trace, names.index(trace.name), first=trace.channel == force, left_out=left_out) for trace in traces
+        _curve(trace, place, blows, shift_s=shifts[trace.name] if aligned else 0.0, unit="ms")
+        for place, trace in enumerate(traces)
     ]
-    ends = [float(trace.time_s[-1]) for trace in traces if len(trace.time_s)]
-    x = {"title": {"text": "Time, s"}, "range": [0.0, max(ends)]}
-    axes = [Axis(title=f"{force}, {units[force]}")]
-    if responses:
-        unit = " or ".join(dict.fromkeys(units[name] for name in responses))
-        axes.append(Axis(title=f"{'response' if len(responses) > 1 else responses[0]}, {unit}"))
+    names = "; ".join(trace["name"] for trace in drawn[:SHOWN_AT_FIRST])
     return Picture(
         name="blows",
-        title="Recordings as they were used: force above, responses below",
-        alt=f"Force and responses over time of {counted(len(names), 'blow or record', 'blows or records')}; "
-        f"those left out are dotted: {', '.join(sorted(left_out)) or 'none'}.",
+        title="Forces as recorded" + (", aligned where they set in" if aligned else ""),
+        alt=f"Force over time of {counted(len(traces), 'blow or record', 'blows or records')}: {names}.",
         traces=tuple(drawn),
-        layout=panels(x, *axes),
-        note="Click a name in the legend to hide or show a blow; dotted: left out. Drag to zoom into a pulse.",
-        height_px=460,
+        layout=panels({"title": {"text": "Time, ms"}}, Axis(title=f"{traces[0].channel}, {traces[0].unit}")),
+        note=LEGEND_NOTE,
+        height_px=330,
     )
 
 
-def _curve(trace: Recorded, place: int, *, first: bool, left_out: set[str]) -> Trace:
-    out = trace.name in left_out
+def _responses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
+    channels = list(dict.fromkeys(trace.channel for trace in traces))
+    units = {trace.channel: trace.unit for trace in traces}
+    names = list(dict.fromkeys(trace.name for trace in traces))
+    stacked = len(channels) <= MOST_PANELS
+    drawn = []
+    for trace in traces:
+        rank = channels.index(trace.channel) if stacked else 0
+        curve = _curve(trace, names.index(trace.name), blows, shift_s=0.0, unit="s")
+        drawn.append({**curve, "yaxis": f"y{rank + 1}" if rank else "y", "showlegend": trace.channel == channels[0]})
+    axes = [Axis(title=f"{channel}, {units[channel]}") for channel in channels]
+    axes = axes if stacked else [Axis(title=f"responses, {' or '.join(dict.fromkeys(units.values()))}")]
+    end = max(float(trace.time_s[-1]) for trace in traces if len(trace.time_s))
+    x = {"title": {"text": "Time, s"}, "range": [0.0, end]}
+    return Picture(
+        name="responses",
+        title="Responses as recorded",
+        alt=f"Responses over time: {', '.join(channels)}; {counted(len(names), 'blow or record', 'blows or records')}.",
+        traces=tuple(drawn),
+        layout=panels(x, *axes),
+        note=LEGEND_NOTE,
+        height_px=int(np.clip(170 + 130 * len(axes), 300, 800)),
+    )
+
+
+def _curve(trace: Recorded, place: int, blows: pd.DataFrame, *, shift_s: float, unit: str) -> Trace:
+    used = dict(zip(blows["blow"], blows["used"].astype(bool), strict=True))
+    out = not used.get(trace.name, True)
     name = f"{trace.name} (left out)" if out else trace.name
-    hover = f"%{{x:.5g}} s: %{{y:.4g}} {trace.unit} ({trace.channel})"
-    more = {"yaxis": "y" if first else "y2", "legendgroup": trace.name, "showlegend": first}
-    more["visible"] = True if place < SHOWN_AT_FIRST else "legendonly"
-    dash = "dot" if out else dash_of(place)
+    factor = 1e3 if unit == "ms" else 1.0
+    shown = True if place < SHOWN_AT_FIRST else "legendonly"
     return line(
-        np.asarray(trace.time_s),
+        factor * (np.asarray(trace.time_s) - shift_s),
         np.asarray(trace.values),
         name,
         colour_of(place),
-        hover=hover,
-        dash=dash,
+        hover=f"%{{x:.5g}} {unit}: %{{y:.4g}} {trace.unit} ({trace.channel})",
+        dash="dot" if out else dash_of(place),
         width=1.2,
-        **more,
+        legendgroup=trace.name,
+        visible=shown,
     )
 
 

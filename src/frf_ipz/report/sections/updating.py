@@ -17,13 +17,15 @@ from frf_ipz.report.wording import counted, number, percent
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import FloatArray, IntArray
     from frf_ipz.report.contents import RunContents
-    from frf_ipz.structure import Geometry
+    from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 PART = re.compile(r"stiffness of (?:element|spring|group) (\S+)(?: to (\S+))?")
 MOST_MODES = 30
+MOST_PLACES = 400  # drawn along the structure
+STIFF = 0.01  # of the largest flexibility: at places below, a ratio says nothing
 LEAST_EIGENVALUE = 1e-9  # of the largest one: a rigid-body mode has no stiffness to change
 
 
@@ -46,8 +48,7 @@ def build(run: RunContents) -> Section | None:
     rows = run.targets()
     pictures = [_targets(rows)] if rows else []
     pictures += [_convergence(updated)] if len(updated.history) > 1 else []
-    change = _along_structure(updated, run.geometry)
-    pictures += [_of_modes(updated)] if change is None else [change, _of_modes(updated)]
+    pictures += [*_of_parts(updated, run.geometry), *_of_flexibility(run, updated), _of_modes(updated)]
     lead = f"Method {updated.method}: {updated.status.value}. {counted(len(updated.history), 'iteration')}."
     reduced = run.reduced
     return Section(
@@ -143,18 +144,18 @@ def _convergence(updated: UpdatedModel) -> Picture:
     )
 
 
-def _along_structure(updated: UpdatedModel, geometry: Geometry | None) -> Picture | None:
+def _of_parts(updated: UpdatedModel, geometry: Geometry | None) -> list[Picture]:
     """Draw the factors on the stiffness of named parts, where the method has such parameters."""
     columns = [(name, match) for name in updated.history.columns if (match := PART.fullmatch(str(name)))]
     values = updated.history[[name for name, _ in columns]].to_numpy(float) if columns else np.zeros((0, 0))
     known = values[np.isfinite(values).all(axis=1)] if values.size else values
     if not len(known):
-        return None
+        return []
     change = 100 * np.expm1(known[-1])
     names = [str(name).removeprefix("stiffness of ") for name, _ in columns]
     x, title = _positions([match for _, match in columns], geometry)
     rows = [[name, f"{value:+.3g} %"] for name, value in zip(names, change, strict=True)]
-    return Picture(
+    picture = Picture(
         name="change",
         title="Change of stiffness along the structure",
         alt=f"Change of the stiffness of {counted(len(change), 'part')}: from {number(float(change.min()), 3)} % to "
@@ -171,6 +172,7 @@ def _along_structure(updated: UpdatedModel, geometry: Geometry | None) -> Pictur
         table=Table(caption="Change of stiffness", columns=("part", "change"), rows=rows, file="parameters.parquet"),
         height_px=320,
     )
+    return [picture]
 
 
 def _positions(matches: Sequence[re.Match[str]], geometry: Geometry | None) -> tuple[FloatArray, str]:
@@ -185,6 +187,46 @@ def _positions(matches: Sequence[re.Match[str]], geometry: Geometry | None) -> t
         return count, "Part"
     rows = np.vectorize(place.__getitem__)(ends)
     return geometry.coordinates_m[rows, axis].mean(axis=1), "Position, m"
+
+
+def _of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Picture]:
+    """Draw how much further every place gives way to a force at rest than the nominal model says."""
+    frfs, geometry = run.frfs, run.geometry
+    if geometry is None or frfs is None:
+        return []
+    directions = {dof.direction for dof in (*frfs.output_dofs, *frfs.input_dofs)}
+    place = {int(node): row for row, node in enumerate(geometry.nodes)}
+    dofs = enumerate(updated.nominal.expanded_dofs)
+    rows = np.array([row for row, dof in dofs if dof.direction in directions and dof.node in place], int)
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_PLACES).astype(int))] if len(rows) else rows
+    before, after = (_flexibility(model, rows) for model in (updated.nominal, updated.model))
+    moving = before > STIFF * before.max(initial=0.0)
+    rows, change = rows[moving], 100 * (after[moving] / before[moving] - 1)
+    if len(rows) < 2:
+        return []
+    names = [updated.nominal.expanded_dofs[row].name for row in rows]
+    axis = int(np.argmax(np.ptp(geometry.coordinates_m, axis=0)))
+    x = geometry.coordinates_m[[place[updated.nominal.expanded_dofs[row].node] for row in rows], axis]
+    return [
+        Picture(
+            name="flexibility",
+            title="Change along the structure: how much further each place gives way to a force on it",
+            alt=f"Change of the static flexibility at {counted(len(rows), 'place')}: from "
+            f"{number(float(change.min()), 3)} to {number(float(change.max()), 3)} %.",
+            traces=(markers(x, change, "change", "@updated", size=6, text=names, hover="%{text}: %{y:+.3g} %"),),
+            layout=panels({"title": {"text": f"Position {'xyz'[axis]}, m"}}, Axis(title="Change of flexibility, %")),
+            note="Updated over nominal model, without motions as a rigid body. The smallest change that meets the "
+            "targets: a hint where the model is off, no diagnosis of what is wrong there.",
+            height_px=320,
+        )
+    ]
+
+
+def _flexibility(model: ReducedModel, rows: IntArray) -> FloatArray:
+    """Give the static deflection under a unit force on the same place, (n_rows,), m/N."""
+    values, shapes = eigh((model.stiffness + model.stiffness.T) / 2, model.mass)
+    flexible = values > LEAST_EIGENVALUE * values[-1]
+    return np.asarray(((model.expansion[rows] @ shapes[:, flexible]) ** 2 / values[flexible]).sum(axis=1))
 
 
 def _of_modes(updated: UpdatedModel) -> Picture:
