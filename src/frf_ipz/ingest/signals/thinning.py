@@ -32,14 +32,8 @@ def thin(values: FloatArray, n_points: int) -> tuple[np.ndarray, FloatArray]:
     """
     if len(values) <= n_points:
         return np.arange(len(values)), values
-    n_cells = max(n_points // 2, 1)
-    edges = np.linspace(0, len(values), n_cells + 1).astype(int)[:-1]
-    cells = np.split(values, edges[1:])
-    places = np.unique(
-        [
-            edge + place
-            for edge, cell in zip(edges, cells, strict=True)
-            for place in (int(np.argmin(cell)), int(np.argmax(cell)))
-        ]
-    )
+    size = -(-len(values) // max(n_points // 2, 1))
+    cells = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    starts = np.arange(len(cells)) * size
+    places = np.unique(np.concatenate([starts + cells.argmin(axis=1), starts + cells.argmax(axis=1)]))
     return places, values[places]
