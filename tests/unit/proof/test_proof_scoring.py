@@ -100,7 +100,7 @@ def test_a_bar_passes_with_enough_good_cases_and_not_with_one_less(group, name, 
         ("linear", "declared nonlinear", RIGHT, replace(WRONG, said="gap_contact"), 100),
         ("linear", "declared nonlinear", NULL, replace(ALARM, said="dry_friction"), 100),
         ("nulls", "false alarms", NULL, ALARM, 50),
-        ("nulls", "false alarms", NULL, replace(ALARM, said="failed", verdict="failed"), 50),
+        ("nulls", "false alarms", NULL, replace(ALARM, said="failed", verdict="failed", detected=False), 50),
         ("outside the catalogue", "confident wrong names", FLAGGED, NAMED, 10),
         ("two effects", "false second effect", RIGHT, replace(RIGHT, n_findings=2), 20),
     ],
@@ -123,6 +123,19 @@ def test_groups_do_not_mix():
     name = "effect named first, of those detected"
     assert bar("linear", name, RIGHT, ALARM, PAIR, LAW, NAMED).rate.count == 1
     assert bar("nulls", "false alarms", RIGHT, WRONG, NAMED).rate.count == 0
+
+
+def test_what_does_not_apply_does_not_count():
+    assert bar("linear", "effect named first, of those detected", RIGHT, MISSED).rate.count == 1
+    assert bar("linear", "truth in the reported set, of those detected", RIGHT, MISSED).rate.count == 1
+    assert (
+        bar("linear", "effect named first, of those decidable", RIGHT, replace(WRONG, decidable=False)).rate.count == 1
+    )
+    assert (
+        bar("linear", "detected, of those with over 100 nats", RIGHT, replace(MISSED, detectable=None)).rate.count == 1
+    )
+    assert bar("places", "exact, where the effect is right", RIGHT, replace(RIGHT, place=None), MISSED).rate.count == 1
+    assert bar("two effects", "both, each with over 100 nats", replace(PAIR, both_detectable=False)).rate.count == 0
 
 
 def test_the_upper_end_of_the_interval_of_false_alarms():

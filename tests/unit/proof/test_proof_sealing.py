@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from proof_tools.blind import diagnose_all, predict_all, worth_predicting, write_pipeline
-from proof_tools.commands import code_digest, read_done, run
+from proof_tools.commands import code_digest, read_done, run, run_all
 from proof_tools.plan import FULL, SLICE, Folders, plan_cases, turns
 from proof_tools.sealing import BrokenSealError, check_seal, make_cases
 from simulator.effects.catalogue import CONTRACT, NONLINEAR
@@ -19,10 +19,7 @@ FAKE = """
 import json, sys
 from pathlib import Path
 stage, pipeline, _, out, _ = sys.argv[1:]
-seen = Path(pipeline).read_text(encoding="utf-8")
 if stage == "diagnose":
-    if "broken" in seen:
-        sys.exit("frf-ipz: no such file")
     Path(out).mkdir(parents=True)
     Path(out, "diagnosis.json").write_text(json.dumps({"verdict": "explained", "findings": []}))
 with Path(sys.argv[0]).with_suffix(".log").open("a") as log:
@@ -144,6 +141,31 @@ def test_pipelines_apply_the_finding_or_leave_it_out(made):
         assert Path(table["pipeline"]["test"]) == (folders.cases / name / "test.toml").resolve()
         assert table["fit"] == tomllib.loads(handed_in.decode())["fit"]
     assert (folders.cases / name / "pipeline.toml").read_bytes() == handed_in
+
+
+def test_options_of_a_diagnosis_are_kept_or_left_out_as_a_whole(tmp_path):
+    folders = Folders.inside(tmp_path)
+    (folders.cases / "case_1").mkdir(parents=True)
+    text = '[pipeline]\ntest = "test.toml"\n[diagnose]\ngain_tolerance = 0.01\napply = false\n'
+    (folders.cases / "case_1" / "pipeline.toml").write_text(text, encoding="utf-8")
+    applied = tomllib.loads(write_pipeline(folders, "case_1", applying=True).read_text(encoding="utf-8"))
+    assert applied["diagnose"] == {"gain_tolerance": 0.01, "apply": True}
+    assert "diagnose" not in write_pipeline(folders, "case_1", applying=False).read_text(encoding="utf-8")
+
+
+def test_a_chain_of_commands_stops_where_one_fails(tmp_path):
+    fails = [sys.executable, "-c", "import sys; sys.exit('frf-ipz: first')"]
+    writes = [sys.executable, "-c", f"open({str(tmp_path / 'second')!r}, 'w').close()"]
+    jobs = {"case_1": lambda: [fails, writes], "case_2": lambda: [writes, fails]}
+    steps = []
+    run_all({"case_1": jobs["case_1"]}, tmp_path / "logs", workers=1, code="x", step=lambda: steps.append(1))
+    assert not (tmp_path / "second").exists()
+    assert read_done(tmp_path / "logs", "case_1").message == "frf-ipz: first"
+    run_all(jobs, tmp_path / "logs", workers=1, code="x", step=lambda: steps.append(1))
+    assert (tmp_path / "second").exists()
+    assert read_done(tmp_path / "logs", "case_2").status == 1
+    assert len(steps) == 3
+    assert read_done(tmp_path / "logs", "case_3") is None
 
 
 def test_a_command_that_fails_or_hangs_is_written_down(tmp_path):
