@@ -110,7 +110,7 @@ class Freedom:
             m s.
         """
         free = _free_motion(response, self.modes, 0) * self.plant.at_places.shapes[place, self.modes, None]
-        return np.asarray(np.einsum("cbm,cml->bl", self._starts(unknowns), free))
+        return np.asarray(np.einsum("cbm,cml->bl", self.starts_of(unknowns), free))
 
     def sensor_starts(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
         """Give what sensors show of how stretches start.
@@ -127,15 +127,15 @@ class Freedom:
         (n_moving, n_sensors, n_lines) complex array
             As `Stretches.motion`.
         """
-        starts, shapes = self._starts(unknowns), response.sensor_shapes[:, self.modes]
+        starts, shapes = self.starts_of(unknowns), response.sensor_shapes[:, self.modes]
         seen = [
             np.einsum("cbm,cml->bl", starts, _free_motion(response, self.modes, sensor.quantity.power) * shape[:, None])
             for sensor, shape in zip(self.plant.sensors, shapes, strict=True)
         ]
         return np.stack(seen, 1)
 
-    def _starts(self, unknowns: FloatArray) -> FloatArray:
-        """(2, n_moving, n_free) motion and velocity of modes at the start of stretches."""
+    def starts_of(self, unknowns: FloatArray) -> FloatArray:
+        """(2, n_moving, n_free) displacement times omega, and velocity, of modes at the start of stretches."""
         parts = self._split(unknowns)[4:]
         return np.array([part.reshape(self.starts.shape) * self.starts for part in parts])
 

@@ -36,10 +36,13 @@ class Clock:
         Which lines.
     oversampling : int
         Times per sample.
+    fades : bool
+        The end is faded out: needed for what comes from noisy lines, not for what is simulated.
     """
 
     stretches: Stretches
     oversampling: int = OVERSAMPLING
+    fades: bool = True
 
     @property
     def n_times(self) -> int:
@@ -91,6 +94,8 @@ class Clock:
         return np.asarray(slope)
 
     def _fade(self) -> FloatArray:
+        if not self.fades:
+            return np.ones(self.n_times)
         part = np.arange(self.n_times) / self.n_times
         return np.clip((FADE[1] - part) / (FADE[1] - FADE[0]), 0.0, 1.0)
 

@@ -4,8 +4,8 @@ The recordings of all levels are asked first (`assess_linearity`). If no linear 
 at every place on the first part of each blow, or on stretches of records. What is held out takes no part in that.
 
 Evidence is in nats: half the drop of the weighted sum of squares against the linear model with its tolerances, less
-what the freedom of the law costs. Nothing linear can gain more than `linear_limit` on the same data, whatever it is. So the
-branches compare: a law that gains more is needed besides, or instead of, anything linear.
+what the freedom of the law costs. Nothing linear can gain more than `linear_limit` on the same data, whatever it is:
+a law that gains more is needed besides, or instead of, anything linear.
 """
 
 from __future__ import annotations

@@ -51,6 +51,8 @@ class Stretches:
         N s.
     start_force : (n_blows, 2) array
         Force and its slope at the start of stretches that start in motion, N and N/s; else 0.
+    fine_force : (n_blows, FINER * n_samples) array
+        Force on finer times, N.
     motion : (n_blows, n_sensors, n_lines) complex array
         Responses as displacements, in the signs of the sensors, m s; 0 where a blow lacks a sensor.
     noise : (n_sensors, n_lines) array
@@ -71,6 +73,7 @@ class Stretches:
     n_samples: int
     force: ComplexArray
     start_force: FloatArray
+    fine_force: FloatArray
     motion: ComplexArray
     noise: FloatArray
     variance: FloatArray
@@ -141,12 +144,14 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     s = np.asarray(sigma + 2j * np.pi * np.fft.rfftfreq(n, step))
     powers = np.array([sensor.quantity.power for sensor in plant.sensors])
     force = np.zeros((len(cuts), len(s)), complex)
-    start_force = np.zeros((len(cuts), 2))
+    start_force, fine_force = np.zeros((len(cuts), 2)), np.zeros((len(cuts), FINER * n))
     motion = np.zeros((len(cuts), len(plant.sensors), len(s)), complex)
     present = np.zeros(motion.shape[:2], bool)
     for number, cut in enumerate(cuts):
         rows = [_row(plant, sensor.channel, sensor.dof) for sensor in cut.blow.sensors]
-        lines, start_force[number] = _lines(cut, n, sigma)
+        finer = _finer(cut, n)
+        fine_force[number] = finer[0]
+        lines, start_force[number] = _lines(cut, finer, sigma)
         force[number], motion[number, rows] = lines[0], lines[1:]
         present[number, rows] = True
     motion /= s ** powers[:, None]
@@ -167,6 +172,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         n_samples=n,
         force=force,
         start_force=start_force,
+        fine_force=fine_force,
         motion=motion,
         noise=known,
         variance=variance,
@@ -206,24 +212,29 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
     return [_Cut(i, blow, start, is_moving=True) for i, blow in enumerate(blows) for start in parts], n
 
 
-def _lines(cut: _Cut, n: int, sigma: float) -> tuple[ComplexArray, FloatArray]:
+def _lines(cut: _Cut, finer: FloatArray, sigma: float) -> tuple[ComplexArray, FloatArray]:
     """Transform force and responses, and read the force and its slope at the start.
 
     A signal that jumps at the start is not band-limited: the sum over samples is off by half the first one, and, on
     finer samples, by little more.
     """
-    signals, step = np.vstack([cut.blow.force, cut.blow.responses]), cut.blow.step_s
+    step = cut.blow.step_s
+    n = finer.shape[1] // FINER
     if not cut.is_moving:
-        decay = np.exp(-sigma * step * np.arange(n)) * step
-        return np.fft.rfft(signals[:, cut.start : cut.start + n] * decay, axis=1), np.zeros(2)
+        signals = np.vstack([cut.blow.force, cut.blow.responses])[:, cut.start : cut.start + n]
+        return np.fft.rfft(signals * np.exp(-sigma * step * np.arange(n)) * step, axis=1), np.zeros(2)
     fine = step / FINER
-    around = slice(cut.start - EDGE, min(cut.start + n + EDGE, signals.shape[1]))
-    tapered = _tapered(signals[:, around])
-    finer = resample(tapered, FINER * tapered.shape[1], axis=1)[:, FINER * EDGE : FINER * (EDGE + n)]
     decay = np.exp(-sigma * fine * np.arange(FINER * n)) * fine
     decay[0] /= 2
     slope = (finer[0, 1] - finer[0, 0]) / fine - finer[0, :3] @ np.array([1, -2, 1]) / (2 * fine)
     return np.fft.rfft(finer * decay, axis=1)[:, : n // 2 + 1], np.array([finer[0, 0], slope])
+
+
+def _finer(cut: _Cut, n: int) -> FloatArray:
+    """Force and responses on finer times, (1 + n_sensors, FINER n)."""
+    signals = np.vstack([cut.blow.force, cut.blow.responses])
+    padded = np.pad(signals, ((0, 0), (EDGE, EDGE)))[:, cut.start : cut.start + n + 2 * EDGE]
+    return np.asarray(resample(_tapered(padded), FINER * padded.shape[1], axis=1)[:, FINER * EDGE : FINER * (EDGE + n)])
 
 
 def _tapered(signals: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ class DryFriction(Law):
 
     name = "dry_friction"
     strength_name = "friction_N"
+    holds = True
     phrase = "dry friction of {} N"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:

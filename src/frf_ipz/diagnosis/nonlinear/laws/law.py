@@ -39,6 +39,8 @@ class Law(ABC):
     shape_name: ClassVar[str] = ""
     """The parameter that bends the law; empty for a law without, or for one whose shape is no parameter."""
     strength_can_be_negative: ClassVar[bool] = False
+    holds: ClassVar[bool] = False
+    """It can hold its place still: in a simulation its force is then constant within a time step."""
     phrase: ClassVar[str] = ""
     """What sits at the place, in words, with the strength in braces as a number with its unit."""
 

@@ -1,0 +1,178 @@
+"""Fits a law at its place through a simulation of every blow.
+
+Unlike `refine`, no motion is estimated from the data: the law's force follows from the blows alone, and so does its change
+by each unknown. Steps are damped as long as the simulation gets worse (Levenberg and Marquardt).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.nonlinear.march import March, Yielding, follow, march
+from frf_ipz.diagnosis.nonlinear.motion import Clock
+from frf_ipz.diagnosis.nonlinear.place import PlaceInTime
+from frf_ipz.diagnosis.nonlinear.plant import PlantResponse, respond
+from frf_ipz.diagnosis.nonlinear.refine import LawFit, Start
+from frf_ipz.diagnosis.nonlinear.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.stretches import FINER
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
+FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
+SETTLED = 3e-3  # relative drop of the cost
+LONGEST = 0.5  # relative change of a law's number in one step
+WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Shot:
+    """A simulation of all stretches."""
+
+    start: Start
+    response: PlantResponse
+    place: PlaceInTime
+    yielding: Yielding
+    done: March
+    force: ComplexArray
+    misfit: FloatArray
+
+    @property
+    def cost(self) -> float:
+        cost = float(self.misfit @ self.misfit + self.start.unknowns @ self.start.unknowns)
+        return cost if np.isfinite(cost) else np.inf
+
+
+def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: int = 6) -> LawFit:
+    """Fit a law at a place.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    freedom : Freedom
+        Unknowns of the linear model.
+    start : Start
+        Law, place, and first values; the strength is not zero.
+    iterations : int
+        Steps at most; with 0 the start is only simulated.
+
+    Returns
+    -------
+    LawFit
+        The best simulation.
+    """
+    shot, damping = _fire(stretches, freedom, start), FIRST_DAMPING
+    rows = _slopes(stretches, freedom, shot)
+    for _ in range(iterations):
+        before = shot.cost
+        while damping < MOST_DAMPING:
+            trial = _fire(stretches, freedom, _step(shot, rows, damping))
+            if trial.cost < shot.cost:
+                break
+            damping *= SLOWER
+        else:
+            break
+        shot, damping = trial, damping * FASTER
+        rows = _slopes(stretches, freedom, shot)
+        if shot.cost > (1 - SETTLED) * before:
+            break
+    return _finish(shot, rows)
+
+
+def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
+    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
+    yielding = place.yielding(constant=start.law.holds)
+    with np.errstate(over="ignore", invalid="ignore"):  # a step too far may run away: its cost is infinite
+        done = march(start.law, (start.strength, start.shape), yielding, *place.without_law())
+    response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns))
+    force = _lines(stretches, done.force, holds=start.law.holds)
+    shown = linear_motion(stretches, freedom, response) - response.to_sensors(start.place) * force[:, None]
+    shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+    used = stretches.used
+    misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
+    return _Shot(start=start, response=response, place=place, yielding=yielding, done=done, force=force, misfit=misfit)
+
+
+def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexArray:
+    """Transform a law's force; one that is constant within steps acts half a step earlier than its time says."""
+    clock = Clock(stretches, oversampling=FINER, fades=False)
+    lines = clock.at_lines(np.where(np.isfinite(force), force, 0.0))
+    lines[~np.isfinite(force).all(-1)] = np.inf
+    return lines * np.exp(stretches.s * clock.step_s / 2) if holds else lines
+
+
+def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
+    """Derivatives of the weighted responses by unknowns, strength and shape (times their size), (.., n_rows)."""
+    start, used, n_free = shot.start, stretches.used, len(freedom.modes)
+    changes = shot.place.changes(shot.done.force)
+    by_force = follow(start.law, shot.yielding, shot.done, changes)
+    to_sensors = shot.response.to_sensors(start.place)[:, used]
+    weight = 1 / np.sqrt(stretches.variance[:, :, used])
+    lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
+    seen = -to_sensors * lines[:, :, None] * weight
+    on_used = replace(shot.response, s=stretches.s[used], modes=shot.response.modes[:, used])
+    shapes = freedom.plant.at_places.shapes[start.place]
+    rows = freedom.columns(stretches, on_used, -shot.force[:, used], shapes)
+    rows[: 2 * n_free] += seen[: 2 * n_free]
+    first = 2 * n_free + freedom.sensors.size
+    for number in range(len(freedom.inputs)):
+        mine = stretches.input_of == number
+        rows[first + number * n_free : first + (number + 1) * n_free, mine] += seen[2 * n_free : 3 * n_free, mine]
+    first += freedom.inputs.size
+    for which in range(2 if len(freedom.moving) else 0):
+        for blow in freedom.moving:
+            rows[first : first + n_free, blow] += seen[(3 + which) * n_free : (4 + which) * n_free, blow]
+            first += n_free
+    return as_real(np.concatenate([rows, seen[len(changes) :]]))
+
+
+def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    n = len(shot.start.unknowns)
+    prior = np.full(len(rows), WEAK_PRIOR)
+    prior[:n] = 1.0
+    right = rows @ shot.misfit
+    right[:n] -= shot.start.unknowns
+    return rows @ rows.T + np.diag(prior), right
+
+
+def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
+    start, n = shot.start, len(shot.start.unknowns)
+    normal, right = _normal(shot, rows)
+    damped = normal + damping * np.diag(np.diag(normal))
+    step = linalg.cho_solve(linalg.cho_factor(damped, lower=True), right)
+    step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
+    shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
+    return replace(
+        start, strength=float(start.strength * (1 + step[n])), shape=float(shape), unknowns=start.unknowns + step[:n]
+    )
+
+
+def _finish(shot: _Shot, rows: FloatArray) -> LawFit:
+    start, n = shot.start, len(shot.start.unknowns)
+    normal, _ = _normal(shot, rows)
+    inverse = linalg.cho_solve(linalg.cho_factor(normal, lower=True), np.eye(len(rows))[:, n:])[n:]
+    sizes = np.array([start.strength, start.shape])[: len(rows) - n]
+    covariance = np.zeros((2, 2))
+    covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
+    return LawFit(
+        law=start.law,
+        place=start.place,
+        strength=start.strength,
+        shape=start.shape,
+        unknowns=start.unknowns,
+        cost=shot.cost,
+        n_rows=len(shot.misfit),
+        covariance=covariance,
+        motion=shot.done.motion,
+        velocity=shot.done.velocity,
+        force=shot.force,
+        misfit=shot.misfit,
+    )
