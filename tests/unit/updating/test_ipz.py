@@ -1,0 +1,142 @@
+"""The published step by step: its sensitivities, and what the method refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.published.step import PublishedStep, StepSettings
+from frf_ipz.updating.update import method_names, update_model
+from frf_ipz.updating.updated_model import UpdateStatus
+from updating_bench.paper_cases import section_4, section_5
+from updating_study import set_up
+
+STEP = 1e-4  # relative change of the root that moves most
+SLOPES = 1e-4  # of the largest entry of a row: roots are good to 1e-9 without balancing, and bend by the step
+RATIO = 20.0  # times the damping of the paper, so that vectors are complex in earnest
+IPZ = UpdateOptions(method="ipz", damping=False, max_iterations=5)
+
+
+def step_of(case, *, damping=False, cross=True, ratio=1.0):
+    """The published step of a paper's case; `ratio` multiplies the damping, so that vectors are complex in earnest."""
+    model, targets = case.reduced, case.pairs.targets
+    label = case.fit.labels[0]
+    return PublishedStep(
+        model.mass,
+        ratio * model.damping,
+        model.stiffness,
+        sensor=model.dofs.index(label.output_dof.unsigned),
+        actuator=model.dofs.index(label.input_dof.unsigned),
+        targets=case.targets,
+        computed=np.array([pair.computed_value for pair in targets]),
+        n_poles=4,
+        settings=StepSettings(alpha=0.1, beta=1.0, cross_sensitivities=cross, damping=damping),
+    )
+
+
+def roots_with(step, matrix):
+    step.evaluate(matrix)
+    return step.roots[0] + 1j * step.roots[1]
+
+
+def sensitivity_by_differences(case, step, place, size_of_step, *, damping):
+    """Change of all targets with one chosen eigenvalue of the matrix, or of its substructure, eqs. (22) and (24)."""
+    matrix = (step.damping if damping else step.stiffness).take(step.back)
+    size = step.order - 1
+    if place < step.n_poles:
+        change = np.outer(step.vectors[:, place], step.duals[place])
+    else:
+        change = np.zeros((step.order, step.order))
+        change[:size, :size] = np.outer(step.vectors[:size, place], step.duals[place, :size])
+    whole = np.zeros_like(change)
+    whole[np.ix_(step.rows, step.columns)] = size_of_step * change
+    other = step_of(case, damping=damping, ratio=RATIO)
+    return (roots_with(other, matrix + whole) - roots_with(other, matrix - whole)) / (2 * size_of_step)
+
+
+@pytest.mark.parametrize("damping", [False, True], ids=["stiffness", "damping"])
+@pytest.mark.parametrize("make", [section_4, section_5], ids=["section 4", "section 5"])
+def test_all_sensitivities_against_differences(make, damping):
+    case = make()
+    step = step_of(case, damping=damping, ratio=RATIO)
+    step.evaluate((step.damping if damping else step.stiffness).take(step.back))
+    step._eigenvectors()
+    found = step._sensitivity().copy() / step.weights
+    for place in range(7):
+        size = STEP / np.max(np.abs(found[place]) / np.abs(case.targets))
+        expected = sensitivity_by_differences(case, step, place, size, damping=damping)
+        assert np.abs(found[place] - expected).max() < SLOPES * np.abs(expected).max()
+
+
+def test_cross_sensitivities_are_left_out_on_request():
+    step = step_of(section_4(), cross=False)
+    step.evaluate(step.stiffness.take(step.back))
+    step._eigenvectors()
+    found = step._sensitivity()
+    assert not found[4:, :4].any()
+    assert not found[:4, 4:].any()
+    assert found[:4, :4].any()
+
+
+def test_a_step_goes_towards_the_targets():
+    step = step_of(section_4())
+    matrix = step.stiffness.take(step.back)
+    before = step.evaluate(matrix)
+    step.settings = replace(step.settings, beta=0.01)
+    after = step.evaluate(step.step())
+    assert after < before
+
+
+def test_a_pencil_without_the_wanted_roots_is_refused():
+    case = section_4()
+    with pytest.raises(NumericalError, match="fewer poles or zeros"):
+        step_of(replace(case, fit=case.fit), ratio=1e4)
+
+
+def test_the_sensor_must_be_retained():
+    case = section_4()
+    model = replace(case.reduced, dofs=tuple(Dof(dof.node + 100, "z") for dof in case.reduced.dofs))
+    with pytest.raises(InputError, match="among \\[reduce\\] dofs"):
+        update_model(model, case.fit, case.pairs, IPZ)
+
+
+def test_several_frfs_take_turns():
+    bench = set_up(0)
+    assert len(bench.labels) == 1
+    bench = set_up(4)
+    assert len(bench.labels) > 1
+    updated = update_model(bench.reduced, bench.fit, bench.pairs, replace(IPZ, beta=0.05, max_iterations=200))
+    assert updated.history.misfit.iloc[-1] < updated.history.misfit.iloc[0]
+    assert any("(FRF 2)" in name for name in updated.history.columns)
+
+
+def test_without_targets_there_is_nothing_to_do():
+    case = section_4()
+    updated = update_model(case.reduced, case.fit, Pairs(rows=()), IPZ)
+    assert updated.status is UpdateStatus.NOTHING_TO_DO
+
+
+def test_the_limit_of_iterations_is_said():
+    case = section_4()
+    updated = update_model(case.reduced, case.fit, case.pairs, IPZ)
+    assert updated.status is UpdateStatus.MAX_ITERATIONS
+    assert updated.history.iteration.tolist() == [1, 2, 3, 4, 5]
+    assert updated.ensemble.shape == (0, 3, 6, 6)
+
+
+def test_a_step_that_is_too_large_diverges_and_returns_the_best():
+    case = section_4()
+    updated = update_model(case.reduced, case.fit, case.pairs, replace(IPZ, beta=30.0, alpha=0.0, max_iterations=500))
+    assert updated.status is UpdateStatus.DIVERGED
+    assert np.isfinite(updated.model.stiffness).all()
+
+
+def test_methods_are_found_by_their_modules():
+    assert method_names() == ("ipz", "minimal-change")
+    case = section_4()
+    with pytest.raises(InputError, match="did you mean 'minimal-change'"):
+        update_model(case.reduced, case.fit, case.pairs, UpdateOptions(method="minimal"))
