@@ -106,13 +106,20 @@ def _run(bench: Workbench, request: Request) -> Response:
 
 def _file(bench: Workbench, request: Request) -> Response:
     """Send a file of the run; whatever lies outside, and what begins with a dot, is not there."""
-    wanted = Path(request.path_params["path"])
-    path = (bench.folder / wanted).resolve()
-    inside = path.is_relative_to(bench.folder)
-    if not inside or any(part.startswith(".") for part in wanted.parts) or not path.is_file():
+    path = _inside(bench.folder, str(request.path_params["path"]))
+    if path is None:
         return PlainTextResponse("There is no such file in this run.\n", 404)
     headers = {"content-security-policy": REPORT_POLICY} if path.suffix == ".html" else {}
     return FileResponse(path, headers=headers)
+
+
+def _inside(folder: Path, name: str) -> Path | None:
+    try:
+        path = (folder / name).resolve()
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+    except (OSError, ValueError):  # a link that goes round, a zero byte; not below the folder
+        return None
+    return path if path.is_file() and not hidden else None
 
 
 def _answering(

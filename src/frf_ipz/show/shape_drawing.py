@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 FLAT = 1e-6  # of the largest extent: thinner than this is flat
 MOST_NODES = 3000  # that are drawn; of more, some
 REACH = 0.16  # of the largest extent: how far the drawing moves at most
+MOST_BEYOND = 3.0  # a model that moves more than this many times what was measured leaves the drawing
 TALL = 1.25  # of the drawing against what moves in it
+BESIDE = 0.15  # of the margin above: a row of nodes moves upwards only
 AXES = {"x": 0, "y": 1, "z": 2}
 
 
@@ -39,13 +41,10 @@ def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
     """
     nodes, positions, lines = _plan(geometry, shape.motions)
     is_row = not np.ptp(positions[:, 1:]) if len(nodes) else True
-    extent = max(float(np.ptp(positions, axis=0).max(initial=0.0)), np.finfo(float).tiny)
+    extent = (float(np.ptp(positions, axis=0).max()) if len(nodes) else 0.0) or 1.0
     place = {int(node): row for row, node in enumerate(nodes)}
     moves = [_move(motion, place, is_row=is_row) for motion in shape.motions]
-    # A model that is far off at a resonance would leave the measurement without a visible motion.
-    reference = [move for motion, (_, move) in zip(shape.motions, moves, strict=True) if motion.name == "measured"]
-    largest = max((float(np.abs(move).max(initial=0.0)) for move in reference), default=0.0)
-    scale = REACH * extent / largest if largest > 0 else 0.0
+    scale = _scale(shape, [move for _, move in moves], extent)
     ground = _project(positions, is_row=is_row)
     drawn = [
         {
@@ -62,7 +61,7 @@ def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
         "title": shape.title,
         "ground": _digits(ground, extent),
         "lines": [[place[int(a)], place[int(b)]] for a, b in lines if int(a) in place and int(b) in place],
-        "frame": _frame(ground, extent),
+        "frame": _frame(ground, extent, is_row=is_row),
         "motions": drawn,
     }
 
@@ -105,10 +104,19 @@ def _project(points: Any, *, is_row: bool) -> Any:  # noqa: ANN401  positions ar
     return np.stack([(x - y) * np.cos(np.pi / 6), z + (x + y) * np.sin(np.pi / 6)], 1)
 
 
-def _frame(ground: FloatArray, extent: float) -> list[float]:
+def _scale(shape: Shape, moves: Sequence[ComplexArray], extent: float) -> float:
+    """Metres drawn for a motion of 1: a model that is far off must not leave the measurement without a visible one."""
+    sizes = {
+        motion.name: float(np.abs(move).max(initial=0.0)) for motion, move in zip(shape.motions, moves, strict=True)
+    }
+    largest = min(max(sizes.values(), default=0.0), MOST_BEYOND * sizes.get("measured", np.inf))
+    return REACH * extent / largest if largest > 0 else 0.0
+
+
+def _frame(ground: FloatArray, extent: float, *, is_row: bool) -> list[float]:
     if not len(ground):
         return [0.0, 0.0, 1.0, 1.0]
-    margin = TALL * REACH * extent
+    margin = TALL * REACH * extent * np.array([BESIDE if is_row else 1.0, 1.0])
     low, high = ground.min(axis=0) - margin, ground.max(axis=0) + margin
     return [float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1])]
 

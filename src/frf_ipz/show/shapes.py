@@ -193,5 +193,6 @@ def _onto(motion: Motion, measured: Motion, hertz: float) -> Motion:
     factor = np.vdot(mine, theirs) / (np.vdot(mine, mine).real or 1.0)
     title = f"{motion.name}, {hertz:.5g} Hz"
     if len(both) > 1:
-        title += f", MAC {float(modal_assurance(mine[:, None], theirs[:, None])[0, 0]):.3f}"
+        alike = float(modal_assurance(mine[:, None], theirs[:, None])[0, 0])
+        title += f", MAC {alike:.3f} at {len(both)} DOFs"
     return Motion(name=motion.name, title=title, dofs=motion.dofs, values=motion.values * factor)

@@ -1,0 +1,187 @@
+"""What the server answers, and whom it refuses."""
+
+import re
+
+import pytest
+from starlette.testclient import TestClient
+
+from frf_ipz.errors import InputError
+from frf_ipz.show.app import build_app
+from frf_ipz.show.workbench import Workbench
+
+PORT, TOKEN = 8765, "drawn-at-random"
+HOME = f"/{TOKEN}/"
+PIN = {"kind": "pin", "hz": 250.0}
+SOON_S = 60.0
+
+
+@pytest.fixture
+def runs():
+    return []
+
+
+@pytest.fixture
+def bench(demo, runs):
+    return Workbench(demo / "out", lambda path, _, **__: runs.append(path))
+
+
+@pytest.fixture
+def client(bench):
+    app = build_app(bench, port=PORT, token=TOKEN)
+    return TestClient(app, base_url=f"http://127.0.0.1:{PORT}", raise_server_exceptions=True)
+
+
+def test_the_page_holds_the_report_and_the_forms_and_asks_nothing_of_the_network(client):
+    page = client.get(HOME)
+    assert page.status_code == 200
+    for part in ('id="stabilisation"', 'id="structure"', 'id="pole-form"', 'id="point-form"', 'id="blow-choices"'):
+        assert part in page.text
+    addresses = re.findall(r'(?:src|href)="([^"#]+)"', page.text)
+    assert not [address for address in addresses if re.match(r"\w+:|//|/", address) and address != "data:,"]
+    for address in {address for address in addresses if address != "data:,"}:
+        assert client.get(HOME + address).status_code == 200, address
+
+
+def test_a_change_is_written_answered_and_run(client, bench, runs):
+    answer = client.post(HOME + "change", json=PIN)
+    assert answer.status_code == 200
+    assert "a mode pinned at 250 Hz" in answer.json()["choices"]
+    bench.wait(SOON_S)
+    assert runs == [bench.pipeline]
+    assert bench.choices().fit.pin_hz == (250.0,)
+    state = client.get(HOME + "state").json()
+    assert (state["running"], state["error"], state["stamp"]) == (False, "", bench.stamp)
+
+
+def test_running_again_changes_nothing(client, bench, runs):
+    text = bench.text()
+    assert client.post(HOME + "run", json={}).status_code == 200
+    bench.wait(SOON_S)
+    assert (runs, bench.text()) == ([bench.pipeline], text)
+
+
+def test_a_wrong_change_is_answered_with_a_sentence(client, bench):
+    text = bench.text()
+    answer = client.post(HOME + "change", json={"kind": "strike", "hz": 101.8})
+    assert (answer.status_code, bench.text()) == (400, text)
+    assert answer.json()["error"].startswith("say why")
+
+
+def test_shapes_of_a_mode_and_at_a_frequency(client):
+    mode = client.get(HOME + "shape", params={"mode": "1"}).json()
+    assert [motion["name"] for motion in mode["motions"]] == ["nominal", "updated", "measured"]
+    operating = client.get(HOME + "shape", params={"hz": "60", "input": "89:+z"}).json()
+    assert operating["title"] == "At 60 Hz for 1 N at 89:+z"
+    for wrong in ({"mode": "99"}, {"mode": "x"}, {"hz": "60", "input": "1:+z"}, {"hz": "nan", "input": "89:+z"}, {}):
+        assert client.get(HOME + "shape", params=wrong).status_code == 400, wrong
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"host": "evil.example"},
+        {"host": f"evil.example:{PORT}"},
+        {"host": "127.0.0.1"},
+        {"host": "127.0.0.1:1"},
+        {"host": ""},
+        {"origin": "http://evil.example"},
+        {"origin": f"http://evil.example:{PORT}"},
+        {"origin": "null"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_other_sites_are_refused(client, bench, runs, headers, method):
+    text = bench.text()
+    address = HOME + ("change" if method == "POST" else "")
+    answer = client.request(method, address, headers=headers, json=PIN if method == "POST" else None)
+    assert answer.status_code == 403
+    assert (bench.text(), runs) == (text, [])
+
+
+@pytest.mark.parametrize("host", [f"127.0.0.1:{PORT}", f"localhost:{PORT}"])
+def test_the_page_itself_is_let_in(client, host):
+    headers = {"host": host, "origin": f"http://{host}", "sec-fetch-site": "same-origin"}
+    assert client.post(HOME + "change", json=PIN, headers=headers).status_code == 200
+
+
+@pytest.mark.parametrize("address", ["/", "/change", "/state", f"/{TOKEN[:-1]}/", f"/{TOKEN}x/", "//", f"//{TOKEN}/"])
+def test_nothing_is_there_without_the_token(client, bench, address):
+    text = bench.text()
+    assert client.get(address).status_code == 403
+    assert client.post(address, json=PIN).status_code == 403
+    assert bench.text() == text
+
+
+def test_changes_come_as_short_json_only(client, bench):
+    text = bench.text()
+    plain = {"content-type": "text/plain"}
+    assert client.post(HOME + "change", content='{"kind": "pin", "hz": 250}', headers=plain).status_code == 415
+    assert client.post(HOME + "change", content="{", headers={"content-type": "application/json"}).status_code == 400
+    assert client.post(HOME + "change", json={**PIN, "x": "y" * 30_000}).status_code == 413
+    assert client.get(HOME + "change").status_code == 405
+    assert bench.text() == text
+
+
+def test_files_of_the_run_can_be_had_and_no_others(client, bench, demo):
+    assert client.get(HOME + "run/poles.parquet").content == (demo / "out" / "poles.parquet").read_bytes()
+    (demo / "secret.txt").write_text("secret", encoding="utf-8")
+    (demo / "out2").mkdir()
+    (demo / "out2" / "secret.txt").write_text("secret", encoding="utf-8")
+    (bench.folder / "link.txt").symlink_to(demo / "secret.txt")
+    (bench.folder / ".partial-1").mkdir()
+    (bench.folder / ".partial-1" / "secret.txt").write_text("secret", encoding="utf-8")
+    outside = [
+        "../secret.txt",
+        "..%2fsecret.txt",
+        "%2e%2e/secret.txt",
+        "%2e%2e%2fsecret.txt",
+        "stages/..%2f..%2fsecret.txt",
+        "..%2fout2/secret.txt",
+        "%2fetc%2fpasswd",
+        "/etc/passwd",
+        str(demo / "secret.txt"),
+        "link.txt",
+        ".partial-1/secret.txt",
+        "stages",
+        "",
+        "x%00y",
+    ]
+    for path in outside:
+        answer = client.get(f"{HOME}run/{path}")
+        assert (answer.status_code, "secret" in answer.text) == (404, False), path
+
+
+def test_every_answer_forbids_foreign_frames_scripts_and_copies(client):
+    for address in (HOME, HOME + "state", HOME + "run/report.html", "/elsewhere"):
+        headers = client.get(address).headers
+        assert "default-src 'none'" in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "no-referrer"
+    assert "access-control-allow-origin" not in client.get(HOME, headers={"origin": f"http://127.0.0.1:{PORT}"}).headers
+
+
+def test_a_run_without_its_pipeline_file_is_shown_without_forms(client, bench):
+    bench.pipeline.unlink()
+    page = client.get(HOME)
+    assert "Nothing can be changed" in page.text
+    assert 'id="pole-form"' not in page.text
+
+
+def test_what_the_page_shows_of_the_file_is_escaped(client):
+    wish = {"kind": "strike", "hz": 101.8, "why": "<img src=x onerror=alert(1)>"}
+    assert client.post(HOME + "change", json=wish).status_code == 200
+    page = client.get(HOME).text
+    assert "<img" not in page
+    assert "&lt;img src=x" in page
+
+
+def test_a_damaged_result_is_said(client, bench):
+    (bench.folder / "stages" / "fit.npz").write_bytes(b"no archive")
+    answer = client.get(HOME)
+    assert answer.status_code == 400
+    assert "is damaged" in answer.json()["error"]
+    with pytest.raises(InputError):
+        bench.contents()

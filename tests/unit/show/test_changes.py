@@ -1,0 +1,147 @@
+"""Changes of pipeline.toml: what is written, and that all else in the file stays."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.show.changes import to_change
+from frf_ipz.show.pipeline_text import changed_text, parse, write_text
+
+PATH = Path("pipeline.toml")
+TEXT = """# my beam
+[pipeline]
+test = "test.toml"   # as measured
+
+[fit]
+# order matters to nobody
+band_hz = [10.0, 700.0]  # Hz
+pin_hz = [
+  100.0, # sure of it
+]
+
+[predict]
+points = ["49:+z"]
+"""
+
+
+def after(*wishes, text=TEXT):
+    for wish in wishes:
+        text = changed_text(text, to_change(wish, PATH), PATH)
+    return text
+
+
+def fit_of(text):
+    return parse(text, PATH).fit
+
+
+def test_a_strike_is_added_and_every_other_line_stays():
+    text = after({"kind": "strike", "hz": 143.21987654, "why": "mains "})
+    assert [(one.hz, one.why) for one in fit_of(text).strike] == [(143.22, "mains")]
+    assert [line for line in text.splitlines() if "strike" not in line] == TEXT.splitlines()
+
+
+def test_a_strike_needs_a_reason():
+    with pytest.raises(InputError, match="say why"):
+        after({"kind": "strike", "hz": 143.2, "why": "  "})
+
+
+def test_a_strike_takes_the_pin_beside_it_away_and_a_pin_the_strike():
+    struck = after({"kind": "strike", "hz": 100.5, "why": "no mode"})
+    assert fit_of(struck).pin_hz == ()
+    pinned = fit_of(after({"kind": "pin", "hz": 101.0}, text=struck))
+    assert (pinned.pin_hz, pinned.strike) == ((101.0,), ())
+
+
+def test_a_pin_replaces_the_one_beside_it():
+    assert fit_of(after({"kind": "pin", "hz": 101.0}, {"kind": "pin", "hz": 250.0})).pin_hz == (101.0, 250.0)
+
+
+def test_taking_back_takes_only_that_entry():
+    strikes = [{"kind": "strike", "hz": hz, "why": "x"} for hz in (50.0, 50.4)]
+    text = after(*strikes, {"kind": "strike", "hz": 50.4, "on": False})
+    assert [one.hz for one in fit_of(text).strike] == [50.0]
+
+
+def test_taking_all_back_gives_the_text_that_was_there():
+    wish = {"kind": "strike", "hz": 143.2, "why": "mains"}
+    assert after(wish, {**wish, "on": False}) == TEXT
+
+
+def test_strikes_written_as_tables_are_kept_as_tables():
+    text = TEXT.replace("[predict]", '[[fit.strike]]\nhz = 60.0 # hum\nwhy = "mains"\n\n[predict]')
+    changed = after({"kind": "strike", "hz": 143.2, "why": "a cable"}, text=text)
+    assert [one.hz for one in fit_of(changed).strike] == [60.0, 143.2]
+    assert changed.count("[[fit.strike]]") == 2
+    assert "# hum" in changed
+    left = after(*({"kind": "strike", "hz": hz, "on": False} for hz in (60.0, 143.2)), text=changed)
+    assert fit_of(left).strike == ()
+
+
+def test_stretches_and_the_band():
+    text = after({"kind": "leave", "low_hz": 49.5, "high_hz": 50.5}, {"kind": "band", "low_hz": 0, "high_hz": 300})
+    assert fit_of(text).exclude_hz == ((49.5, 50.5),)
+    assert fit_of(text).band_hz == (0.0, 300.0)
+    text = after(
+        {"kind": "leave", "low_hz": 49.5, "high_hz": 50.5, "on": False}, {"kind": "band", "on": False}, text=text
+    )
+    assert (fit_of(text).exclude_hz, fit_of(text).band_hz) == ((), None)
+
+
+def test_blows_are_kept_dropped_and_left_to_the_checks():
+    drop = {"kind": "blow", "name": "hits/p18_03.csv", "use": "drop"}
+    text = after(drop)
+    assert parse(text, PATH).ingest.drop == ("hits/p18_03.csv",)
+    text = after({**drop, "use": "keep"}, text=text)
+    ingest = parse(text, PATH).ingest
+    assert (ingest.keep, ingest.drop) == (("hits/p18_03.csv",), ())
+    assert parse(after({**drop, "use": "checks"}, text=text), PATH).ingest.keep == ()
+
+
+def test_points_are_added_once_and_taken_back():
+    text = after({"kind": "point", "dof": "24:z"}, {"kind": "point", "dof": "24:+z"})
+    assert parse(text, PATH).predict.points == ("49:+z", "24:+z")
+    assert parse(after({"kind": "point", "dof": "49:z", "on": False}, text=text), PATH).predict.points == ("24:+z",)
+
+
+def test_a_section_that_is_missing_is_made():
+    text = after({"kind": "pin", "hz": 5.0}, text='[pipeline]\ntest = "t.toml"\n')
+    assert tomllib.loads(text) == {"pipeline": {"test": "t.toml"}, "fit": {"pin_hz": [5.0]}}
+
+
+def test_text_of_others_cannot_break_out_of_its_string():
+    why = 'x"\n[pipeline]\ntest = "/etc/passwd" \u0000 # \\'
+    text = after({"kind": "strike", "hz": 5.0, "why": why})
+    assert tomllib.loads(text)["pipeline"] == {"test": "test.toml"}
+    assert tomllib.loads(text)["fit"]["strike"][0]["why"] == " ".join(why.split())
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        ({"kind": "strik", "hz": 1.0}, "did you mean 'strike'"),
+        ("strike", "there is no change"),
+        ({"kind": "pin", "hz": 1.0, "command": "rm"}, "unknown key 'command'"),
+        ({"kind": "pin"}, "'hz' is missing"),
+        ({"kind": "pin", "hz": "high"}, "number"),
+        ({"kind": "pin", "hz": float("nan")}, "is no frequency"),
+        ({"kind": "pin", "hz": -3.0}, "is no frequency"),
+        ({"kind": "leave", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
+        ({"kind": "blow", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
+        ({"kind": "point", "dof": "tip"}, "is no DOF label"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(wish, message):
+    with pytest.raises(InputError, match=message):
+        after(wish)
+
+
+def test_a_file_keeps_its_line_ends_and_its_mode(tmp_path):
+    path = tmp_path / "pipeline.toml"
+    path.write_bytes(TEXT.replace("\n", "\r\n").encode())
+    path.chmod(0o640)
+    write_text(path, after({"kind": "pin", "hz": 250.0}))
+    assert path.read_bytes().count(b"\r\n") == path.read_bytes().count(b"\n") > 1
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert [left.name for left in tmp_path.iterdir()] == ["pipeline.toml"]

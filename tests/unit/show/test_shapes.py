@@ -1,0 +1,145 @@
+"""Shapes: measured and model are the same motion where the measurement is the model's own."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chains import chain, label
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.numerics.pencils import damped_poles
+from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.show.shape_drawing import REACH, draw_shape
+from frf_ipz.show.shapes import Motion, Shape, mode_shape, operating_shape
+from frf_ipz.structure import Geometry
+
+ROUNDING = 1e-9  # of the largest value: a 5 by 5 solve, and eigenvectors of a lightly damped pencil
+LABELS = (
+    label(-2, 4, FrfQuantity.ACCELERANCE),
+    label(3, 4, FrfQuantity.ACCELERANCE),
+    label(5, 4, FrfQuantity.MOBILITY),
+    label(5, -1, FrfQuantity.RECEPTANCE),
+)
+
+
+def poles_of(model):
+    roots = damped_poles(model.mass, model.damping, model.stiffness)
+    upper = roots.take(np.flatnonzero(roots.values.imag > 0))
+    return upper.take(np.argsort(np.abs(upper.values)))
+
+
+def measured_run(model, nominal):
+    """FRFs and a fit that are the model's own, paired with a nominal model."""
+    frequency = np.linspace(1.0, 80.0, 80)
+    s = 2j * np.pi * frequency
+    frfs = SimpleNamespace(frequency_hz=frequency, s=s, values=model_frfs(model, LABELS, s), labels=LABELS)
+    roots, others = poles_of(model), poles_of(nominal)
+    shapes = np.stack(
+        [
+            roots.right[[abs(one.output_dof.node) - 1 for one in LABELS]],
+            roots.right[[one.input_dof.node - 1 for one in LABELS]],
+        ]
+    ).prod(axis=0)
+    signs = np.array([one.sign for one in LABELS])
+    powers = np.array([one.quantity.power for one in LABELS])
+    residues = (shapes * signs[:, None]).T * roots.values[:, None] ** powers
+    fit = SimpleNamespace(n_modes=5, labels=LABELS, model=SimpleNamespace(poles=roots.values, residues=residues))
+    targets = [
+        SimpleNamespace(kind="pole", measured=k, computed_value=value, verdict=Verdict.PAIRED)
+        for k, value in enumerate(others.values)
+    ]
+    updated = SimpleNamespace(model=model, nominal=nominal, after=roots.values)
+    return SimpleNamespace(fit=fit, frfs=frfs, updated=updated, pairs=SimpleNamespace(targets=targets))
+
+
+@pytest.fixture
+def run():
+    return measured_run(chain(seed=1), chain(seed=2))
+
+
+def at(motion, dofs):
+    values = dict(zip(motion.dofs, motion.values, strict=True))
+    return np.array([values[dof] for dof in dofs])
+
+
+def test_the_operating_shape_of_a_model_is_that_of_its_own_frfs(run):
+    nominal, updated, measured = operating_shape(run, 33.2, "4:+x").motions
+    assert [motion.name for motion in (nominal, updated, measured)] == ["nominal", "updated", "measured"]
+    assert measured.dofs == (Dof(2, "x"), Dof(3, "x"), Dof(5, "x"))
+    assert_allclose(at(updated, measured.dofs), measured.values, rtol=ROUNDING)
+    assert np.abs(at(nominal, measured.dofs) / measured.values - 1).max() > 0.1
+
+
+def test_a_blow_in_the_negative_direction_turns_the_shape(run):
+    _, updated, measured = operating_shape(run, 33.2, "1:-x").motions
+    assert_allclose(at(updated, measured.dofs), measured.values, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_a_mode_of_the_updated_model_is_the_measured_one(run, number):
+    nominal, updated, measured = mode_shape(run, number).motions
+    assert set(measured.dofs) == {Dof(2, "x"), Dof(3, "x"), Dof(5, "x")}
+    assert_allclose(at(updated, measured.dofs), measured.values, atol=1e-7 * np.abs(measured.values).max(), rtol=0)
+    assert "MAC 1.000 at 3 DOFs" in updated.title
+    assert np.abs(measured.values.real).max() == pytest.approx(1.0, rel=1e-3)
+    assert f"{abs(poles_of(run.updated.nominal).values[number]) / 2 / np.pi:.5g} Hz" in nominal.title
+
+
+def test_a_run_without_a_model_has_the_measured_shape_alone(run):
+    run.updated = run.pairs = None
+    assert [motion.name for motion in mode_shape(run, 0).motions] == ["measured"]
+    assert [motion.name for motion in operating_shape(run, 20.0, "4:+x").motions] == ["measured"]
+
+
+def test_what_was_not_measured_is_refused(run):
+    for wrong in (-1, 5):
+        with pytest.raises(InputError, match="has no mode"):
+            mode_shape(run, wrong)
+    with pytest.raises(InputError, match="no FRF was measured"):
+        operating_shape(run, 20.0, "7:+x")
+    with pytest.raises(InputError, match="no FRF was measured"):
+        operating_shape(run, np.nan, "4:+x")
+
+
+def shape_of(values, nodes, direction, name="measured"):
+    dofs = tuple(Dof(node, direction) for node in nodes)
+    return Motion(name=name, title=name, dofs=dofs, values=np.asarray(values, complex))
+
+
+def test_a_row_of_nodes_moves_upwards_by_a_fixed_part_of_its_length():
+    geometry = Geometry(
+        nodes=np.array([1, 2, 3]),
+        coordinates_m=np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]),
+        lines=np.array([[1, 2], [2, 3]]),
+    )
+    motions = (shape_of([1, 2j], [2, 3], "z", "updated"), shape_of([-2], [3], "z"))
+    drawn = draw_shape(Shape(title="t", motions=motions), geometry)
+    updated, measured = drawn["motions"]
+    assert measured["at"] == [[2.0, 0.0]]
+    assert_allclose(measured["move"], [[0, -REACH * 2, 0, 0]], atol=1e-4)
+    assert updated["hasLines"]  # node 1 is held: no DOF of it moves
+    assert_allclose(updated["move"], [[0, 0, 0, 0], [0, REACH, 0, 0], [0, 0, 0, REACH * 2]], atol=1e-4)
+    assert drawn["lines"] == [[0, 1], [1, 2]]
+
+
+def test_a_model_that_is_far_off_leaves_the_measurement_visible():
+    motions = (shape_of([1e3], [2], "z", "updated"), shape_of([1.0], [2], "z"))
+    _, measured = draw_shape(Shape(title="t", motions=motions), None)["motions"]
+    assert measured["move"][0][1] == pytest.approx(REACH / 3, rel=1e-3)  # a single node: as if it were 1 m long
+    geometry = Geometry(
+        nodes=np.array([1, 2]), coordinates_m=np.array([[0.0, 0, 0], [3, 0, 0]]), lines=np.array([[1, 2]])
+    )
+    _, measured = draw_shape(Shape(title="t", motions=motions), geometry)["motions"]
+    assert measured["move"][0][1] == pytest.approx(REACH, rel=1e-3)
+
+
+def test_a_plate_is_seen_from_above_at_an_angle():
+    nodes, places = np.array([1, 2, 3]), np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    geometry = Geometry(nodes=nodes, coordinates_m=places, lines=np.array([[1, 2], [1, 3]]))
+    drawn = draw_shape(Shape(title="t", motions=(shape_of([0, 0, 1], [1, 2, 3], "z"),)), geometry)
+    assert_allclose(drawn["ground"], [[0, 0], [0.866, 0.5], [-0.866, 0.5]], atol=1e-3)
+    assert_allclose(drawn["motions"][0]["move"][2], [0, REACH, 0, 0], atol=1e-4)
