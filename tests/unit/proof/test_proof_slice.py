@@ -1,0 +1,24 @@
+"""A slice of the proof with the public command, as a user runs it."""
+
+import json
+
+import pytest
+
+import proof
+from proof_tools.commands import public_command
+
+SLICE = {"linear": 2, "null": 1, "nonlinear": 1, "pair": 0, "unknown": 1}
+
+
+@pytest.mark.slow
+def test_a_slice_of_the_proof_runs_through(tmp_path):
+    counts = [text for group, count in SLICE.items() for text in (f"--{group}", str(count))]
+    proof.main([*counts, "--out", str(tmp_path)], command=public_command())
+    scores = json.loads((tmp_path / "scores.json").read_text(encoding="utf-8"))
+    judged = [case["judgement"] for case in scores["cases"]]
+    assert sorted(one["group"] for one in judged) == ["linear", "linear", "nonlinear", "null", "unknown"]
+    assert {case["fault"] for case in scores["cases"]} == {""}
+    assert {one["verdict"] for one in judged if one["group"] == "null"} == {"consistent"}
+    assert any(one["right"] for one in judged if one["group"] == "linear")
+    assert all(case["stage_s"] is not None for case in scores["cases"])
+    assert (tmp_path / "proof.html").stat().st_size > 10_000
