@@ -86,7 +86,7 @@ def correlated_lines(decay: float) -> int:
     Returns
     -------
     int
-        At least 1. FRFs keep one line in so many, so that whoever fits them may take the lines as independent.
+        At least 1. Of so many lines one is independent: whoever fits takes one in so many.
     """
     if decay < 1e-6:
         return 1

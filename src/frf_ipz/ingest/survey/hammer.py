@@ -191,7 +191,7 @@ def _about_lines(decay: float) -> tuple[str, ...]:
     step = correlated_lines(decay)
     if step == 1:
         return ()
-    return (f"one frequency line in {step} is kept: the exponential window correlates the noise of those between",)
+    return (f"the exponential window correlates the noise of neighbouring lines: one in {step} is independent",)
 
 
 def _about_rest(used: Sequence[BlowFacts], decay_1_s: float) -> tuple[str, ...]:

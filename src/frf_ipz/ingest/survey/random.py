@@ -220,7 +220,7 @@ def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:
         f"FRFs are exact at s = sigma + i omega but for {100 * left:.2g} % of the motion at the end"
     )
     step = correlated_lines(decay_1_s * survey.n_samples * survey.step_s)
-    lines = f"one frequency line in {step} is kept: the window correlates the noise of those between"
+    lines = f"the window correlates the noise of neighbouring lines: one in {step} is independent"
     restless = [record.name for record in survey.used if not record.rested]
     warnings = [f"{name} does not start from rest: its initial motion enters the FRFs" for name in restless]
     return replace(
