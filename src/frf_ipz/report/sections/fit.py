@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.report.contents import RunContents
 
+DOTTED = ". Where the solid curve stays near the dotted one, the fit says all that the data say."
 LARGE = 2.0  # misfit over noise from which a row of the table is marked
 
 
@@ -75,8 +76,8 @@ def _picture(fit: ModalFit, used: FrfSet, fitted: ComplexArray) -> Picture:
         "modulus of the misfit and the standard deviation of the measurement.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*fit.band_hz), *axes),
-        note="Below: solid, modulus of measurement minus fit; dotted, standard deviation of the measurement. Where the "
-        "solid curve stays near the dotted one, the fit says all that the data say.",
+        note="Below: solid, modulus of measurement minus fit; dotted, standard deviation of the measurement"
+        + (DOTTED if np.isfinite(used.variance).any() else ", which is not known here."),
         height_px=620,
         is_over_frequency=True,
     )

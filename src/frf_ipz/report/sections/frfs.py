@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.report.contents import RunContents
 
+NO_VARIANCE = "The variance of these FRFs is not known, so no band is drawn. "
 PHASE_AXIS = {"dtick": 90, "tick0": 0, "range": list(PHASE_LIMITS)}
 
 
@@ -65,6 +66,7 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
     bins = bins_for(frfs.n_frfs)
     traces: list[Trace] = []
     has_coherence = bool(np.isfinite(frfs.coherence).any())
+    has_band = bool(np.isfinite(frfs.variance).any())
     for number_of in range(frfs.n_frfs):
         traces += _frf(frfs, number_of, bins, has_coherence=has_coherence)
     axes = [
@@ -76,12 +78,14 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
     shapes = [] if run.fit is None else [outline(run.fit.band_hz, 0, 1, "@updated/0.06")]
     return Picture(
         name="frf",
-        title="Measured FRFs: magnitude with its 95 % band, phase" + (" and coherence" if has_coherence else ""),
+        title="Measured FRFs: magnitude"
+        + (" with its 95 % band" if has_band else "")
+        + (", phase and coherence" if has_coherence else " and phase"),
         alt=f"Magnitude, phase and coherence of {counted(frfs.n_frfs, 'measured FRF')} from {number(low)} to "
         f"{number(high)} Hz on logarithmic magnitude axes.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*run.band_hz), *axes, shapes=shapes),
-        note="The band is ±1.96 standard deviations from the scatter between blows. "
+        note=("The band is ±1.96 standard deviations from the scatter between blows. " if has_band else NO_VARIANCE)
         + ("Shaded: the band that is fitted. " if shapes else "")
         + "All pictures over frequency zoom together; 'FRFs' at the top chooses what they show.",
         table=_table(frfs),

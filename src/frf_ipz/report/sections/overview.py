@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.prediction.agreement import compare_frfs
-from frf_ipz.report.contents import RunContents
 from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
 from frf_ipz.report.reference import measured_at
 from frf_ipz.report.section import Markup, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
 from frf_ipz.report.wording import counted, listed, number, percent, small_percent
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.report.contents import RunContents
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,13 +161,26 @@ def _measured_card(run: RunContents) -> Card:
     if updated is None or frfs is None:
         return Card("Error at measured points", "unknown", "no FRF was measured")
     measured = frfs.values[run.used_lines()]
-    norm = max(float(np.linalg.norm(measured)), np.finfo(float).tiny)
-    errors = [
-        float(np.linalg.norm(measured - run.model_values(model))) / norm for model in (updated.nominal, updated.model)
-    ]
-    figure = f"{percent(errors[0], 2)} → {percent(errors[1], 2)}"
-    meaning = "of the FRFs' norm, before and after; nothing was measured at the points of interest"
-    return Card("Error at the measured points", figure, meaning)
+    decibels, errors = [], []
+    for model in (updated.nominal, updated.model):
+        values = run.model_values(model)
+        if frfs.unknown_scale != "none":
+            values = values * _gains(values, measured)
+        decibels.append(number(float(np.median(compare_frfs(measured, values).median_db)), 2))
+        errors.append(percent(float(np.linalg.norm(measured - values) / np.linalg.norm(measured)), 2))
+    scaled = frfs.unknown_scale != "none"
+    meaning = "median over the band, before and after"
+    meaning += "; unknown gains are fitted" if scaled else f"; of the FRFs' norm: {errors[0]} → {errors[1]}"
+    meaning += "; nothing was measured at the points of interest" if run.points else ""
+    return Card("Error at the measured points", f"{decibels[0]} → {decibels[1]} dB", meaning)
+
+
+def _gains(values: ComplexArray, measured: ComplexArray) -> FloatArray:
+    """Give the real factor of each FRF that brings it to the measured one on most lines."""
+    tiny = np.finfo(float).tiny
+    ratio = np.median(np.log(np.maximum(np.abs(measured), tiny) / np.maximum(np.abs(values), tiny)), axis=0)
+    sign = np.sign(np.sum((values.conj() * measured).real, axis=0))
+    return np.asarray(sign * np.exp(ratio))
 
 
 def _target_card(run: RunContents) -> Card:
@@ -171,8 +188,8 @@ def _target_card(run: RunContents) -> Card:
     if not rows:
         return Card("Worst target", "none", "no measured pole or zero has a counterpart in the model")
     worst = max(rows, key=lambda row: abs(row.after))
-    meaning = f"{worst.name} at {number(worst.measured_hz)} Hz; before: {small_percent(worst.before)}"
-    return Card("Worst target after updating", small_percent(worst.after), meaning)
+    meaning = f"{worst.name} at {number(worst.measured_hz)} Hz; before: {small_percent(abs(worst.before))}"
+    return Card("Worst target after updating", small_percent(abs(worst.after)), meaning)
 
 
 def _missing_card(run: RunContents) -> Card:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 PART = re.compile(r"stiffness of (?:element|spring|group) (\S+)(?: to (\S+))?")
 MOST_MODES = 30
+MOST_NAMES = 30  # of targets written under the axis
 MOST_PLACES = 400  # drawn along the structure
 STIFF = 0.01  # of the largest flexibility: at places below, a ratio says nothing
 LEAST_EIGENVALUE = 1e-9  # of the largest one: a rigid-body mode has no stiffness to change
@@ -72,7 +73,7 @@ def _targets(rows: Sequence[Target]) -> Picture:
         errors = 100 * np.abs(np.array(values))
         hover = "%{text}: %{y:.4g} % off"
         traces.append(markers(x, np.maximum(errors, 1e-6), name, colour, symbol=symbol, text=texts, hover=hover))
-    step = max(1, len(rows) // 40)
+    step = -(-len(rows) // MOST_NAMES)
     axis = {
         "title": {"text": "Target"},
         "tickvals": x[::step].tolist(),

@@ -1,0 +1,62 @@
+"""Every picture draws from the results of a run, and says so where they are missing."""
+
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.plotting.registry import PICTURES, draw, picture_names
+from frf_ipz.plotting.style import FORMATS, save_figure
+from synthetic_run import synthetic_folder
+
+OF_A_DIAGNOSIS = {"mismatch", "ranking", "proof"}
+STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
+
+
+@pytest.fixture(scope="module")
+def folder():
+    return synthetic_folder()
+
+
+@pytest.mark.parametrize("name", sorted(set(PICTURES) - OF_A_DIAGNOSIS))
+def test_every_picture_draws_something_with_titled_axes(folder, name):
+    figure = draw(name, folder)
+    drawn = [ax for ax in figure.axes if ax.lines or ax.collections or ax.patches]
+    assert drawn
+    assert drawn[0].get_xlabel() or drawn[0].get_ylabel()
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_files_are_what_they_say(folder, tmp_path, file_format):
+    path = tmp_path / f"picture.{file_format}"
+    save_figure(draw("frfs", folder), path, file_format=file_format)
+    assert path.read_bytes().startswith(STARTS[file_format])
+
+
+def test_text_in_vector_files_stays_text(folder, tmp_path):
+    save_figure(draw("frfs", folder), tmp_path / "picture.svg", file_format="svg")
+    assert ">Frequency, Hz</text>" in (tmp_path / "picture.svg").read_text(encoding="utf-8")
+
+
+def test_a_wrong_name_is_answered_with_the_closest():
+    with pytest.raises(InputError, match="did you mean 'poles'"):
+        draw("pole", synthetic_folder())
+
+
+@pytest.mark.parametrize("name", sorted(OF_A_DIAGNOSIS))
+def test_a_missing_stage_is_named(folder, name):
+    with pytest.raises(InputError, match="needs the result of 'diagnose'"):
+        draw(name, folder)
+
+
+def test_names_are_in_the_order_of_the_chain():
+    names = picture_names()
+    assert names.index("frfs") < names.index("poles") < names.index("pairs") < names.index("prediction")
+
+
+def test_no_window_system_is_asked_for():
+    code = "import sys, frf_ipz.plotting.registry; sys.exit('matplotlib.pyplot' in sys.modules)"
+    with warnings.catch_warnings():
+        assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

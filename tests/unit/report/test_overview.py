@@ -1,0 +1,60 @@
+"""The first screen says what the results say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.prediction.agreement import compare_frfs
+from frf_ipz.report.contents import read_contents
+from frf_ipz.report.sections.overview import build, verdict
+from frf_ipz.report.wording import number
+from synthetic_run import synthetic_folder
+
+
+@pytest.fixture(scope="module")
+def run():
+    return read_contents(synthetic_folder())
+
+
+def html(run):
+    return build(run).blocks[0].html
+
+
+def test_the_error_at_the_point_of_interest_is_that_against_the_frf_kept_aside(run):
+    truth = run.reference.values
+    figures = [compare_frfs(truth, values).median_db[0] for values in (run.prediction.nominal, run.prediction.values)]
+    assert " → ".join(number(float(figure), 2) for figure in figures) in html(run)
+
+
+def test_the_worst_target_is_the_largest_error(run):
+    errors = [abs(row.after) for row in run.targets()]
+    measured = [pair.measured_value for pair in run.pairs.targets]
+    by_hand = np.abs(np.abs(run.updated.after) / np.abs(measured) - 1)
+    np.testing.assert_allclose(errors, by_hand, rtol=1e-9, atol=1e-15)  # differences of nearly equal numbers
+    assert f"{100 * by_hand.max():.2g} %" in html(run)
+
+
+def test_the_verdict_counts_poles_and_zeros(run):
+    poles = sum(pair.kind == "pole" for pair in run.pairs.targets)
+    zeros = sum(pair.kind == "zero" for pair in run.pairs.targets)
+    assert f"{poles} measured poles and {zeros} measured zeros" in verdict(run)
+
+
+def test_roots_that_the_model_lacks_are_counted(run):
+    rows = tuple(
+        replace(row, verdict=Verdict.MISSING_IN_MODEL, computed=-1) if place < 2 else row
+        for place, row in enumerate(run.pairs.rows)
+    )
+    assert "2 poles and zeros" in html(replace(run, pairs=replace(run.pairs, rows=rows)))
+
+
+def test_unknown_gains_are_fitted_before_errors_are_stated(run):
+    frfs = replace(run.recordings.frfs, values=3.0 * run.recordings.frfs.values, unknown_scale="per_channel")
+    scaled = replace(run, recordings=replace(run.recordings, frfs=frfs), prediction=None)
+    exact = replace(run, prediction=None)
+    figure = html(exact).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
+    refit = html(scaled).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
+    assert float(refit) <= 1.5 * float(figure)
+    assert "unknown gains are fitted" in html(scaled)

@@ -1,0 +1,155 @@
+"""The page holds what the run holds, and nothing else."""
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from frf_ipz.report.page import SECTIONS, write_report
+from synthetic_run import Folder, many_frfs, synthetic_folder
+
+MODEL_STAGES = ("reduce", "pair", "update", "predict", "export", "model", "reference")
+MOST_BYTES = 10_000_000
+
+
+class Reader(HTMLParser):
+    """Collects anchors, links, sources and text."""
+
+    def __init__(self):
+        super().__init__()
+        self.ids, self.links, self.sources, self.alts = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes, tag=tag)
+        self.ids += [found["id"]] if "id" in found else []
+        self.links += [found["href"]] if "href" in found else []
+        self.sources += [found[key] for key in ("src", "srcset") if key in found]
+        self.alts += [found["aria-label"]] if found.get("role") == "img" else []
+
+
+def page_of(folder, tmp_path):
+    path = tmp_path / "report.html"
+    write_report(folder, path)
+    return path.read_text(encoding="utf-8")
+
+
+def read(text):
+    reader = Reader()
+    reader.feed(text)
+    return reader
+
+
+def data_of(text):
+    return json.loads(re.search(r'id="page-data">(.*?)</script>', text, re.S)[1])
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    return page_of(synthetic_folder(), tmp_path_factory.mktemp("page"))
+
+
+def test_every_section_but_the_diagnosis_is_there(page):
+    anchors = re.findall(r'<section id="([^"]+)"', page)
+    assert anchors == [
+        "overview",
+        "recordings",
+        "frfs",
+        "stabilization",
+        "poles",
+        "fit",
+        "pairing",
+        "updating",
+        "prediction",
+        "state-space",
+        "provenance",
+    ]
+    assert len(SECTIONS) == len(anchors) + 1
+
+
+def test_nothing_is_fetched_from_elsewhere(page):
+    reader = read(page)
+    assert reader.sources == []
+    assert all(link.startswith("#") for link in reader.links)
+
+
+def test_links_lead_somewhere_and_names_are_unique(page):
+    reader = read(page)
+    assert {link[1:] for link in reader.links} <= set(reader.ids)
+    assert len(set(reader.ids)) == len(reader.ids)
+
+
+def test_every_picture_has_a_place_and_words(page):
+    reader, data = read(page), data_of(page)
+    assert set(data["pictures"]) <= set(reader.ids)
+    assert len(reader.alts) == len(data["pictures"])
+    assert all(len(alt) > 20 for alt in reader.alts)
+
+
+def test_names_of_the_user_cannot_become_markup(page):
+    assert "synthetic <beam>" not in page
+    assert "synthetic &lt;beam&gt;" in page
+
+
+def test_plotly_knows_all_that_the_pictures_ask_for(page):
+    data = data_of(page)
+
+    def plain(node):
+        if isinstance(node, list):
+            return [plain(item) for item in node]
+        if isinstance(node, dict):
+            if "$" in node:
+                return np.frombuffer(base64.b64decode(data["arrays"][node["$"]]), "<f4")
+            return {key: plain(item) for key, item in node.items()}
+        return "#123456" if isinstance(node, str) and node.startswith("@") else node
+
+    for picture in data["pictures"].values():
+        figure = go.Figure(data=plain(picture["data"]), layout=plain(picture["layout"]))
+        for trace in figure.data:
+            assert trace.y is None or len(trace.y) == len(trace.x)
+
+
+def test_a_run_that_ends_with_the_fit_says_what_was_found(tmp_path):
+    text = page_of(synthetic_folder(without=MODEL_STAGES), tmp_path)
+    assert "5 modes found between" in text
+    assert '<section id="updating"' not in text
+    assert '<section id="fit"' in text
+
+
+def test_a_run_without_points_of_interest_states_the_measured_ones(tmp_path):
+    text = page_of(synthetic_folder(without=("predict", "reference")), tmp_path)
+    assert "Error at the measured points" in text
+    assert '<section id="prediction"' not in text
+
+
+def test_recordings_alone_make_a_page(tmp_path):
+    text = page_of(synthetic_folder(without=("fit", *MODEL_STAGES)), tmp_path)
+    assert "nothing fitted yet" in text
+
+
+def test_an_empty_run_makes_a_page(tmp_path):
+    text = page_of(Folder(results={}, record={}, stale=()), tmp_path)
+    assert "holds no results yet" in text
+
+
+def test_results_made_before_the_last_change_are_named(tmp_path):
+    folder = synthetic_folder()
+    folder.stale = ("update",)
+    assert "not yet run again: update" in page_of(folder, tmp_path)
+
+
+def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
+    recordings = many_frfs(100, 50_000)
+    text = page_of(Folder(results={"ingest": recordings}, record={"stages": {}}, stale=()), tmp_path)
+    assert len(text.encode()) < MOST_BYTES
+    data = data_of(text)
+    drawn = [trace for trace in data["pictures"]["frf"]["data"] if "yaxis" not in trace and "fill" not in trace]
+    curves = [trace for trace in drawn if trace.get("showlegend", True)]
+    assert len(curves) == 100
+    for place, trace in enumerate(curves):
+        magnitude = np.frombuffer(base64.b64decode(data["arrays"][trace["y"]["$"]]), "<f4")
+        exact = np.abs(recordings.frfs.values[:, place])
+        np.testing.assert_allclose([magnitude.max(), magnitude.min()], [exact.max(), exact.min()], rtol=1e-6, atol=0)
