@@ -103,6 +103,23 @@ def init(
 
 
 @app.command()
+def plot(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with the results of a run.")],
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Which picture; without it, all are named.")
+    ] = None,
+    file_format: Annotated[str, typer.Option("--format", "-f", metavar="svg|pdf|png", help="Kind of file.")] = "svg",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="File to write; NAME.FORMAT here by default.")
+    ] = None,
+) -> None:
+    """Draw one picture of a run for a publication."""
+    from frf_ipz.cli.pictures import draw_picture, picture_list
+
+    print(picture_list(folder) if name is None else draw_picture(folder, name, file_format, out))
+
+
+@app.command()
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with the results of a run.")],
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Where to listen; 0 for any free port.")] = 0,

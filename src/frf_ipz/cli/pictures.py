@@ -1,0 +1,67 @@
+"""Pictures of a run for publications, from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.plotting.registry import draw, picture_names
+from frf_ipz.plotting.style import FORMATS, save_figure
+from frf_ipz.runs.folder import read_run
+
+
+def picture_list(folder: Path) -> str:
+    """Say what can be drawn of a run.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder.
+
+    Returns
+    -------
+    str
+        Text.
+
+    Raises
+    ------
+    InputError
+        If there is no run in the folder.
+    """
+    read_run(folder)
+    return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *picture_names()])
+
+
+def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) -> str:
+    """Draw a picture of a run into a file.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder.
+    name : str
+        Which picture.
+    file_format : str
+        ``svg``, ``pdf`` or ``png``.
+    out : Path, optional
+        File to write; the picture's name in the folder of work where it is left out.
+
+    Returns
+    -------
+    str
+        What was written.
+
+    Raises
+    ------
+    InputError
+        If there is no such run, picture or format, or the file cannot be written.
+    """
+    if file_format not in FORMATS:
+        raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
+    path = Path(f"{name}.{file_format}") if out is None else out
+    figure = draw(name, read_run(folder))
+    try:
+        save_figure(figure, path, file_format=file_format)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --out") from None
+    return f"wrote {path}"
