@@ -102,7 +102,7 @@ class Observations:
     band_hz : pair of float
         Band that is looked at, Hz.
     frfs : FrfSet, optional
-        FRFs on lines: what is looked at where there are no blows.
+        FRFs on lines: what is looked at where there are no blows, or some did not start at rest.
     """
 
     kind: str

@@ -1,11 +1,12 @@
-"""From a test to what a diagnosis looks at: blows where they started from rest, FRFs elsewhere."""
+"""From a test to what a diagnosis looks at: blows or records, and the FRFs that were estimated from them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
-from frf_ipz.errors import InputError
+from frf_ipz.identification.lines.measured import measured_lines
+from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.blows import read_blows
 
 if TYPE_CHECKING:
@@ -15,9 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.test_file import Test
 
 
-def observe(
-    test: Test, options: IngestOptions, frfs: FrfSet, *, band_hz: tuple[float, float] | None = None
-) -> Observations:
+def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None) -> Observations:
     """Gather what a diagnosis looks at.
 
     Parameters
@@ -28,28 +27,23 @@ def observe(
         How its recordings are used.
     frfs : FrfSet
         The FRFs that were estimated from it, or elsewhere.
-    band_hz : pair of float, optional
-        Band to look at, Hz; all lines above 0 where it is left out.
+    fit : FitOptions, optional
+        Says which band to look at; where it does not, the band that carries signal is taken.
 
     Returns
     -------
     Observations
-        Blows or records where all of them started from rest and the scale is known; else the FRFs.
+        Blows or records where the scale of the channels is known, and the FRFs.
 
     Raises
     ------
     InputError
-        If a recording cannot be used, or there is no line above 0 Hz.
+        If a recording cannot be used, or too few lines are left in the band.
     """
-    lines = frfs.frequency_hz[frfs.frequency_hz > 0]
-    if not len(lines):
-        raise InputError(f"{test.path}: there is no frequency line above 0 Hz; a diagnosis needs some")
-    band = band_hz or (float(lines[0]), float(lines[-1]))
+    band = measured_lines(frfs, fit or FitOptions()).band_hz
     blows: tuple[Blow, ...] = ()
     if test.kind != "frf" and frfs.unknown_scale == "none":
         blows = tuple(_blow(blow, test.input_channel.column) for blow in read_blows(test, options))
-        if not all(blow.rested for blow in blows):
-            blows = ()
     return Observations(kind=test.kind if blows else "frf", blows=blows, band_hz=band, frfs=frfs)
 
 

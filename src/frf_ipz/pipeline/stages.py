@@ -96,7 +96,8 @@ def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
     band = {"fit": [job.pipeline.file.fit.band_hz, job.pipeline.file.fit.exclude_hz]}
 
     def compute(progress: Progress) -> Diagnosis:
-        return find_mismatch(model, observe(job.test, ingest_options, frfs), options, progress=progress)
+        seen = observe(job.test, ingest_options, frfs, fit=job.pipeline.file.fit)
+        return find_mismatch(model, seen, options, folder=job.pipeline.path.parent, progress=progress)
 
     return desk.stage(
         "diagnose",

@@ -63,7 +63,7 @@ def divide(observations: Observations) -> Source:
     InputError
         If there is nothing to look at.
     """
-    if not observations.blows:
+    if not observations.blows or not all(blow.rested for blow in observations.blows):
         return _of_frfs(observations)
     kept = _kept_blows(observations)
     names = {blow.name for blow in kept}

@@ -37,6 +37,8 @@ class Bench:
         Those near the axis, with their errors.
     early : Data
         The same, with larger errors: for first steps.
+    thin : Data
+        Fewer points near the axis: for a first look at small effects.
     """
 
     specimen: Specimen
@@ -45,18 +47,23 @@ class Bench:
     coarse: Measured
     data: Data
     early: Data
+    thin: Data
 
     def suppose(self, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
         """Make a hypothesis."""
         return suppose(self.specimen, self.nuisance, causes, exact=exact)
 
-    def fit(self, causes: tuple[Cause, ...], values: FloatArray, unknown: FloatArray | None = None) -> Fit:
-        """Fit causes, from values and what cannot be known."""
-        hypothesis = self.suppose(causes)
-        if unknown is None:
-            first = polish(hypothesis, self.early, values, iterations=6, tolerance=1.0)
-            values, unknown = first.values, first.unknown
-        return polish(hypothesis, self.data, values, unknown=unknown, iterations=10)
+    def fit(self, causes: tuple[Cause, ...], values: FloatArray) -> Fit:
+        """Fit causes, from values of their parameters."""
+        return self.fit_from(self.fit_early(causes, values))
+
+    def fit_early(self, causes: tuple[Cause, ...], values: FloatArray) -> Fit:
+        """Fit causes with large errors, from values of their parameters."""
+        return polish(self.suppose(causes), self.early, values, iterations=6, tolerance=1.0)
+
+    def fit_from(self, fit: Fit) -> Fit:
+        """Fit exactly, from a fit with large errors."""
+        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=10)
 
 
 def weights_of(measured: Measured, error: float) -> FloatArray:

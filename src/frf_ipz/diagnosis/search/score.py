@@ -11,10 +11,11 @@ from scipy import linalg
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.polish import Data, Fit
 
 STEP = 1e-4  # of a parameter as searched, for its derivative
 LONGEST = 1.0  # of a parameter as searched: farther, nothing is linear
@@ -30,16 +31,25 @@ class Score:
         The data.
     base : Fit
         What is supposed already.
+    data : Data
+        What misfits are of.
+    misfit : (n_data,) array
+        Whitened misfit of the base, as it would be without scatter.
     columns : (n_data, n_nuisance) array
         Whitened derivatives of the FRFs by what cannot be known.
     factor : (n_nuisance, n_nuisance) array
         Lower Cholesky factor of their curvature with its prior.
+    response : Response
+        Of the base.
     """
 
     bench: Bench
     base: Fit
+    data: Data
+    misfit: FloatArray
     columns: FloatArray
     factor: FloatArray
+    response: Response
 
     def gain(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Half the fall of the sum of squares that one linear step from some values promises, nats."""
@@ -58,11 +68,36 @@ class Score:
             curvature += np.diag(1e-9 * np.diag(curvature) + 1e-300)
             step = np.clip(np.linalg.solve(curvature, -gradient), -LONGEST, LONGEST)
             left += float(2 * gradient @ step + step @ curvature @ step)
-        return 0.5 * (self.base.misfit + self.base.pull - left)
+        return 0.5 * (self._square(self.misfit, self.misfit) - left)
+
+    def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
+        """Half the fall of the sum of squares at some values, nats."""
+        misfit = self._misfit(hypothesis, hypothesis.searched(np.concatenate([self.base.values, values])))
+        return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
+
+    def weigh(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        """Find the best sizes of changes, and the gain of each.
+
+        Parameters
+        ----------
+        changes : (n_points, n_frfs, n) complex array
+            Of the FRFs, for size 1.
+
+        Returns
+        -------
+        sizes, gains : (n,) array
+            Sizes may be negative; gains in nats.
+        """
+        white = self.data.whitening(self.data.gains(self.response)[:, None] * changes)
+        seen = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
+        known = linalg.solve_triangular(self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False)
+        squares = np.maximum(np.sum(white**2, 0) - np.sum(seen**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
+        across = self.misfit @ white - known @ seen
+        return across / squares, 0.5 * across**2 / squares
 
     def _misfit(self, hypothesis: Hypothesis, searched: FloatArray) -> FloatArray:
         """Whitened misfit, as it would be without scatter."""
-        data = self.bench.data
+        data = self.data
         response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, data.measured.s)
         return data.misfit(response) + self.columns @ self.base.unknown
 
@@ -71,24 +106,32 @@ class Score:
         return float(one @ other - seen[0] @ seen[1])
 
 
-def score_on(bench: Bench, base: Fit) -> Score:
+def score_on(bench: Bench, base: Fit, data: Data) -> Score:
     """Prepare scores on top of a fit.
 
     Parameters
     ----------
     bench : Bench
-        The data.
+        What is tested.
     base : Fit
         What is supposed already.
+    data : Data
+        What misfits are of.
 
     Returns
     -------
     Score
         For any further cause.
     """
-    data = bench.data
     response = base.hypothesis.respond(base.values, base.unknown, data.measured.s)
     jacobian = nuisance_jacobian(response, bench.nuisance, bench.specimen.layout)
     columns = data.whitening(data.gains(response)[:, None] * jacobian)
-    factor = linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]), lower=True)
-    return Score(bench=bench, base=base, columns=columns, factor=factor)
+    return Score(
+        bench=bench,
+        base=base,
+        data=data,
+        misfit=data.misfit(response) + columns @ base.unknown,
+        columns=columns,
+        factor=linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]), lower=True),
+        response=response,
+    )

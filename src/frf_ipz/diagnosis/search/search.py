@@ -9,12 +9,13 @@ from typing import TypeAlias
 import numpy as np
 
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
 from frf_ipz.diagnosis.search.refine import refine
 from frf_ipz.diagnosis.search.score import score_on
 from frf_ipz.diagnosis.search.sketches import Start
-from frf_ipz.diagnosis.search.wide import best_start, close_search, wide_search
+from frf_ipz.diagnosis.search.wide import best_start, wide_search
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
@@ -22,13 +23,15 @@ Fits: TypeAlias = dict[tuple[object, ...], Fit]
 REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
 NEARLY_RIGHT = 20.0  # sum of squares over the number of values: small effects are looked for on top of such a fit
 VERY_NEARLY = 2.0  # the same: nothing large can be missing
-SMALL_PULL = 200.0  # and this little is explained by what cannot be known
+SMALL_PULL = 600.0  # and this little is explained by what cannot be known
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 PLACES_EACH = 3  # of an effect that are refined
 NEAR = 2  # nodes or elements: places so near count as one there
-FITTED = 12  # hypotheses that are fitted exactly
+FITTED = 12  # hypotheses that are fitted with large errors
+FITTED_EXACTLY = 7
+FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
 CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS = 2000.0  # nats behind the best: not looked at any more
 GAIN = 0.5  # nats: a neighbour must be better by that
@@ -101,7 +104,7 @@ def search(bench: Bench, base: Fit) -> Ranking:
 
 def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
-    score = score_on(bench, base)
+    score = score_on(bench, base, bench.data)
     found = close_search(bench, base)
     starts = _spread(found, CLOSE_EACH)
     hypotheses = [bench.suppose((*base.hypothesis.causes, start.cause)) for start in starts]
@@ -109,9 +112,7 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     for place in np.argsort(-gains)[:CLOSE_FITTED]:
         if gains[place] > max(PROMISING, gains.max() - HOPELESS) or place == int(np.argmax(gains)):
             values = np.concatenate([base.values, starts[place].values])
-            fit = polish(
-                hypotheses[place], bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2
-            )
+            fit = polish(hypotheses[place], bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2)
             _keep(fits, fit)
     return len(found)
 
@@ -152,9 +153,13 @@ def _beside(first: Cause, second: Cause) -> bool:
 
 
 def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
+    """Fit with large errors first, and exactly what then is not far behind."""
+    early = [bench.fit_early((*base.hypothesis.causes, start.cause), start.values) for start in refined[:FITTED]]
+    limit = FAR_BEHIND * min((fit.cost for fit in early), default=0.0) + SLACK
     fits: Fits = {}
-    for start in refined[:FITTED]:
-        _keep(fits, bench.fit((*base.hypothesis.causes, start.cause), start.values))
+    for fit in sorted(early, key=lambda fit: fit.cost)[:FITTED_EXACTLY]:
+        if fit.cost < limit:
+            _keep(fits, bench.fit_from(fit))
     return fits
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.catalogue.specimen import Specimen
-from frf_ipz.diagnosis.measured.transfer import Whitening, whiten
+from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
 from frf_ipz.diagnosis.physics.layout import lay_out
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.nuisance import Nuisance
     from frf_ipz.structure import StructuralModel
 
+MANY_POINTS = 120  # of a contour: every other one is enough for first steps
+FEW_POINTS = 110  # of a contour: what a first look at small effects needs
 EARLY_FLOOR = 8.0  # times the model's errors: first steps see past narrow peaks
 
 
@@ -73,6 +75,9 @@ def set_up(
     basis = make_basis(model, 2 * np.pi * band_hz[1], places)
     nuisance = make_nuisance(basis, layout, options)
     coarse = source.coarse if free_gains == "none" else _scaled(source.coarse, basis, layout, nuisance, free_gains)
+    n_points = len(source.training.s)
+    half = points_of(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
+    few = points_of(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
     specimen = Specimen(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
     return Bench(
         specimen=specimen,
@@ -80,7 +85,8 @@ def set_up(
         effects=effects,
         coarse=coarse,
         data=with_errors(source.training, options, free_gains=free_gains),
-        early=with_errors(source.training, options, free_gains=free_gains, floor=EARLY_FLOOR),
+        early=with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR),
+        thin=with_errors(few, options, free_gains=free_gains),
     )
 
 

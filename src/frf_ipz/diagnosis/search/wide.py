@@ -1,18 +1,15 @@
-"""Wide search: all effects at all places for many values, on transfer functions that are not fitted exactly yet.
+"""Wide search for large effects, all of them at all places for many values, far from the axis.
 
-Far from the axis, where large effects are seen, misfits count by their logarithm. Near it, on top of a fit that is
-nearly right, small effects are seen, and misfits count by their squares.
+Everything is smooth there, and misfits count by their logarithm.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.measured.transfer import points_of
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.refine import robust_misfit
@@ -25,8 +22,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.polish import Fit
 
 WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
-CLOSE_ERROR = 1e-3  # the same near the axis
-CLOSE_POINTS = 90  # of the contour near the axis that are enough for a first look
 
 
 def wide_search(bench: Bench, base: Fit) -> list[Start]:
@@ -45,27 +40,6 @@ def wide_search(bench: Bench, base: Fit) -> list[Start]:
         The best values of each cause, by rising cost.
     """
     return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
-
-
-def close_search(bench: Bench, base: Fit) -> list[Start]:
-    """Look for small effects, near the axis, on top of a fit.
-
-    Parameters
-    ----------
-    bench : Bench
-        Data and effects.
-    base : Fit
-        What is supposed already, nearly right.
-
-    Returns
-    -------
-    list of Start
-        The best values of each cause, by rising cost.
-    """
-    measured = bench.data.measured
-    thinned = points_of(measured, np.arange(0, len(measured.s), -(-len(measured.s) // CLOSE_POINTS)))
-    near = replace(bench.specimen, contour=thinned.s)
-    return _search(bench, near, thinned, base, base.unknown, CLOSE_ERROR)
 
 
 def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:

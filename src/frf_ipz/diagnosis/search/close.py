@@ -1,0 +1,99 @@
+"""Search for small effects on top of a fit that is nearly right: what each promises beyond what scatter can explain.
+
+A small effect changes the FRFs in proportion to its size, so that one projection gives the best size and the evidence
+of each, at every place. The signatures of effects that are one dynamic stiffness on one motion are weighed together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.search.score import Score, score_on
+from frf_ipz.diagnosis.search.sketches import AT_ONCE, Start, receptances
+from frf_ipz.diagnosis.search.wide import causes_of
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.diagnosis.catalogue.effect import Sketch
+    from frf_ipz.diagnosis.physics.response import Response
+    from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.hypothesis import Cause
+    from frf_ipz.diagnosis.search.polish import Fit
+
+COLUMNS = 600  # signatures that are weighed together
+LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
+
+
+def close_search(bench: Bench, base: Fit) -> list[Start]:
+    """Look for small effects.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already, nearly right.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, the most promising first; the cost is minus the gain in nats.
+    """
+    score = score_on(bench, base, bench.thin)
+    specimen = replace(bench.specimen, contour=bench.thin.measured.s)
+    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
+    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
+    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
+    response = base.hypothesis.respond(base.values, base.unknown, specimen.contour)
+    found = _drawn(score, response, drawn)
+    found += [_direct(score, cause) for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Sketch]]) -> list[Start]:
+    """Weigh all shapes of all sketches; keep the best of each."""
+    best: dict[int, Start] = {}
+    batch: list[tuple[int, int, ComplexArray]] = []
+    for first in range(0, len(drawn), AT_ONCE):
+        some = drawn[first : first + AT_ONCE]
+        motions = np.stack([sketch.motion for _, sketch in some], 1)
+        hypothesis = score.base.hypothesis
+        layout = hypothesis.specimen.layout
+        across = receptances(response, hypothesis.basis, layout, motions, np.zeros(len(some))).across
+        for column, (_, sketch) in enumerate(some):
+            for shape, curve in enumerate(sketch.shapes):
+                batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))
+                if len(batch) == COLUMNS:
+                    _weigh(score, drawn, batch, best)
+                    batch = []
+    if batch:
+        _weigh(score, drawn, batch, best)
+    return list(best.values())
+
+
+def _weigh(
+    score: Score, drawn: list[tuple[Cause, Sketch]], batch: list[tuple[int, int, ComplexArray]], best: dict[int, Start]
+) -> None:
+    sizes, gains = score.weigh(np.stack([change for _, _, change in batch], 2))
+    for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):
+        if size > 0 and (index not in best or -gain < best[index].cost):
+            cause, sketch = drawn[index]
+            values = sketch.values[shape].copy()
+            if sketch.amplitudes is not None and len(sketch.amplitudes) == 1:
+                values = 1 + (values - 1) * min(size, LARGEST)
+            else:
+                values[sketch.amplitude] *= size
+            best[index] = Start(cause=cause, values=values, cost=-gain)
+
+
+def _direct(score: Score, cause: Cause) -> Start:
+    """Try the values that an effect proposes to start from."""
+    bench = score.bench
+    hypothesis = bench.suppose((*score.base.hypothesis.causes, cause), exact=False)
+    grid = cause.effect.starts(bench.specimen, cause.place) if hypothesis.counts[-1] else np.zeros((1, 0))
+    gains = [score.at(hypothesis, values) for values in grid]
+    place = int(np.argmax(gains))
+    return Start(cause=cause, values=grid[place], cost=-gains[place])
