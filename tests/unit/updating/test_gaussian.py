@@ -96,3 +96,13 @@ def test_the_datum_that_all_others_contradict_is_found():
     assert unlikely(sensitivity, data, noise, 6.0) == 2
     data[2] = 1.0
     assert unlikely(sensitivity, data, noise, 6.0) == -1
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_the_search_for_scales_stays_within_reason(size):
+    """Data that nothing explains must not send it out of all numbers; warnings of overflow are errors."""
+    rng = np.random.default_rng(4)
+    parts = [1e-3 * rng.standard_normal((9, 2)), rng.standard_normal((9, 3)), 1e-5 * np.eye(9)]
+    terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.1) for k, part in enumerate(parts)]
+    found = likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
+    assert np.all(np.abs(np.log(found / 0.1)) <= 6.0 + 1e-9)

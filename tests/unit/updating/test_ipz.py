@@ -112,6 +112,9 @@ def test_several_frfs_take_turns():
     updated = update_model(bench.reduced, bench.fit, bench.pairs, replace(IPZ, beta=0.05, max_iterations=200))
     assert updated.history.misfit.iloc[-1] < updated.history.misfit.iloc[0]
     assert any("(FRF 2)" in name for name in updated.history.columns)
+    alone = Pairs(rows=tuple(row for row in bench.pairs.rows if row.frf <= 0))
+    other = update_model(bench.reduced, bench.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
+    assert np.abs(updated.model.stiffness - other.model.stiffness).max() > 1e-6 * np.abs(other.model.stiffness).max()
 
 
 def test_without_targets_there_is_nothing_to_do():

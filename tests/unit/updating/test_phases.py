@@ -12,7 +12,7 @@ from updating_study import set_up
 
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
-SEEDS = (3, 11, 21)  # a plate, frames and beams
+SEEDS = (20, 12, 11)  # a plate and a frame with zeros off the axis, and a beam
 
 
 @pytest.fixture(params=SEEDS, scope="module")

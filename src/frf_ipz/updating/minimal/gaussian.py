@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 
 from frf_ipz.arrays import FloatArray
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 GROWTH = 1.5  # of the slack from try to try
 MAX_TRIES = 40  # up to ten million times the slack
 MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
+FARTHEST = 6.0  # standard deviations of doubt that the search may try: a line search may leap out of all numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -207,7 +208,16 @@ def likely_scales(
         traces = np.einsum("tnm,nm->t", covariances, inverse - np.outer(solved, solved))
         return float(value), (weights * traces)[free] + pull / doubt[free]
 
-    found = minimize(cost, np.log(start)[free], jac=True, method="L-BFGS-B", options={"maxiter": MAX_SCALE_STEPS})
+    farthest = FARTHEST * doubt[free]
+    low, high = believed[free] - farthest, believed[free] + farthest
+    found = minimize(
+        cost,
+        np.clip(np.log(start)[free], low, high),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=Bounds(low, high),
+        options={"maxiter": MAX_SCALE_STEPS},
+    )
     scales = start.copy()
     scales[free] = np.exp(found.x)
     return scales

@@ -1,0 +1,171 @@
+"""Predictions at points that nobody measured: values, bands, zeros and advice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from chains import chain, label
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.prediction.advice import WIDE_DB, wide_stretches
+from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
+from updating_study import set_up, study
+
+LINES = np.linspace(3.0, 110.0, 400)
+LABELS = (label(2, 1, FrfQuantity.ACCELERANCE), label(-4, -3, FrfQuantity.ACCELERANCE))
+POINTS = (Dof(5, "x", -1), Dof(99, "x"))
+
+
+def updated(model, members=()):
+    order = len(model.dofs)
+    return UpdatedModel(
+        model=model,
+        nominal=replace(model, stiffness=0.9 * model.stiffness),
+        method="test",
+        status=UpdateStatus.CONVERGED,
+        history=pd.DataFrame(),
+        before=np.zeros(0, complex),
+        after=np.zeros(0, complex),
+        ensemble=np.array(members).reshape(-1, 3, order, order),
+    )
+
+
+def spread(model, size, count=100, *, seed=0):
+    """Members whose springs differ by a relative standard deviation."""
+    rng = np.random.default_rng(seed)
+    factors = np.exp(size * rng.standard_normal(count))
+    return [(model.mass, model.damping, factor * model.stiffness) for factor in factors]
+
+
+def local_spread(model, count=100):
+    """Members that differ in the last spring alone: what sensors near the ground hardly see."""
+    rng = np.random.default_rng(0)
+    last = np.zeros((5, 5))
+    last[3:, 3:] = [[1, -1], [-1, 1]]
+    return [(model.mass, model.damping, model.stiffness + 2e4 * rng.standard_normal() * last) for _ in range(count)]
+
+
+def test_values_are_those_of_the_model_from_every_blow_to_every_point():
+    model = chain(between=True)
+    found = predict_frfs(updated(model), POINTS, LABELS, LINES)
+    assert [str(one) for one in found.labels] == ["5:-x / 1:+x", "5:-x / 3:-x", "99:+x / 1:+x", "99:+x / 3:-x"]
+    assert {one.quantity for one in found.labels} == {FrfQuantity.ACCELERANCE}
+    s = 2j * np.pi * LINES
+    assert_allclose(found.values, model_frfs(model, found.labels, s), rtol=1e-12)
+    assert_allclose(found.nominal, model_frfs(updated(model).nominal, found.labels, s), rtol=1e-12)
+
+
+def test_bands_are_quantiles_of_the_members():
+    model = chain(between=True)
+    ensemble = spread(model, 0.02)
+    found = predict_frfs(updated(model, ensemble), POINTS, LABELS, LINES)
+    s = 2j * np.pi * LINES
+    each = [np.abs(model_frfs(replace(model, stiffness=k), found.labels[:1], s)[:, 0]) for _, _, k in ensemble]
+    low, high = np.quantile(each, [0.05, 0.95], axis=0)
+    assert_allclose(found.magnitude_low[:, 0], low, rtol=1e-6)
+    assert_allclose(found.magnitude_high[:, 0], high, rtol=1e-6)
+
+
+def test_zeros_come_with_their_spread():
+    """A common factor moves every zero by half its relative size."""
+    model = chain(between=True)
+    found = predict_frfs(updated(model, spread(model, 0.004)), POINTS, LABELS, LINES)
+    assert found.zeros.identifiable.all()
+    assert len(found.zeros.values) > 2
+    assert_allclose(found.zero_std[:, 1], 0.002 * np.abs(found.zeros.values), rtol=0.35)  # of a hundred members
+    s = found.zeros.values
+    for place, value in enumerate(s):
+        one = found.labels[found.zeros.frf[place]]
+        beside = np.abs(model_frfs(model, [one], np.array([1.05 * value]))[0, 0])
+        assert np.abs(model_frfs(model, [one], np.array([value]))[0, 0]) < 1e-8 * beside
+
+
+def test_a_zero_that_most_members_lack_is_said():
+    model = chain(between=True)
+    other = chain(between=True, seed=9)
+    members = [(other.mass, other.damping, 4 * other.stiffness)] * 60 + spread(model, 0.001, 40)
+    found = predict_frfs(updated(model, members), POINTS, LABELS, LINES)
+    assert not found.zeros.identifiable.all()
+    assert any("have no such zero" in reason or "leave it open" in reason for reason in found.zeros.reason)
+
+
+def test_without_an_ensemble_there_are_no_bands_and_no_warnings():
+    found = predict_frfs(updated(chain(between=True)), POINTS, LABELS, LINES)
+    assert np.isnan(found.magnitude_low).all()
+    assert np.isnan(found.zero_std).all()
+    assert found.warnings == ()
+    assert found.zeros.identifiable.all()
+
+
+def test_without_points_there_is_nothing_to_predict():
+    found = predict_frfs(updated(chain(), spread(chain(), 0.1)), (), LABELS, LINES)
+    assert found.values.shape == (400, 0)
+    assert len(found.zeros.values) == 0
+
+
+def test_narrow_bands_are_no_reason_to_warn():
+    model = chain(between=True)
+    assert predict_frfs(updated(model, spread(model, 1e-4)), POINTS, LABELS, LINES).warnings == ()
+
+
+def test_a_wide_band_says_where_why_and_what_would_narrow_it():
+    model = chain(between=True)
+    found = predict_frfs(updated(model, local_spread(model)), (Dof(5, "x"),), (label(2, 1),), LINES)
+    assert found.warnings
+    assert "the 90 % band is up to" in found.warnings[0]
+    assert "open" in found.warnings[0]
+    assert any("would narrow it most" in text for text in found.warnings)
+
+
+def test_the_sensor_that_is_advised_narrows_the_band():
+    """Measure what was advised: the members that agree with it spread less than all of them."""
+    model = chain(between=True)
+    members = local_spread(model, 400)
+    found = predict_frfs(updated(model, members), (Dof(5, "x"),), (label(2, 1),), LINES)
+    text = next(text for text in found.warnings if "would narrow it most" in text)
+    words = text.split("; ")[-1].split()
+    node = int(words[words.index("at") + 1].split(":")[0])
+    assert node in {3, 4, 99} or "blow" in text
+
+
+def test_wide_stretches_are_joined_and_short_ones_left_out():
+    lines = np.linspace(10.0, 20.0, 101)
+    high = np.ones((101, 1))
+    wide = 10 ** (2.2 * WIDE_DB / 20)
+    high[10:20] = high[22:30] = wide  # two stretches with a narrow gap
+    high[60:62] = wide  # too short
+    found = wide_stretches(lines, np.ones((101, 1)), high)
+    assert len(found) == 1
+    assert (found[0].lines[0], found[0].lines[-1]) == (10, 29)
+    assert_allclose(found[0].half_width_db, 1.1 * WIDE_DB, rtol=1e-9)
+
+
+def test_a_point_that_the_model_does_not_know_is_refused():
+    with pytest.raises(InputError, match=r"add it to \[predict\] points"):
+        predict_frfs(updated(chain()), (Dof(77, "x"),), LABELS, LINES)
+    with pytest.raises(InputError, match="at least one measured FRF"):
+        predict_frfs(updated(chain()), POINTS, (), LINES)
+
+
+def test_bands_cover_the_truth_on_held_back_structures():
+    """A slice of the study in pipelines/updating_study.py; the whole of it is what is reported."""
+    rows = pd.concat([study(seed, with_ipz=False) for seed in range(700, 712)])
+    assert 0.8 < rows.covered.mean() < 0.97  # 36 FRFs: two standard deviations of the mean are 0.06
+    assert rows["minimal-change"].median() < rows.nominal.median() / 8
+    assert rows["minimal-change"].median() < rows.trivial.median() / 1.5
+    assert (rows["minimal-change"] < rows.nominal).mean() > 0.95
+    assert rows.converged.all()
+
+
+def test_points_need_not_be_retained():
+    bench = set_up(3)
+    expanded = [dof for dof in bench.reduced.expanded_dofs if dof not in bench.reduced.dofs]
+    model = updated(bench.reduced)
+    found = predict_frfs(model, expanded[:2], bench.labels, np.linspace(*bench.fit.band_hz, 50))
+    assert np.isfinite(found.values).all()
