@@ -1,0 +1,48 @@
+"""A real browser, and the demo served to it."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from demo_case import make_demo
+
+HOW = "(Debian: apt-get install chromium chromium-driver; pip install selenium)"
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium without a window."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason=f"needs selenium {HOW}")
+    chromium, driver = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        pytest.skip(f"needs Chromium and its driver {HOW}")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--window-size=1300,1000",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    yield chrome
+    chrome.quit()
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    return make_demo(tmp_path_factory.mktemp("served"))
+
+
+@pytest.fixture(scope="module")
+def address(demo):
+    """Address of the page of the demo, served by the command."""
+    command = [sys.executable, "-m", "frf_ipz.cli.main", "show", str(demo / "out"), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+        yield server.stdout.readline().strip()
+        server.kill()

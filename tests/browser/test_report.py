@@ -1,0 +1,153 @@
+"""The page in a real browser: every picture draws, nothing is an error, hover, keys, linked axes, themes, print."""
+
+import base64
+import time
+
+import numpy as np
+import pytest
+
+from frf_ipz.report.page import write_report
+from synthetic_run import Folder, many_frfs, synthetic_folder
+
+pytestmark = pytest.mark.browser
+
+PATIENCE_S = 60.0  # on a machine that does much else
+ARROW_RIGHT = "\ue014"  # as WebDriver writes it
+DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm"
+
+
+def open_page(browser, path):
+    browser.get(path.as_uri())
+    wait_for(browser, "return document.documentElement.dataset.drawn === 'all'")
+    return browser
+
+
+def wait_for(browser, script):
+    until = time.monotonic() + PATIENCE_S
+    while not browser.execute_script(script):
+        assert time.monotonic() < until, f"never came true: {script}"
+        time.sleep(0.05)
+
+
+def errors(browser):
+    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] in {"SEVERE", "WARNING"}]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_report(synthetic_folder(), path)
+    return path
+
+
+@pytest.fixture
+def page(browser, written):
+    return open_page(browser, written)
+
+
+def axis_range(page, name, axis="xaxis"):
+    return page.execute_script(f"return document.querySelector('#{name} .plot')._fullLayout.{axis}.range")
+
+
+def visible_traces(page, name):
+    script = f"return document.querySelector('#{name} .plot').data.filter((t) => t.visible !== false).length"
+    return page.execute_script(script)
+
+
+def test_every_picture_draws_and_nothing_is_an_error(page):
+    empty = page.execute_script(
+        "return [...document.querySelectorAll('figure')].filter((f) => !f.querySelector(arguments[0]))"
+        ".map((f) => f.id)",
+        DRAWN,
+    )
+    assert empty == []
+    assert errors(page) == []
+
+
+def test_hovering_over_a_pole_shows_its_frequency_and_damping(page):
+    fit = synthetic_folder().results["fit"]
+    plot = page.find_element("css selector", "#pole-zero-map .plot")
+    page.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    x, y = page.execute_script(
+        "const l = arguments[0]._fullLayout, box = arguments[0].getBoundingClientRect();"
+        "const t = arguments[0].data.find((d) => d.name === 'poles' && d.mode === 'markers');"
+        "return [box.x + l.xaxis._offset + l.xaxis.d2p(t.x[2]), box.y + l.yaxis._offset + l.yaxis.d2p(t.y[2])];",
+        plot,
+    )
+    page.execute_cdp_cmd("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": x, "y": y})
+    wait_for(page, "return document.querySelector('#pole-zero-map .hovertext') !== null")
+    text = page.find_element("css selector", "#pole-zero-map .hoverlayer").text
+    assert f"{fit.model.natural_frequency_hz[2]:.7g}"[:6] in text
+    assert f"{100 * fit.model.damping_ratio[2]:.5f}"[:5] in text
+    assert "pole 3" in text
+
+
+def test_zooming_one_frequency_axis_zooms_all(page):
+    zoom = "{'xaxis.range[0]': Math.log10(100), 'xaxis.range[1]': Math.log10(300)}"
+    page.execute_script(f"Plotly.relayout(document.querySelector('#frf .plot'), {zoom})")
+    for name in ("stabilisation", "fit-picture", "pairs", "prediction-0", "pole-zero-map"):
+        np.testing.assert_allclose(axis_range(page, name), np.log10([100, 300]), rtol=1e-9, atol=0)
+
+
+def test_a_linear_frequency_axis_shows_the_same_stretch(page):
+    before = axis_range(page, "frf")
+    page.find_element("id", "scale").click()
+    np.testing.assert_allclose(axis_range(page, "frf"), 10 ** np.array(before), rtol=1e-6, atol=0)
+
+
+def test_an_frf_that_is_switched_off_leaves_all_pictures(page):
+    before = {name: visible_traces(page, name) for name in ("frf", "fit-picture", "pole-zero-map")}
+    page.find_element("css selector", ".chooser summary").click()
+    page.find_element("css selector", ".chooser input[value='1']").click()
+    for name, count in before.items():
+        assert visible_traces(page, name) < count
+    assert page.find_element("id", "shown").text == "1 of 2"
+    page.find_element("css selector", ".chooser button[data-all='1']").click()
+    assert visible_traces(page, "frf") == before["frf"]
+
+
+def test_keys_zoom_and_move_and_go_back(page):
+    plot = page.find_element("css selector", "#frf .plot")
+    whole = axis_range(page, "frf")
+    plot.send_keys("+")
+    zoomed = axis_range(page, "frf")
+    assert whole[0] < zoomed[0] < zoomed[1] < whole[1]
+    plot.send_keys(ARROW_RIGHT)
+    assert axis_range(page, "frf")[0] > zoomed[0]
+    plot.send_keys("0")
+    np.testing.assert_allclose(axis_range(page, "frf"), whole, rtol=1e-9, atol=0)
+
+
+def test_the_dark_theme_changes_page_and_pictures(page):
+    shown = page.execute_script("return document.documentElement.dataset.theme")
+    paper = "return document.querySelector('#frf .plot')._fullLayout.paper_bgcolor"
+    before = page.execute_script(paper)
+    page.find_element("id", "theme").click()
+    assert page.execute_script("return document.documentElement.dataset.theme") != shown
+    assert page.execute_script(paper) != before
+    page.find_element("id", "theme").click()
+    assert page.execute_script(paper) == before
+
+
+def test_printing_gives_pages_with_every_picture(page):
+    page.set_window_size(1280, 900)
+    answer = page.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    pdf = base64.b64decode(answer["data"])
+    assert pdf.startswith(b"%PDF")
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page /") >= 5
+    assert errors(page) == []
+
+
+def test_no_picture_is_wider_than_the_paper_when_printed(page):
+    page.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    widths = page.execute_script("return [...document.querySelectorAll('.main-svg')].map((s) => s.width.baseVal.value)")
+    page.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert 0 < max(widths) <= 700
+
+
+def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
+    path = tmp_path / "big.html"
+    write_report(Folder(results={"ingest": many_frfs(100, 50_000)}, record={"stages": {}}, stale=()), path)
+    page = open_page(browser, path)
+    assert page.find_element("id", "shown").text == "6 of 100"
+    assert errors(page) == []

@@ -1,0 +1,247 @@
+"""The page in a real browser: what is clicked there ends up in pipeline.toml and in the results."""
+
+import pyarrow.parquet as pq
+import pytest
+
+from frf_ipz.pipeline.config import read_pipeline
+from frf_ipz.pipeline.run import run_pipeline
+
+pytestmark = pytest.mark.browser
+SOON_S = 120.0  # a run on a busy machine; a page that hangs ends the test
+STRUCK_HZ = 284.95  # the third mode of the demo
+NEAR = 0.02  # relative: a pole within this of a struck one is the struck one
+
+PLACE_OF_POLE = """
+const plot = document.querySelector('#stabilisation .plot');
+const trace = plot.data.find((one) => one.mode === 'markers' && one.name.includes('shape'));
+const k = [...trace.x].findIndex((x) => Math.abs(x / arguments[0] - 1) < 0.01);
+const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
+return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offset + yaxis.d2p(trace.y[k])];
+"""
+PLACE_OF_NODE = """
+const plot = document.querySelector('#structure .plot');
+const trace = plot.data.find((one) => one.name === arguments[0]);
+const k = [...trace.text].indexOf(arguments[1]);
+const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
+return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offset + yaxis.d2p(trace.y[k])];
+"""
+PLACES_OF_BAND = """
+const { xaxis, yaxis } = document.querySelector('#stabilisation .plot')._fullLayout;
+const box = document.querySelector('#stabilisation .plot').getBoundingClientRect();
+const x = arguments[0].map((hz) => box.left + xaxis._offset + xaxis.d2p(hz));
+return [...x, box.top + yaxis._offset + yaxis._length / 2];
+"""
+
+
+class Page:
+    """The page, as somebody with a mouse has it."""
+
+    def __init__(self, browser, address):
+        self.browser = browser
+        browser.get_log("browser")
+        browser.get(address)
+        self.wait_until(self.is_drawn)
+
+    def wait_until(self, condition):
+        common = pytest.importorskip("selenium.common.exceptions")
+        support = pytest.importorskip("selenium.webdriver.support.ui")
+        ignored = [common.WebDriverException]
+        return support.WebDriverWait(self.browser, SOON_S, ignored_exceptions=ignored).until(lambda _: condition())
+
+    def run(self, script, *arguments):
+        return self.browser.execute_script(script, *arguments)
+
+    def is_drawn(self):
+        return self.run("return document.documentElement.dataset.drawn === 'all' && !!document.body.dataset.stamp")
+
+    def stamp(self):
+        return self.run("return document.body.dataset.stamp")
+
+    def wait_for_results(self, before):
+        self.wait_until(lambda: self.stamp() not in {None, before} and self.is_drawn())
+
+    def show(self, selector):
+        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
+
+    def find(self, selector):
+        return self.browser.find_element("css selector", selector)
+
+    def click(self, selector):
+        self.show(selector)
+        self.find(selector).click()
+
+    def click_at(self, place):
+        self.pointer().move_to_location(*map(int, place)).pointer_down().pointer_up()
+        self.actions.perform()
+
+    def drag(self, places):
+        pointer = self.pointer()
+        pointer.move_to_location(*map(int, places[0])).pointer_down()
+        for place in places[1:]:
+            pointer.move_to_location(*map(int, place))
+        pointer.pointer_up()
+        self.actions.perform()
+
+    def pointer(self):
+        self.actions = pytest.importorskip("selenium.webdriver").ActionChains(self.browser, duration=50)
+        return self.actions.w3c_actions.pointer_action
+
+    def value(self, form, name):
+        return self.run(f"return document.querySelector('{form}').elements.{name}.value")
+
+    def write(self, form, **fields):
+        for name, text in fields.items():
+            field = self.find(f"{form} [name={name}]")
+            field.clear()
+            field.send_keys(text)
+
+    def errors(self):
+        return [entry for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+@pytest.fixture
+def page(browser, address):
+    page = Page(browser, address)
+    yield page
+    assert not page.errors()
+
+
+def poles(folder):
+    return pq.read_table(folder / "poles.parquet")["frequency_hz"].to_pylist()
+
+
+def is_there(folder, hertz):
+    return any(abs(pole / hertz - 1) < NEAR for pole in poles(folder))
+
+
+def test_every_picture_draws(page):
+    drawn = page.run(
+        "return [...document.querySelectorAll('figure .plot')].map((plot) => !!plot.querySelector('.main-svg'))"
+    )
+    assert len(drawn) >= 10
+    assert all(drawn)
+
+
+def test_a_pole_struck_in_the_diagram_is_gone_and_stays_gone_on_the_command_line(page, demo, tmp_path):
+    assert is_there(demo / "out", STRUCK_HZ)
+    comment = (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0]
+    page.show("#stabilisation")
+    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ))
+    page.wait_until(lambda: page.value("#pole-form", "hz"))
+    assert float(page.value("#pole-form", "hz")) == pytest.approx(STRUCK_HZ, rel=NEAR)
+    page.write("#pole-form", why="a cable that rings")
+    before = page.stamp()
+    page.click("#pole-form [value=strike]")
+    page.wait_for_results(before)
+    assert not is_there(demo / "out", STRUCK_HZ)
+    assert "a cable that rings" in page.find("#choices").text
+    (strike,) = read_pipeline(demo / "pipeline.toml").file.fit.strike
+    assert (strike.hz, strike.why) == (pytest.approx(STRUCK_HZ, rel=NEAR), "a cable that rings")
+    assert (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0] == comment
+    struck = poles(demo / "out")
+    assert poles(run_pipeline(demo / "pipeline.toml", demo / "out").path) == struck
+    assert poles(run_pipeline(demo / "pipeline.toml", tmp_path / "anew").path) == struck
+    page.browser.refresh()
+    page.wait_until(page.is_drawn)
+    before = page.stamp()
+    page.click("#choices [aria-label*='a cable that rings']")
+    page.wait_for_results(before)
+    assert is_there(demo / "out", STRUCK_HZ)
+
+
+def test_a_stretch_that_is_dragged_over_is_left_out(page, demo):
+    page.click("[data-drag=select]")
+    page.show("#stabilisation")
+    low, high, height = page.run(PLACES_OF_BAND, [40.0, 60.0])
+    page.drag([(low, height), ((low + high) / 2, height + 5), (high, height + 10)])
+    page.wait_until(lambda: page.value("#band-form", "high_hz"))
+    before = page.stamp()
+    page.click("#band-form [value=leave]")
+    page.wait_for_results(before)
+    ((low_hz, high_hz),) = read_pipeline(demo / "pipeline.toml").file.fit.exclude_hz
+    assert (low_hz, high_hz) == (pytest.approx(40.0, rel=0.02), pytest.approx(60.0, rel=0.02))
+    assert "1 stretches left out" not in page.find("#stabilisation .note").text
+    assert "1 stretch left out" in page.find("#stabilisation .note").text
+    assert page.find("[data-drag=select]").get_attribute("aria-pressed") == "true"
+
+
+def test_a_blow_is_dropped(page, demo):
+    page.click("#blow-choices summary")
+    before = page.stamp()
+    page.run(
+        "const list = document.querySelector('[data-blow=\"hits/p69_02.csv\"]'); list.value = 'drop';"
+        "list.dispatchEvent(new Event('change', {bubbles: true}));"
+    )
+    page.wait_for_results(before)
+    blows = pq.read_table(demo / "out" / "blows.parquet").to_pandas().set_index("blow")
+    assert not blows.loc["hits/p69_02.csv", "used"]
+    assert page.find("[data-blow='hits/p69_02.csv']").get_attribute("value") == "drop"
+
+
+def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
+    page.show("#structure")
+    page.click_at(page.run(PLACE_OF_NODE, "nodes", "node 33"))
+    page.wait_until(lambda: page.value("#point-form", "dof") == "33:+z")
+    before = page.stamp()
+    page.click("#point-form [value=point]")
+    page.wait_for_results(before)
+    assert "33:+z" in pq.read_table(demo / "out" / "poi_frf.parquet")["output_dof"].to_pylist()
+
+
+def test_a_sensor_picked_on_the_drawing_can_be_hidden(page):
+    page.show("#structure")
+    page.click_at(page.run(PLACE_OF_NODE, "sensor", "101:+z"))
+    page.wait_until(lambda: page.value("#point-form", "dof") == "101:+z")
+    page.click("#hide-sensor")
+    assert page.find("#shown").text == "0 of 2"
+    page.click("#hide-sensor")
+    assert page.find("#shown").text == "2 of 2"
+
+
+def test_what_the_run_refuses_is_said_and_taken_back(page, demo):
+    text = (demo / "pipeline.toml").read_bytes()
+    page.write("#point-form", dof="4711:+z")
+    page.click("#point-form [value=point]")
+    page.wait_until(lambda: "no node 4711" in page.find("#problem").text)
+    assert "(the change was taken back)" in page.find("#problem").text
+    assert (demo / "pipeline.toml").read_bytes() == text
+
+
+def test_a_strike_without_a_reason_is_refused(page, demo):
+    text = (demo / "pipeline.toml").read_bytes()
+    page.write("#pole-form", hz="100")
+    page.click("#pole-form [value=strike]")
+    page.wait_until(lambda: "say why" in page.find("#problem").text)
+    assert (demo / "pipeline.toml").read_bytes() == text
+    page.browser.get_log("browser")  # the browser notes the answer 400
+
+
+def test_the_structure_moves_and_rests(page):
+    page.show("#shape")
+    pose = "return document.querySelector('#shape-drawing path.updated').getAttribute('d')"
+    page.wait_until(lambda: page.run(pose))
+    first = page.run(pose)
+    page.wait_until(lambda: page.run(pose) != first)
+    page.click("#play")
+    page.run(
+        "const slider = document.querySelector('#phase'); slider.value = 0; slider.dispatchEvent(new Event('input'))"
+    )
+    at_rest = page.run(pose)
+    page.run(
+        "document.querySelector('#phase').value = 90; document.querySelector('#phase').dispatchEvent(new Event('input'))"
+    )
+    assert page.run(pose) != at_rest
+    page.run(
+        "const modes = document.querySelector('#shape-form').elements.mode; modes.value = '';"
+        "modes.dispatchEvent(new Event('change', {bubbles: true}))"
+    )
+    page.wait_until(lambda: "for 1 N at" in page.find("#shape-title").text)
+    assert page.find("#operating").is_displayed()
+
+
+def test_it_can_be_worked_with_the_keyboard(page):
+    keys = pytest.importorskip("selenium.webdriver").Keys
+    page.run("document.querySelector('#modes [data-fill]').focus()")
+    page.browser.switch_to.active_element.send_keys(keys.ENTER)
+    assert float(page.value("#pole-form", "hz")) == pytest.approx(16.25, rel=0.01)
+    assert page.browser.switch_to.active_element.get_attribute("name") == "why"
