@@ -82,7 +82,7 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
     terms = all_terms(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     progress(0.2, "adding and dropping poles")
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
-    selected = select_modes(data, start.poles, terms, options)
+    selected = select_modes(data, start.poles, terms, options, noise_is_known=bool(lines.known.all()))
     if not len(selected.fit.poles):
         raise NumericalError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
@@ -97,9 +97,10 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
 def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _Fitted:
     """Fit once more with the best weights, and find out whether noise or model limits the fit."""
     fit, data, judgement = selected.fit, selected.data, selected.judgement
+    lines = replace(lines, receptance=data.receptance)
     if not lines.known.all():
         lines = with_noise_of(lines, judgement.misfit / data.weight)
-    data = replace(lines.weighted(), stretch=data.stretch, real_modes=data.real_modes)
+    data = replace(lines.weighted(), real_modes=data.real_modes)
     fit = refine(data, fit.poles, terms)
     judgement = judge(data, fit, terms)
     free = 2 * len(data.s) - fit.system.n_linear
@@ -108,7 +109,7 @@ def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _F
     if not lines.known.all() or np.median(excess) > MODEL_ERROR:
         noise_from = "misfit"
         lines = replace(lines, variance=lines.variance * judgement.level)
-        data = replace(lines.weighted(), stretch=data.stretch, real_modes=data.real_modes)
+        data = replace(lines.weighted(), real_modes=data.real_modes)
         fit = refine(data, fit.poles, terms)
     return _Fitted(
         lines=lines, data=data, terms=terms, fit=fit, judgement=judgement, excess=excess, noise_from=noise_from
@@ -126,7 +127,7 @@ def _as_modal_fit(frfs: FrfSet, start: Start, selected: Selected, fitted: _Fitte
     found = find_zeros(errors, lines.s)
     of_residues = residue_covariance(errors, lines.powers, order[:n_modes])
     unit = np.abs(lines.s[:, None]) ** lines.powers
-    left = lines.receptance - response(fitted.data, fit.system, terms)
+    left = lines.receptance - response(fit.system, terms, lines.s)
     return ModalFit(
         model=measured_model(fit.system, terms, lines.powers, order, np.zeros(frfs.n_frfs)),
         n_modes=n_modes,
@@ -144,7 +145,7 @@ def _as_modal_fit(frfs: FrfSet, start: Start, selected: Selected, fitted: _Fitte
         ),
         misfit=misfit_table(lines.frequency_hz, left * unit, np.sqrt(lines.variance) * unit, frfs.labels),
         noise_from=fitted.noise_from,
-        warnings=_warnings(frfs, fitted),
+        warnings=_warnings(frfs, selected, fitted),
     )
 
 
@@ -164,7 +165,7 @@ def _covariance(errors: FitErrors, found: FoundZeros, modes: IntArray) -> RootCo
     return RootCovariance(common=np.concatenate([poles, common]), own=sparse.csr_array(own + added))
 
 
-def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
+def _warnings(frfs: FrfSet, selected: Selected, fitted: _Fitted) -> tuple[str, ...]:
     said = []
     excess = fitted.excess
     if fitted.lines.known.all() and np.median(excess) > MODEL_ERROR:
@@ -173,11 +174,11 @@ def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
             f"{excess.max():.2g} at worst): the structure does what no linear model with these modes does, so standard "
             "deviations are taken from the misfit"
         )
-    stretch = fitted.data.stretch
-    if stretch is not None:
+    if selected.drift is not None:
+        change = selected.drift.relative
         said.append(
-            f"natural frequencies differ between the FRFs by {np.ptp(stretch):.2g} of themselves: the structure "
-            f"drifted while it was measured; highest in {frfs.labels[int(np.argmax(stretch))]}, lowest in "
-            f"{frfs.labels[int(np.argmin(stretch))]}, and the poles given are the mean"
+            f"natural frequencies differ between the FRFs by {np.ptp(change) * 1e6:.3g} ppm, all modes alike: the "
+            f"structure drifted while it was measured; highest in {frfs.labels[int(np.argmax(change))]}, lowest in "
+            f"{frfs.labels[int(np.argmin(change))]}; the poles given are those of the mean"
         )
     return tuple(said)

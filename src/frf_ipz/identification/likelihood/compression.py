@@ -39,8 +39,6 @@ class Weighted:
         Weight of an FRF: one over the standard deviation of each part of its noise is profile times gain, N/m.
     full : (n_lines, n_frfs) array or None
         Weights where profile times gain is not good enough.
-    stretch : (n_frfs,) array or None
-        Relative change of all natural frequencies in each FRF, where the structure drifted between recordings.
     real_modes : bool
         Residues of receptances are imaginary, as those of normal modes.
     """
@@ -50,13 +48,12 @@ class Weighted:
     profile: FloatArray
     gain: FloatArray
     full: FloatArray | None = None
-    stretch: FloatArray | None = None
     real_modes: bool = False
 
     @property
     def is_shared(self) -> bool:
         """One basis serves all FRFs."""
-        return self.full is None and self.stretch is None
+        return self.full is None
 
     @property
     def weight(self) -> FloatArray:
@@ -170,18 +167,20 @@ def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compres
     Compressed
         The small system.
     """
-    weight = data.weight if not data.is_shared else data.gain
+    columns = model_columns(data.s, poles, terms, real_modes=data.real_modes, with_slopes=True)
     if data.is_shared:
-        columns = model_columns(data, poles, terms, with_slopes=True)
         columns *= np.tile(data.profile, 2)[:, None]
         rows = stacked(data.receptance * data.profile[:, None]) * data.gain
         U, z = _reduce(columns, rows)
         systems, right, total = U[None], z.T, np.einsum("lf,lf->f", rows, rows)
     else:
-        reduced = [_reduced_one(data, poles, terms, frf, weight[:, frf]) for frf in range(weight.shape[1])]
+        reduced = [
+            _reduce(columns * np.tile(weight, 2)[:, None], stacked(value * weight)[:, None])
+            for weight, value in zip(data.weight.T, data.receptance.T, strict=True)
+        ]
         systems = np.stack([U for U, _ in reduced])
-        right = np.stack([z for _, z in reduced])
-        total = np.sum(np.abs(data.receptance * weight) ** 2, axis=0)
+        right = np.stack([z[:, 0] for _, z in reduced])
+        total = np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0)
     return Compressed(
         poles=poles,
         n_smooth=terms.n_columns,
@@ -194,56 +193,52 @@ def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compres
 
 
 def model_columns(
-    data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, frf: int = 0, with_slopes: bool = False
+    s: ComplexArray, poles: ComplexArray, terms: SmoothTerms, *, real_modes: bool, with_slopes: bool = False
 ) -> FloatArray:
-    """Columns of the model of one FRF, not weighted.
+    """Columns of the model, not weighted.
 
     Parameters
     ----------
-    data : Weighted
-        Lines.
+    s : (n,) complex array
+        Where, rad/s.
     poles : (n_poles,) complex array
         rad/s.
     terms : SmoothTerms
         What lies out of band.
-    frf : int
-        Which FRF: they differ where the structure drifted.
+    real_modes : bool
+        Residues have imaginary parts only.
     with_slopes : bool
         Add the columns of the poles' changes.
 
     Returns
     -------
-    (2 n_lines, n_columns) array
+    (2 n, n_columns) array
         Smooth ones, residues, and slopes.
     """
-    s = data.s if data.stretch is None else data.s / (1 + data.stretch[frf])
     residues = pair_columns(s, poles)
-    parts = [terms.columns(data.s), residues[:, len(poles) :] if data.real_modes else residues]
+    parts = [terms.columns(s), residues[:, len(poles) :] if real_modes else residues]
     return np.concatenate([*parts, pair_columns(s, poles, power=2)] if with_slopes else parts, axis=1)
 
 
-def response(data: Weighted, system: Compressed, terms: SmoothTerms) -> ComplexArray:
-    """Evaluate the model on the lines.
+def response(system: Compressed, terms: SmoothTerms, s: ComplexArray) -> ComplexArray:
+    """Evaluate the model.
 
     Parameters
     ----------
-    data : Weighted
-        Lines.
     system : Compressed
-        Of the same data.
+        The fit.
     terms : SmoothTerms
         What lies out of band.
+    s : (n,) complex array
+        Where, rad/s.
 
     Returns
     -------
-    (n_lines, n_frfs) complex array
+    (n, n_frfs) complex array
         Receptances, m/N.
     """
-    coefficients = system.coefficients()
-    if data.stretch is None:
-        return unstacked(model_columns(data, system.poles, terms) @ coefficients.T)
-    one = [model_columns(data, system.poles, terms, frf=frf) @ row for frf, row in enumerate(coefficients)]
-    return unstacked(np.stack(one, axis=1))
+    columns = model_columns(s, system.poles, terms, real_modes=system.real_modes)
+    return unstacked(columns @ system.coefficients().T)
 
 
 def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
@@ -264,14 +259,6 @@ def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
     if len(U) == 1:
         return np.asarray(linalg.solve_triangular(U[0], z.T, check_finite=False).T)
     return np.stack([linalg.solve_triangular(one, side, check_finite=False) for one, side in zip(U, z, strict=True)])
-
-
-def _reduced_one(
-    data: Weighted, poles: ComplexArray, terms: SmoothTerms, frf: int, weight: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    columns = model_columns(data, poles, terms, frf=frf, with_slopes=True) * np.tile(weight, 2)[:, None]
-    U, z = _reduce(columns, stacked(data.receptance[:, frf] * weight)[:, None])
-    return U, z[:, 0]
 
 
 def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:

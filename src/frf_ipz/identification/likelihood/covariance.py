@@ -16,10 +16,10 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import Compressed
 from frf_ipz.identification.likelihood.refinement import Refined
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-from frf_ipz.numerics.partial_fractions import pair_columns, unstacked
+from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
 
 LINES_AT_ONCE = 64
-NEAR_POLES = 8  # poles whose errors a stretch of lines shows: those far away add nothing that could be seen
+NEAR_POLES = 6  # poles whose errors a stretch of lines shows: those far away add nothing that could be seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +34,14 @@ class FitErrors:
         What lies out of band.
     pole_root : (2 n_poles, 2 n_poles) array
         A root of the covariance of the poles: all real parts, then all imaginary parts, rad/s.
+    level : float
+        Factor on the standard deviation of the coefficients, where neighbouring lines err alike.
     """
 
     system: Compressed
     terms: SmoothTerms
     pole_root: FloatArray
+    level: float
 
     def linear(self, rows: ComplexArray, slopes: ComplexArray, frf: int) -> tuple[ComplexArray, ComplexArray]:
         """Errors of numbers that are linear in coefficients and slopes of an FRF.
@@ -63,7 +66,7 @@ class FitErrors:
         U = self.system.U[frf if len(self.system.U) > 1 else 0]
         own = linalg.solve_triangular(U[:n, :n], rows.T, trans="T", check_finite=False).T
         common = (slopes - own @ U[:n, n:]) @ self.slope_errors(frf)
-        return own / self.system.scale[frf], common / self.system.scale[frf]
+        return own * (self.level / self.system.scale[frf]), common / self.system.scale[frf]
 
     def slope_errors(self, frf: int) -> FloatArray:
         """Errors of the slopes' coefficients, times `scale`.
@@ -102,7 +105,12 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
         Poles, residues, and the rest.
     """
     root = np.linalg.pinv(np.linalg.cholesky(_regular(fit.information))).T
-    return FitErrors(system=fit.system, terms=terms, pole_root=root * np.sqrt(np.tile(level, 2))[:, None])
+    return FitErrors(
+        system=fit.system,
+        terms=terms,
+        pole_root=root * np.sqrt(np.tile(level, 2))[:, None],
+        level=float(np.sqrt(np.median(level))),
+    )
 
 
 def model_rows(system: Compressed, terms: SmoothTerms, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -148,6 +156,7 @@ def value_std(errors: FitErrors, s: ComplexArray) -> FloatArray:
     system = errors.system
     n, n_frfs = system.n_linear, len(system.z)
     roots = np.stack([errors.slope_errors(frf) for frf in range(n_frfs)])
+    of_slopes = roots @ roots.transpose(0, 2, 1)
     squares = np.empty((len(s), n_frfs))
     for first in range(0, len(s), LINES_AT_ONCE):
         part = slice(first, first + LINES_AT_ONCE)
@@ -157,9 +166,10 @@ def value_std(errors: FitErrors, s: ComplexArray) -> FloatArray:
             frfs = np.arange(n_frfs) if len(system.U) == 1 else np.array([number])
             own = linalg.solve_triangular(U[:n, :n], rows.T, trans="T", check_finite=False).T
             common = (slopes - own @ U[:n, n:])[:, near]
-            chosen = roots[np.ix_(frfs, near)]
-            moved = (common.conj() @ (chosen @ chosen.transpose(0, 2, 1))) * common
-            squares[part, frfs] = np.sum(np.abs(own) ** 2, axis=1)[:, None] + moved.sum(axis=2).real.T
+            parts = stacked(common)
+            moved = np.einsum("flk,lk->lf", parts @ of_slopes[np.ix_(frfs, near, near)], parts)
+            squares[part, frfs] = errors.level**2 * np.sum(np.abs(own) ** 2, axis=1)[:, None]
+            squares[part, frfs] += unstacked(moved).real + unstacked(moved).imag
     return np.asarray(np.sqrt(squares) / system.scale)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line tells nothing of the structure
 LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
-MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: real structures are not linear to less
+MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: few structures are linear to less
 FEWEST_LINES = 16  # what the fit of a single mode needs
 SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
 DEAD = 1.3  # times the noise, in mean square: an FRF below carries none
@@ -167,7 +167,8 @@ def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
 
 def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
     """Find the lines that carry signal, for a user who has said nothing."""
-    strong = usable & (np.nanmedian(np.abs(frfs.values) / np.sqrt(noise), axis=1) > SIGNAL)
+    ratio = np.abs(frfs.values) ** 2 / noise
+    strong = usable & (np.median(np.where(np.isfinite(ratio), ratio, 0.0), axis=1) > SIGNAL**2)
     if not strong.any():
         raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")
     share = np.cumsum(strong) / strong.sum()

@@ -86,30 +86,23 @@ def misfit_table(
     """
     edges = np.linspace(frequency_hz[0], frequency_hz[-1], BANDS + 1)
     band = np.clip(np.searchsorted(edges, frequency_hz, side="right") - 1, 0, BANDS - 1)
-    rows = []
-    for frf, label in enumerate(labels):
-        for number in range(BANDS):
-            lines = band == number
-            if not lines.any():
-                continue
-            size, noise = _rms(np.abs(misfit[lines, frf])), _rms(std[lines, frf])
-            rows.append(
-                {
-                    "frf": frf,
-                    "output_dof": str(label.output_dof),
-                    "input_dof": str(label.input_dof),
-                    "band_low_hz": float(edges[number]),
-                    "band_high_hz": float(edges[number + 1]),
-                    "misfit": size,
-                    "noise": noise,
-                    "ratio": _rms(np.abs(misfit[lines, frf]) / std[lines, frf]),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    starts = np.flatnonzero(np.diff(band, prepend=-1))
+    counts = np.diff(np.append(starts, len(band)))[:, None]
+    squares, powers = np.abs(misfit) ** 2, std**2
+    columns = [np.sqrt(np.add.reduceat(one, starts) / counts).T for one in (squares, powers, squares / powers)]
+    shape = columns[0].shape
+    return pd.DataFrame(
+        {
+            "frf": np.repeat(np.arange(len(labels)), shape[1]),
+            "output_dof": np.repeat([str(label.output_dof) for label in labels], shape[1]),
+            "input_dof": np.repeat([str(label.input_dof) for label in labels], shape[1]),
+            "band_low_hz": np.tile(edges[band[starts]], shape[0]),
+            "band_high_hz": np.tile(edges[band[starts] + 1], shape[0]),
+            "misfit": columns[0].ravel(),
+            "noise": columns[1].ravel(),
+            "ratio": columns[2].ravel(),
+        }
+    )
 
 
 def _level_at(judgement: Judgement, poles: ComplexArray) -> FloatArray:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 BESIDE = (0.9, 1.1)  # of the band's edges: zeros beyond are not listed
-POLISHING = 4  # Newton steps
+POLISHING = 3  # Newton steps
 MIRRORED = 0.5  # of a zero's distance from the axis: its mirror image must lie that close to make a quadruple
 ON_AXIS = 1e-9  # of the modulus: a zero with a smaller imaginary part is real
 ROUGH = 0.05  # relative standard deviation above which a zero is no number
@@ -100,7 +100,7 @@ def _of_one(
     values = np.unique(np.round(values, 9))
     values, kinds = _kinds(values[np.argsort(np.abs(values))])
     rows, slopes = model_rows(errors.system, errors.terms, values)
-    change = -1 / _slope(errors, values, coefficients)[:, None]
+    change = -1 / _slope(errors, values, slopes, coefficients)[:, None]
     own, common = errors.linear(rows * change, slopes * change, frf)
     own_parts, common_parts = _in_turn(own), _in_turn(common)
     is_real = np.repeat(np.array(kinds, object) == "real", 2) & (np.arange(2 * len(values)) % 2 == 1)
@@ -138,21 +138,20 @@ def _fixed_residues(coefficients: FloatArray, terms: SmoothTerms) -> ComplexArra
 
 def _polished(errors: FitErrors, values: ComplexArray, coefficients: FloatArray) -> ComplexArray:
     for _ in range(POLISHING):
-        rows, _ = model_rows(errors.system, errors.terms, values)
-        step = rows @ coefficients / _slope(errors, values, coefficients)
+        rows, slopes = model_rows(errors.system, errors.terms, values)
+        step = rows @ coefficients / _slope(errors, values, slopes, coefficients)
         values = values - np.where(np.abs(step) < 0.01 * np.abs(values), step, 0.0)
     real = np.abs(values.imag) < ON_AXIS * np.abs(values)
     return np.asarray(np.where(real, values.real, values.real + 1j * np.abs(values.imag)))
 
 
-def _slope(errors: FitErrors, values: ComplexArray, coefficients: FloatArray) -> ComplexArray:
+def _slope(errors: FitErrors, values: ComplexArray, slopes: ComplexArray, coefficients: FloatArray) -> ComplexArray:
     """Differentiate the response by s."""
     terms, system = errors.terms, errors.system
     scaled = values / terms.scale_rad_s
     powers = [power * scaled ** (power - 1) / terms.scale_rad_s for power in terms.powers]
     fixed = [-unstacked(pair_columns(values, pole[None], power=2)) for pole in terms.poles]
-    pairs = -unstacked(pair_columns(values, system.poles, power=2))
-    pairs = pairs[:, system.n_poles :] if system.real_modes else pairs
+    pairs = -slopes[:, system.n_poles :] if system.real_modes else -slopes
     return np.asarray(np.concatenate([np.stack(powers, axis=1), *fixed, pairs], axis=1) @ coefficients)
 
 

@@ -1,31 +1,51 @@
 """Drift between recordings: all natural frequencies of an FRF off by one factor, as temperature or support change.
 
-A common factor per FRF moves poles in proportion to themselves. One Gauss-Newton step finds it with the information
-that the poles are fitted by; where it explains much of the misfit, the lines of each FRF are stretched instead.
+A common factor per FRF moves poles in proportion to themselves. Gauss-Newton steps find it with the information that
+the poles are fitted by. Where it explains much of the misfit, each FRF is moved to the mean frequencies by what the
+model says: ``h(s) - h(s / (1 + drift))`` is added to it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.identification.likelihood.compression import Compressed, Weighted, response
 from frf_ipz.identification.likelihood.refinement import Refined, pole_jacobian, refine
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.likelihood.compression import Compressed, Weighted
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
-ROUNDS = 6
-SETTLED = 0.1  # standard deviations
+ROUNDS = 8
+SETTLED = 0.3  # standard deviations
 LARGEST = 2e-3  # a larger change is no drift but another structure
 WORTH = 0.3  # part of the excess misfit that the factors must explain
 ITERATIONS = 6
 
 
-def drift_of(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray | None:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drift:
+    """Change of frequencies between FRFs.
+
+    Parameters
+    ----------
+    relative : (n_frfs,) array
+        Change of all natural frequencies in each FRF, relative, of mean zero.
+    std : (n_frfs,) array
+        Its standard deviation, from the noise alone.
+    moved : (n_lines, n_frfs) complex array
+        The receptances at the mean frequencies, m/N.
+    """
+
+    relative: FloatArray
+    std: FloatArray
+    moved: ComplexArray
+
+
+def find_drift(data: Weighted, fit: Refined, terms: SmoothTerms) -> tuple[Drift, Refined] | None:
     """Find the drift between FRFs, if there is one.
 
     Parameters
@@ -39,29 +59,40 @@ def drift_of(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray | N
 
     Returns
     -------
-    (n_frfs,) array or None
-        Relative change of all natural frequencies, of mean zero; None where it does not explain the misfit.
+    (Drift, Refined) or None
+        The drift and the fit to the moved FRFs; None where it does not explain the misfit.
     """
     n_frfs = data.receptance.shape[1]
-    if n_frfs < 2:
+    if n_frfs < 2 or not len(fit.poles):
         return None
-    first, std = stretches(fit.system)
+    step, std = stretches(fit.system)
     demanded = n_frfs * np.log(2 * data.receptance.size)
-    if np.sum((first / std) ** 2) < demanded:
+    if np.sum((step / std) ** 2) < demanded:
         return None
-    stretch, best = np.zeros(n_frfs), fit
+    relative, best, moved = np.zeros(n_frfs), fit, data.receptance
     for _ in range(ROUNDS):
-        step, std = stretches(best.system)
-        stretch = stretch + step
-        stretch = stretch - np.average(stretch, weights=std**-2)
-        if np.abs(stretch).max() > LARGEST:
+        relative = relative + step
+        relative = relative - np.average(relative, weights=std**-2)
+        if np.abs(relative).max() > LARGEST:
             return None
-        best = refine(replace(data, stretch=stretch), best.poles, terms, iterations=ITERATIONS)
+        moved = _moved(data, best.system, terms, relative)
+        best = refine(replace(data, receptance=moved), best.poles, terms, iterations=ITERATIONS)
+        step, std = stretches(best.system)
+        step = step - np.average(step, weights=std**-2)
         if np.all(np.abs(step) < SETTLED * std):
             break
     excess = max(fit.misfit - 2 * data.receptance.size, 1.0)
     gain = fit.misfit - best.misfit
-    return stretch if gain > demanded and gain > WORTH * excess else None
+    if gain < demanded or gain < WORTH * excess:
+        return None
+    return Drift(relative=relative, std=std, moved=moved), best
+
+
+def _moved(data: Weighted, system: Compressed, terms: SmoothTerms, relative: FloatArray) -> ComplexArray:
+    moved = data.receptance + response(system, terms, data.s)
+    for frf, change in enumerate(relative):
+        moved[:, frf] -= response(system, terms, data.s / (1 + change))[:, frf]
+    return moved
 
 
 def stretches(system: Compressed) -> tuple[FloatArray, FloatArray]:

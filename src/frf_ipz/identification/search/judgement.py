@@ -72,7 +72,7 @@ def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
     Judgement
         What is missing and what is too much.
     """
-    misfit = (data.receptance - response(data, fit.system, terms)) * data.weight
+    misfit = (data.receptance - response(fit.system, terms, data.s)) * data.weight
     level = smooth_level(np.abs(misfit) ** 2) / 2
     level = np.where(level > LEVEL_SCATTER, level, 1.0)
     frequency = data.s.imag / (2 * np.pi)

@@ -10,7 +10,8 @@ import numpy as np
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import Weighted
 from frf_ipz.identification.likelihood.refinement import Refined, refine
-from frf_ipz.identification.search.drift import drift_of
+from frf_ipz.identification.search.artefacts import find_artefacts
+from frf_ipz.identification.search.drift import Drift, find_drift
 from frf_ipz.identification.search.judgement import Judgement, judge
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
     from frf_ipz.identification.options import FitOptions
 
-ROUNDS = 4  # of adding poles
+ROUNDS = 8  # of adding poles
+CLEARER = 0.6  # times the misfit before: what was refused then may be proposed again
 ROUGH_ITERATIONS = 12  # of a fit whose poles are still to be judged
 UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole says nothing
 NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or struck
+MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
 NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
 
 
@@ -32,7 +35,9 @@ class Selected:
     Parameters
     ----------
     data : Weighted
-        What was fitted; with the drift between FRFs where there is one.
+        What was fitted: FRFs moved to their mean frequencies where the structure drifted.
+    drift : Drift or None
+        The drift, where there is one.
     fit : Refined
         Poles and residues.
     judgement : Judgement
@@ -42,6 +47,7 @@ class Selected:
     """
 
     data: Weighted
+    drift: Drift | None
     fit: Refined
     judgement: Judgement
     decisions: tuple[dict[str, object], ...]
@@ -55,6 +61,8 @@ class _Search:
     terms: SmoothTerms
     pinned: FloatArray
     struck: tuple[tuple[float, str], ...]
+    trusted: bool
+    drift: Drift | None = None
     refused: list[complex] = field(default_factory=list)
     decisions: list[dict[str, object]] = field(default_factory=list)
 
@@ -64,7 +72,9 @@ class _Search:
             self.decisions.append({"frequency_hz": hz, "damping_ratio": ratio, "action": action, "reason": reason})
 
 
-def select_modes(data: Weighted, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
+def select_modes(
+    data: Weighted, poles: ComplexArray, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
+) -> Selected:
     """Find the modes that the lines ask for.
 
     Parameters
@@ -77,6 +87,8 @@ def select_modes(data: Weighted, poles: ComplexArray, terms: SmoothTerms, option
         What lies out of band.
     options : FitOptions
         Poles that are pinned and struck.
+    noise_is_known : bool
+        All FRFs came with their variance.
 
     Returns
     -------
@@ -84,11 +96,15 @@ def select_modes(data: Weighted, poles: ComplexArray, terms: SmoothTerms, option
         The fit.
     """
     struck = tuple((one.hz, one.why) for one in options.strike)
-    search = _Search(data=data, terms=terms, pinned=np.array(options.pin_hz, float), struck=struck)
+    search = _Search(
+        data=data, terms=terms, pinned=np.array(options.pin_hz, float), struck=struck, trusted=noise_is_known
+    )
     poles = _pin(search, _strike(search, poles))
+    search.trusted = True  # first poles are not many, and errors of strong modes are not told yet
     fit, judgement = _skim(search, refine(data, poles, terms, iterations=ROUGH_ITERATIONS))
+    search.trusted = noise_is_known
     for _ in range(ROUNDS):
-        search.data, fit, judgement = _with_drift(search, fit, judgement)
+        fit, judgement = _with_drift(search, fit, judgement)
         proposed = _proposed(search, judgement)
         if not len(proposed):
             break
@@ -97,9 +113,15 @@ def select_modes(data: Weighted, poles: ComplexArray, terms: SmoothTerms, option
         better, verdict = _skim(search, trial)
         if len(better.poles) <= len(fit.poles) and better.misfit > fit.misfit:
             continue
+        if better.misfit < CLEARER * fit.misfit:
+            search.refused.clear()  # they were judged against a misfit that was not noise
         search.note(*_added(fit.poles, better.poles))
         fit, judgement = better, verdict
-    return Selected(data=search.data, fit=fit, judgement=judgement, decisions=tuple(search.decisions))
+    search.trusted = search.trusted and bool(np.median(judgement.level) < MODEL_ERROR)
+    fit, judgement = _skim(search, fit)
+    return Selected(
+        data=search.data, drift=search.drift, fit=fit, judgement=judgement, decisions=tuple(search.decisions)
+    )
 
 
 def _strike(search: _Search, poles: ComplexArray) -> ComplexArray:
@@ -141,11 +163,14 @@ def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
         judgement = judge(search.data, fit, search.terms)
         struck = _near_struck(search, fit.poles)
         weak = (judgement.significance < 1) | (judgement.damping_std > UNCERTAIN)
-        bad = struck | (weak & ~_protected(search, fit.poles))
+        artefacts = [""] * len(fit.poles) if search.trusted else find_artefacts(search.data, fit, judgement)
+        bad = struck | (
+            (weak | np.array([bool(reason) for reason in artefacts], bool)) & ~_protected(search, fit.poles)
+        )
         if not bad.any():
             return fit, judgement
         bad &= struck | (judgement.significance <= np.median(judgement.significance[bad]))
-        reasons = [_why(judgement, number) for number in np.flatnonzero(bad).tolist()]
+        reasons = [_why(judgement, number) or artefacts[number] for number in np.flatnonzero(bad).tolist()]
         search.note(fit.poles[bad], "dropped", reasons)
         search.refused.extend(fit.poles[bad].tolist())
         fit = refine(search.data, fit.poles[~bad], search.terms, iterations=ROUGH_ITERATIONS)
@@ -154,19 +179,19 @@ def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
 def _why(judgement: Judgement, number: int) -> str:
     if judgement.significance[number] < 1:
         return f"takes off the misfit {judgement.significance[number]:.2g} of what the BIC demands"
-    return f"its damping is known to {judgement.damping_std[number]:.0%} only"
+    if judgement.damping_std[number] > UNCERTAIN:
+        return f"its damping is known to {judgement.damping_std[number]:.0%} only"
+    return ""
 
 
-def _with_drift(search: _Search, fit: Refined, judgement: Judgement) -> tuple[Weighted, Refined, Judgement]:
-    if search.data.stretch is not None or not len(fit.poles):
-        return search.data, fit, judgement
-    stretch = drift_of(search.data, fit, search.terms)
-    if stretch is None:
-        return search.data, fit, judgement
-    search.data = replace(search.data, stretch=stretch)
+def _with_drift(search: _Search, fit: Refined, judgement: Judgement) -> tuple[Refined, Judgement]:
+    found = None if search.drift else find_drift(search.data, fit, search.terms)
+    if found is None:
+        return fit, judgement
+    search.drift, moved_fit = found
+    search.data = replace(search.data, receptance=search.drift.moved)
     search.refused.clear()
-    fit, judgement = _skim(search, refine(search.data, fit.poles, search.terms, iterations=ROUGH_ITERATIONS))
-    return search.data, fit, judgement
+    return _skim(search, moved_fit)
 
 
 def _proposed(search: _Search, judgement: Judgement) -> ComplexArray:
