@@ -13,12 +13,12 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.fe.response import model_frfs
+from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel
-from updating_bench.judgement import correlations, error_db, measured_poles_with_nominal_shapes
 from updating_bench.paper_cases import PaperCase, published, section_4, section_5, shown_zeros, table
 
 BAND_RAD_S = np.linspace(40.0, 3900.0, 4000)  # section 4: where the paper compares FRFs
@@ -37,7 +37,7 @@ def compare_section_4() -> pd.DataFrame:
     """One row a method: how it ended and how good the point of interest is."""
     case = section_4()
     rows = {"nominal": judge(case, case.reduced)}
-    rows["measured poles, nominal shapes"] = judge(case, measured_poles_with_nominal_shapes(case.reduced, case.pairs))
+    rows["measured poles, nominal shapes"] = judge(case, with_measured_poles(case.reduced, case.pairs))
     for name, options, parts in (
         ("ipz, delta 1e-5", published(4, 1e-5), False),
         ("ipz, delta 1e-1", published(4, 1e-1), False),
@@ -54,12 +54,16 @@ def compare_section_4() -> pd.DataFrame:
 def judge(case: PaperCase, model: ReducedModel, updated: UpdatedModel | None = None) -> dict[str, float]:
     """Judge a model by its FRF and its zeros at the point of interest, and an update by its targets."""
     s = 1j * BAND_RAD_S
-    found, truth = model_frfs(model, [case.point], s)[:, 0], case.truth.receptance(s, case.point)
-    shape, amplitude = correlations(found, truth)
+    agreement = compare_frfs(case.truth.receptance(s, case.point)[:, None], model_frfs(model, [case.point], s))
     real = case.truth.zeros(case.point)
     real = real[(real.imag < BAND_RAD_S[-1]) & (np.abs(real.real) < 0.1 * np.abs(real))]
     zeros = shown_zeros(model, case.point)[: len(real)]
-    row = {"dB": error_db(found, truth), "X_S": shape, "X_A": amplitude, "zeros_%": worst_percent(zeros, real)}
+    row = {
+        "dB": float(agreement.median_db[0]),
+        "X_S": float(agreement.shape[0]),
+        "X_A": float(agreement.amplitude[0]),
+        "zeros_%": worst_percent(zeros, real),
+    }
     if updated is not None:
         matrix = model.stiffness
         row["iterations"] = float(updated.history.groupby("phase").iteration.max().sum())

@@ -23,13 +23,13 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.pairing.assignment import pair
 from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
-from updating_bench.judgement import error_db, measured_poles_with_nominal_shapes
 from updating_bench.random_structures import Case, random_case
 from updating_bench.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
 
@@ -75,7 +75,7 @@ def study(seed: int, *, with_ipz: bool = True) -> pd.DataFrame:
     published = by_ipz(bench) if with_ipz else None
     models = {
         "nominal": bench.reduced,
-        "trivial": measured_poles_with_nominal_shapes(bench.reduced, bench.pairs),
+        "trivial": with_measured_poles(bench.reduced, bench.pairs),
         "ipz": None if published is None else published.model,
         "minimal-change": updated.model,
     }
@@ -123,13 +123,14 @@ def judge(bench: Bench, updated: UpdatedModel, models: dict[str, ReducedModel | 
         if label.input_dof != bench.case.blows[0]:
             continue
         s = 2j * np.pi * lines
-        truth = bench.truth.receptance(s, label)
+        truth = bench.truth.receptance(s, label)[:, None]
         row = {
-            name: np.nan if model is None else error_db(model_frfs(model, [label], s)[:, 0], truth)
+            name: np.nan if model is None else float(compare_frfs(truth, model_frfs(model, [label], s)).median_db[0])
             for name, model in models.items()
         }
         low, high = predicted.magnitude_low[:, number], predicted.magnitude_high[:, number]
-        row["covered"] = float(np.mean((np.abs(truth) >= low) & (np.abs(truth) <= high)))
+        magnitude = np.abs(truth[:, 0])
+        row["covered"] = float(np.mean((magnitude >= low) & (magnitude <= high)))
         row["band_db"] = float(np.median(20 * np.log10(high / low)))
         rows.append(row)
     return rows

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from frf_ipz.prediction.agreement import with_measured_poles
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from paper_comparison import compare_section_4, judge
-from updating_bench.judgement import measured_poles_with_nominal_shapes
 from updating_bench.paper_cases import section_4, section_5
 
 MOST_ITERATIONS = 5
@@ -69,7 +69,7 @@ def test_it_beats_the_trivial_answer_in_db_and_zeros_and_so_does_the_table():
 
 def test_the_trivial_answer_has_the_measured_poles():
     case = section_4()
-    trivial = measured_poles_with_nominal_shapes(case.reduced, case.pairs)
+    trivial = with_measured_poles(case.reduced, case.pairs)
     values = np.linalg.eigvals(np.linalg.solve(trivial.mass, trivial.stiffness)).real
     assert_allclose(np.sqrt(np.sort(values)[:4]), np.abs(case.targets[:4]), rtol=1e-9)
 
