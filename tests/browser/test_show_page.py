@@ -228,7 +228,7 @@ def test_the_structure_moves_and_rests(page):
     )
     at_rest = page.run(pose)
     page.run(
-        "document.querySelector('#phase').value = 90; document.querySelector('#phase').dispatchEvent(new Event('input'))"
+        "const slider = document.querySelector('#phase'); slider.value = 90; slider.dispatchEvent(new Event('input'))"
     )
     assert page.run(pose) != at_rest
     page.run(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.report.picture import Picture, Trace, line, outline
+from frf_ipz.report.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
 
 DIAGRAM = "stabilisation"
+CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen stretch stay as clear as they were
 
 
 def with_choices(picture: Picture, options: FitOptions) -> Picture:
@@ -42,10 +44,12 @@ def with_choices(picture: Picture, options: FitOptions) -> Picture:
     shapes = [outline(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
     words = [f"{len(options.pin_hz)} pinned"] if options.pin_hz else []
     words += [f"{len(strikes)} struck"] if strikes else []
-    words += [f"{len(options.exclude_hz)} stretches left out (shaded)"] if options.exclude_hz else []
+    left_out = counted(len(options.exclude_hz), "stretch", "stretches")
+    words += [f"{left_out} left out (shaded)"] if options.exclude_hz else []
     note = f"{picture.note} Your choices: {', '.join(words)}." if words else picture.note
     layout = {**picture.layout, "shapes": [*picture.layout.get("shapes", []), *shapes]}
-    return replace(picture, traces=(*picture.traces, *traces), layout=layout, note=note)
+    drawn = [{**trace, **CLEAR} if trace.get("mode") == "markers" else trace for trace in picture.traces]
+    return replace(picture, traces=(*drawn, *traces), layout=layout, note=note)
 
 
 def _uprights(
