@@ -170,9 +170,10 @@ def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
     assert list(result.frfs.averages) == [1, 1, 1, 1]
 
 
-def test_a_double_hit_that_is_kept_gives_the_right_frf(tmp_path):
+@pytest.mark.parametrize("force_window_s", [None, 0.008])
+def test_a_double_hit_that_is_kept_gives_the_right_frf(tmp_path, force_window_s):
     """Both pulses are in the force, so that nothing is wrong with the FRF when the window keeps them."""
-    result = estimate(campaign(tmp_path, twice, others=0))
+    result = estimate(campaign(tmp_path, twice, others=0), force_window_s=force_window_s)
     band = result.frfs.in_band((20.0, 250.0))
     truth = Structure().accelerance(result.frfs.s[band])
     assert np.abs(result.frfs.values[band] - truth).max() < 0.02 * np.abs(truth).max()
