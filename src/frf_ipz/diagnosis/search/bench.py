@@ -63,7 +63,7 @@ class Bench:
 
     def fit_from(self, fit: Fit) -> Fit:
         """Fit exactly, from a fit with large errors."""
-        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=10)
+        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=16)
 
 
 def weights_of(measured: Measured, error: float) -> FloatArray:

@@ -20,13 +20,17 @@ from frf_ipz.diagnosis.physics.response import Response, nuisance_jacobian
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.transfer import Measured, Whitening
+    from frf_ipz.diagnosis.physics.nuisance import Nuisance
+    from frf_ipz.diagnosis.physics.response import Modes
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
 
 STEP = 1e-5  # of the logarithm of a parameter, for its derivative
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-8, 1e6
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-5, 1e-9, 1e6
 FASTER, SLOWER = 0.2, 6.0  # what damping is multiplied with after a good and a bad step
 LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear range
 PRIOR_CURVATURE = 12.0  # over the squared range: that of a uniform prior, where the data say nothing
+KEPT_TWICE = 2  # corrections of the frequencies after a step
+FARTHEST = 0.1  # of a squared frequency: more is no small correction
 LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
 MATTERS = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
@@ -178,7 +182,8 @@ class _Slope:
 
     jacobian: FloatArray
     used: BoolArray
-    squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies without scatter
+    squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies
+    scatter: FloatArray  # (m, n_unknowns), of the same
     ratios: FloatArray  # (m, n_parameters), of their damping ratios without scatter
 
     def curvature(self, hypothesis: Hypothesis) -> FloatArray:
@@ -205,7 +210,7 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
         response = hypothesis.respond(hypothesis.physical(moved), point.unknown, data.measured.s)
         columns.append(data.whitening(gains * (response.values - point.response.values) / step)[:, None])
         here, there = point.response.modes, response.modes
-        squares.append((there.omega[:m] ** 2 - here.omega[:m] ** 2) / step)
+        squares.append((there.squares[:m] - here.squares[:m]) / step)
         ratios.append((there.stated_ratio[:m] - here.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
     white = data.whitening(gains[:, None] * by_unknown)
@@ -214,6 +219,7 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
         jacobian=np.hstack([*columns, white[:, used]]),
         used=used,
         squares=np.reshape(squares, (len(columns), m)).T,
+        scatter=_scatter_of_squares(point.response.modes, hypothesis.nuisance),
         ratios=np.reshape(ratios, (len(columns), m)).T,
     )
 
@@ -231,8 +237,7 @@ def _step(hypothesis: Hypothesis, data: Data, point: _Point, slope: _Slope, damp
     searched = np.clip(point.searched + step[:n_parameters], hypothesis.low, hypothesis.high)
     unknown = point.unknown.copy()
     unknown[slope.used] += step[n_parameters:]
-    if n_parameters:
-        unknown = _keep_modes(hypothesis, point, slope, searched, unknown)
+    unknown = _keep_modes(hypothesis, point, slope, searched, unknown)
     return _at(hypothesis, data, searched, unknown)
 
 
@@ -241,34 +246,46 @@ def _keep_modes(
 ) -> FloatArray:
     """Bring frequencies and damping of the modes to where the linear step wants them.
 
-    A sharp peak allows a parameter no long step, unless the scatter of its frequency makes up for what the step does to
-    it beyond the linear: the data fix frequencies, not the parameters that they depend on.
+    A sharp peak allows no long step, unless the scatter of its frequency makes up for what the step does to it beyond
+    the linear: the data fix frequencies, not the parameters that they depend on.
     """
     nuisance, here = hypothesis.nuisance, point.response.modes
-    there = hypothesis.modes(hypothesis.physical(searched), unknown)
     m, moved, spread = nuisance.n_modes, searched - point.searched, np.diag(nuisance.kappa_std)
-    corrected = unknown.copy()
-    linear = here.omega[:m] ** 2 + slope.squares @ moved
-    places, elastic = nuisance.frequency_places, (there.omega[:m] > 0) & (spread > 0) & (here.omega[:m] > 0)
-    elastic &= slope.used[places]
-    kappa = unknown[places] * spread
-    wanted = linear * (1 + point.unknown[places] * spread) + here.omega[:m] ** 2 * (
-        kappa - point.unknown[places] * spread
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):  # rigid-body modes are left out below
-        corrected[places] = np.where(elastic, (wanted / there.omega[:m] ** 2 - 1) / spread, unknown[places])
+    values, corrected = hypothesis.physical(searched), unknown.copy()
+    linear = here.squares[:m] + slope.squares @ moved + slope.scatter @ (unknown - point.unknown)
+    places = nuisance.frequency_places
+    for _ in range(KEPT_TWICE):
+        there = hypothesis.modes(values, corrected)
+        elastic = (there.omega[:m] > 0) & (spread > 0) & (linear > 0) & slope.used[places]
+        scale = np.where(elastic, there.omega[:m] ** 2 * spread, 1.0)
+        off = np.clip((linear - there.squares[:m]) / scale, -FARTHEST / np.maximum(spread, 1e-12), np.inf)
+        corrected[places] += np.where(elastic, np.minimum(off, FARTHEST / np.maximum(spread, 1e-12)), 0.0)
     places = nuisance.damping_places
     linear_ratio = here.stated_ratio[:m] + slope.ratios @ moved
     old, new = point.unknown[places] * nuisance.damping_std, unknown[places] * nuisance.damping_std
     wanted_ratio = linear_ratio * (1 + old) + here.stated_ratio[:m] * (new - old)
     damped = slope.used[places] & (there.stated_ratio[:m] > 0)
-    corrected[places] = np.where(
-        damped,
-        (np.maximum(wanted_ratio, LEAST_OF_RATIO * there.stated_ratio[:m]) / there.stated_ratio[:m] - 1)
-        / nuisance.damping_std,
-        unknown[places],
-    )
+    least = LEAST_OF_RATIO * there.stated_ratio[:m]
+    stated = np.where(damped, there.stated_ratio[:m], 1.0)
+    relative = np.maximum(wanted_ratio, least) / stated - 1
+    corrected[places] = np.where(damped, relative / nuisance.damping_std, unknown[places])
     return corrected
+
+
+def _scatter_of_squares(modes: Modes, nuisance: Nuisance) -> FloatArray:
+    """Change of the squared frequencies by what cannot be known, (m, n_nuisance)."""
+    m = nuisance.n_modes
+    i, j = nuisance.pairs
+    turned = modes.rotation[i] * modes.rotation[j] * np.where(i == j, 1.0, 2.0)[:, None]
+    omega = modes.omega[:m]
+    kappa = turned * (omega[i] * omega[j] * nuisance.kappa_std[i, j])[:, None]
+    mu = -turned * modes.squares[:m] * nuisance.mu_std[i, j][:, None]
+    cords = modes.rotation[: nuisance.n_rigid] ** 2 * nuisance.cords_std
+    found = np.zeros((m, nuisance.size))
+    size = len(i)
+    found[:, :size], found[:, size : 2 * size] = kappa.T, mu.T
+    found[:, 2 * size + m : 2 * size + m + nuisance.n_rigid] = cords.T
+    return found
 
 
 def same_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArray:

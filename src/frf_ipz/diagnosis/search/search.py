@@ -160,7 +160,20 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     for fit in sorted(early, key=lambda fit: fit.cost)[:FITTED_EXACTLY]:
         if fit.cost < limit:
             _keep(fits, bench.fit_from(fit))
+    _fit_imitators(bench, early, fits)
     return fits
+
+
+def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
+    """Fit what is known to look like the best: far behind at first, it may yet be as good."""
+    best = max(fits.values(), key=lambda fit: fit.log_evidence).hypothesis.causes[-1].effect
+    fitted = {fit.hypothesis.causes[-1].effect.name for fit in fits.values()}
+    for fit in sorted(early, key=lambda fit: fit.cost):
+        effect = fit.hypothesis.causes[-1].effect
+        alike = effect.name in best.imitators or best.name in effect.imitators
+        if alike and effect.name not in fitted:
+            fitted.add(effect.name)
+            _keep(fits, bench.fit_from(fit))
 
 
 def _climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
