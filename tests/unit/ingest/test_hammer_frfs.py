@@ -207,3 +207,56 @@ def test_a_response_may_be_a_velocity(tmp_path):
     band = frfs.in_band(BAND_HZ)
     truth = structure.accelerance(frfs.s[band])[:, :1] / frfs.s[band, None]
     assert np.abs(frfs.values[band] - truth).max() < EXACT * np.abs(truth).max()
+
+
+def test_the_variance_of_a_single_blow_is_the_noise_in_its_own_record(tmp_path):
+    """Over many lines the squared error is what the variance says, though nothing was averaged."""
+    structure = Structure()
+    path = hammer_campaign(tmp_path, structure=structure, heights=(100.0,), noise=0.05, seed=4)
+    result = estimate(path, exponential_window_s=0.3)
+    band = result.frfs.in_band(BAND_HZ)
+    truth = structure.accelerance(result.frfs.s[band])
+    ratio = np.abs(result.frfs.values[band] - truth) ** 2 / result.frfs.variance[band]
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.3)  # under the window a sixth of the 790 lines is independent
+    assert np.isnan(result.frfs.coherence).all()
+    assert any("a single blow or record at 7:+z: no coherence" in warning for warning in result.warnings)
+
+
+def test_the_variance_of_several_blows_is_their_error(tmp_path):
+    structure = Structure()
+    path = hammer_campaign(tmp_path, structure=structure, heights=(100, 60, 150, 80, 120), noise=0.05, seed=5)
+    frfs = estimate(path).frfs
+    band = frfs.in_band(BAND_HZ)
+    ratio = np.abs(frfs.values[band] - structure.accelerance(frfs.s[band])) ** 2 / frfs.variance[band]
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.2)
+    assert np.median(frfs.coherence[band]) > 0.99
+
+
+def test_the_scatter_between_blows_is_what_the_variance_says(tmp_path):
+    """FRFs of single blows scatter about their mean as the variance of the mean foretells."""
+    path = hammer_campaign(tmp_path, heights=(100.0,) * 6, noise=0.05, seed=6, at_s=0.0303)
+    names = [f"p7_{number:02d}.csv" for number in range(1, 7)]
+    windows = {"exponential_window_s": 0.3}
+    mean = estimate(path, **windows).frfs
+    alone = [
+        estimate(path, drop=tuple(other for other in names if other != name), **windows).frfs.values for name in names
+    ]
+    band = mean.in_band(BAND_HZ)
+    scatter = np.var(alone, axis=0, ddof=1)[band] / 6
+    assert np.mean(scatter / mean.variance[band]) == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_response_may_be_a_rotation(tmp_path):
+    structure = Structure()
+    for number in range(2):
+        signals = blow(structure, height=90.0 + number)
+        signals[2] *= 1e3  # in mrad/s^2
+        write_csv(tmp_path / "hits" / f"{number}.csv", signals, 1 / 2048)
+    path = write_test(tmp_path, HIT)
+    head, tail = path.read_text(encoding="utf-8").split('column = "acc_2"')
+    tail = tail.replace('unit = "m/s^2"', 'unit = "mrad/s^2"').replace('dof = "2:+z"', 'dof = "1:-ry"')
+    path.write_text(f'{head}column = "acc_2"{tail}', encoding="utf-8")
+    result = estimate(path)
+    assert errors(result, structure).max() < EXACT
+    assert result.frfs.labels[1].unit == "rad/s^2/N"
+    assert result.frfs.labels[1].sign == -1
