@@ -46,6 +46,8 @@ class RunContents:
         Where the nodes of the FE model are.
     reference : FrfSet, optional
         Measured FRFs at points of interest that were kept aside.
+    is_lumped : bool
+        The model is lumped: its geometry is a row of masses, not positions.
     stale : frozenset of str
         Stages whose result was made before the last change.
     """
@@ -61,6 +63,7 @@ class RunContents:
     diagnosis: Diagnosis | None = None
     geometry: Geometry | None = None
     reference: FrfSet | None = None
+    is_lumped: bool = False
     stale: frozenset[str] = frozenset()
 
     @property
@@ -170,6 +173,7 @@ def read_contents(folder: RunFolder) -> RunContents:
         state_space=folder.load("export") if has_model else None,
         diagnosis=folder.load("diagnose"),
         geometry=model.geometry if isinstance(model, StructuralModel) else model,
+        is_lumped=isinstance(model, StructuralModel) and model.kind == "lumped",
         reference=folder.load("reference"),
         stale=frozenset(name for name in stages if folder.is_stale(name)),
     )

@@ -17,7 +17,7 @@ SENTENCES = {
 }
 
 
-def verdict_of(diagnosis: Diagnosis) -> str:
+def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     """Give the verdict as a sentence.
 
     Parameters
@@ -27,14 +27,30 @@ def verdict_of(diagnosis: Diagnosis) -> str:
 
     Returns
     -------
-    str
-        The findings' own statements, where there are any.
+    pair of str
+        The verdict, or what was found first; and the findings' other statements.
     """
-    verdict = diagnosis.verdict
-    statements = [finding.statement for finding in diagnosis.findings if finding.statement]
-    if verdict == "explained" and statements:
-        return " ".join(statements)
-    return " ".join([SENTENCES.get(verdict, ""), *statements]).strip()
+    statements = [plain_signs(finding.statement) for finding in diagnosis.findings if finding.statement]
+    if diagnosis.verdict == "explained" and statements:
+        return statements[0], " ".join(statements[1:])
+    part = "A part of it is explained: " if statements else ""
+    return SENTENCES.get(diagnosis.verdict, ""), part + " ".join(statements)
+
+
+def plain_signs(text: str) -> str:
+    """Set typographic signs in a text that was made for a terminal.
+
+    Parameters
+    ----------
+    text : str
+        With ``+-``.
+
+    Returns
+    -------
+    str
+        With the sign for plus or minus.
+    """
+    return text.replace("+-", "±")
 
 
 def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -32,12 +32,15 @@ class Marks:
         DOFs of the test, and points of interest.
     missing : mapping of int to str
         Nodes at which something is missing in the model, and what.
+    across : str
+        Title of the axis under a structure that is a line.
     """
 
     sensors: Sequence[Dof] = ()
     blows: Sequence[Dof] = ()
     points: Sequence[Dof] = ()
     missing: Mapping[int, str] = field(default_factory=dict)
+    across: str = "Position, m"
 
 
 def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
@@ -72,7 +75,7 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
         title="The structure",
         alt=_in_words(geometry, marks),
         traces=tuple(traces),
-        layout=_layout(geometry, positions, is_line=is_line),
+        layout=_layout(marks.across if geometry is not None else "Node number", positions, is_line=is_line),
         note=note,
         height_px=230 if is_line else 430,
     )
@@ -146,14 +149,13 @@ def _missing(missing: Mapping[int, str], positions: FloatArray, place: Mapping[i
     return [markers(positions[rows, 0], positions[rows, 1], "missing in the model", "@bad", **style)]
 
 
-def _layout(geometry: Geometry | None, positions: FloatArray, *, is_line: bool) -> dict[str, Any]:
+def _layout(across_title: str, positions: FloatArray, *, is_line: bool) -> dict[str, Any]:
     hidden = {"showgrid": False, "zeroline": False, "showline": False, "ticks": "", "showticklabels": False}
     extent = float(np.ptp(positions[:, 0])) or 1.0
     margin = 0.06 * extent
     across = [float(positions[:, 0].min()) - margin, float(positions[:, 0].max()) + margin]
     if is_line:
-        title = {"text": "Position, m" if geometry is not None else "Node number"}
-        x = {"title": title, "range": across, "showgrid": False, "zeroline": False}
+        x = {"title": {"text": across_title}, "range": across, "showgrid": False, "zeroline": False}
         return {"xaxis": x, "yaxis": {**hidden, "range": [-0.9, 0.95], "fixedrange": True}}
     return {"xaxis": hidden, "yaxis": {**hidden, "scaleanchor": "x"}}
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate
-from frf_ipz.report.findings import verdict_of
+from frf_ipz.report.findings import plain_signs, verdict_of
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
 from frf_ipz.report.table import Table
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 MOST_ALTERNATIVES = 15
+POWERS = {"exponentformat": "power", "dtick": 1}
+WIDE = 30.0  # ratio of evidences from which their axis is logarithmic
 
 
 def build(run: RunContents) -> Section | None:
@@ -43,12 +45,14 @@ def build(run: RunContents) -> Section | None:
     if len(diagnosis.mismatch):
         blocks.append(_map(diagnosis))
     if diagnosis.findings or diagnosis.alternatives:
-        blocks += [_ranking(diagnosis), _findings(diagnosis)]
+        gains = [one.log_evidence_gain for one in (*diagnosis.findings, *diagnosis.alternatives)]
+        blocks += [_ranking(diagnosis)] if max(gains) > 0 else []
+        blocks.append(_findings(diagnosis))
     blocks.append(_proof(diagnosis))
     if diagnosis.curves is not None:
         blocks.append(_curves(diagnosis.curves, run.band_hz))
     blocks += _gates(diagnosis) + _detectability(diagnosis)
-    lead = diagnosis.statement or verdict_of(diagnosis)
+    lead = plain_signs(diagnosis.statement) or verdict_of(diagnosis)[0]
     notes = (*[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity], *diagnosis.warnings)
     return Section(anchor="diagnosis", title="Diagnosis", lead=lead, blocks=tuple(blocks), notes=notes)
 
@@ -70,7 +74,7 @@ def _map(diagnosis: Diagnosis) -> Picture:
             place = names.index(str(row["frf"])), bands.index((float(row["low_hz"]), float(row["high_hz"])))
             values[place] = row[column]
         traces.append(_heat(values, names, bands, (rank, column, top)))
-    shared = {"title": {"text": ""}, "type": "category", "autorange": "reversed"}
+    shared = {"type": "category", "autorange": "reversed"}
     axes = Axis(title="model as it is", options=shared), Axis(title="with the findings", options=shared)
     x = {"title": {"text": "Band, Hz"}, "type": "category", "tickangle": -40}
     return Picture(
@@ -112,25 +116,29 @@ def _ranking(diagnosis: Diagnosis) -> Picture:
     names = [f"{_plain(one.effect)} {_where(one.location)}".strip() for one in ranked]
     names = [f"{place + 1}. {name}" for place, name in enumerate(names)]
     found = len(diagnosis.findings)
+    gains = np.array([one.log_evidence_gain for one in ranked])
+    wide = bool(gains.max() > WIDE * max(float(np.median(gains)), 1.0))
     bars: Trace = {
         "type": "bar",
         "orientation": "h",
-        "x": np.array([one.log_evidence_gain for one in ranked]),
+        "x": np.maximum(gains, 1.0) if wide else gains,
+        "customdata": gains,
         "y": names,
         "marker": {"color": ["@updated"] * found + ["@muted/0.7"] * (len(ranked) - found)},
         "text": [f"p = {number(one.probability, 3)}" for one in ranked],
         "textposition": "auto",
-        "hovertemplate": "%{y}: %{x:.4g} nats, %{text}<extra></extra>",
+        "hovertemplate": "%{y}: %{customdata:.4g} nats, %{text}<extra></extra>",
         "name": "evidence",
     }
     y = Axis(title="", options={"autorange": "reversed", "type": "category"})
+    scale = {"type": "log", **POWERS} if wide else {}
     return Picture(
         name="ranking",
         title="Explanations by their evidence",
         alt="Bars: "
         + "; ".join(f"{name}: {number(one.log_evidence_gain)} nats" for name, one in zip(names, ranked, strict=True)),
         traces=(bars,),
-        layout=panels({"title": {"text": "Gain of log evidence over the model without it, nats"}}, y),
+        layout=panels({"title": {"text": "Gain of log evidence over the model without it, nats"}, **scale}, y),
         note="Blue: the findings; grey: other explanations. p is the probability among all that were tried.",
         height_px=int(np.clip(110 + 30 * len(ranked), 180, 640)),
     )
@@ -266,7 +274,7 @@ def _gates(diagnosis: Diagnosis) -> list[Block]:
             alt="; ".join(f"{row[0]}: {row[1]}, limit {row[2]}, {row[3]}" for row in rows),
             traces=(points, limits),
             layout=panels(
-                {"title": {"text": "Mean squared difference over its expected square"}, "type": "log"},
+                {"title": {"text": "Mean squared difference over its expected square"}, "type": "log", **POWERS},
                 Axis(title="", options={"type": "category", "range": [-0.6, len(gates) - 0.4]}),
             ),
             note="A structure whose FRFs change with the level of the blows (homogeneity) is not linear.",

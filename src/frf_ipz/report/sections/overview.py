@@ -49,13 +49,16 @@ def build(run: RunContents) -> Section:
         f"<dd>{escape(card.meaning)}</dd></div>"
         for card in cards
     )
-    head = Markup(html=f'<p class="verdict">{escape(verdict(run))}</p><dl class="cards">{shown}</dl>')
+    first, more = verdict(run)
+    said = f'<p class="verdict">{escape(first)}</p>' + (f'<p class="lead">{escape(more)}</p>' if more else "")
+    head = Markup(html=f'{said}<dl class="cards">{shown}</dl>')
     frfs = run.frfs
     marks = Marks(
         sensors=() if frfs is None else frfs.output_dofs,
         blows=() if frfs is None else frfs.input_dofs,
         points=run.points,
         missing=marked_nodes(run.diagnosis, frfs),
+        across="Masses in a row" if run.is_lumped else "Position, m",
     )
     drawing = draw_structure(run.geometry, marks)
     notes: tuple[str, ...] = ()
@@ -70,8 +73,8 @@ def build(run: RunContents) -> Section:
     )
 
 
-def verdict(run: RunContents) -> str:
-    """Sum up the run in a sentence or two.
+def verdict(run: RunContents) -> tuple[str, str]:
+    """Sum up the run.
 
     Parameters
     ----------
@@ -80,21 +83,21 @@ def verdict(run: RunContents) -> str:
 
     Returns
     -------
-    str
-        Text.
+    pair of str
+        The verdict in a sentence, and what there is to add.
     """
-    parts = [verdict_of(run.diagnosis)] if run.diagnosis is not None else []
+    parts = list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
     if run.updated is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
         low, high = run.fit.band_hz
         modes = counted(run.fit.n_modes, "mode")
-        parts.append(
-            f"{modes} found between {number(low)} and {number(high)} Hz in {counted(len(run.fit.labels), 'FRF')}."
-        )
+        frfs = counted(len(run.fit.labels), "FRF")
+        parts.append(f"{modes} found between {number(low)} and {number(high)} Hz in {frfs}.")
     elif run.frfs is not None:
         parts.append(f"{counted(run.frfs.n_frfs, 'FRF')} estimated; nothing fitted yet.")
-    return " ".join(parts) or "This run holds no results yet."
+    first, *others = parts or ["This run holds no results yet."]
+    return first, " ".join(filter(None, others))
 
 
 def _of_update(run: RunContents) -> str:
