@@ -19,6 +19,8 @@ from scipy import linalg
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import IllConditionedError
 
+RIDGE = 1e-13  # of the mean diagonal: far above rounding, far below what moves a pole that the data show
+
 
 def reduced_normal_matrix(theta: FloatArray, H: ComplexArray, order: int, *, real: bool) -> ComplexArray:
     """Normal matrix of the denominator's coefficients, the numerators eliminated.
@@ -71,7 +73,8 @@ def denominator(M: ComplexArray, n_ref: int, order: int) -> ComplexArray:
         D_0 to D_(m-1); D_m is the identity.
     """
     size = order * n_ref
-    low = linalg.solve(M[:size, :size], -M[:size, size : size + n_ref], assume_a="her", check_finite=False)
+    left = _bounded(M[:size, :size])
+    low = linalg.solve(left, -M[:size, size : size + n_ref], assume_a="her", check_finite=False)
     return np.asarray(low.reshape(order, n_ref, n_ref))
 
 
@@ -130,9 +133,14 @@ def _moments(theta: FloatArray, columns: ComplexArray, order: int, *, real: bool
     return np.asarray(np.concatenate([earlier[:0:-1], later]))
 
 
+def _bounded(matrix: ComplexArray) -> ComplexArray:
+    """Bound the condition of a normal matrix: where lines are missing, high orders are nearly dependent."""
+    return np.asarray(matrix + RIDGE * np.trace(matrix).real / len(matrix) * np.eye(len(matrix)))
+
+
 def _cholesky(R: ComplexArray) -> ComplexArray:
     try:
-        return np.asarray(linalg.cholesky(R, lower=True))
+        return np.asarray(linalg.cholesky(_bounded(R), lower=True))
     except linalg.LinAlgError:
         raise IllConditionedError(
             f"the start's model order {len(R) - 1} is too high for the lines of the band; set a lower [fit] max_order"
