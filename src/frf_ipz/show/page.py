@@ -133,7 +133,7 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
         ]
         blocks.insert(1, Markup(html=pole_controls(run.fit)))
     if section.anchor == "recordings":
-        blocks.insert(1, Markup(html=blow_controls(run, choices)))
+        blocks.append(Markup(html=blow_controls(run, choices)))
     if section.anchor == "overview" and run.geometry is not None:
         blocks.append(Markup(html=point_controls(run)))
     return replace(section, blocks=tuple(blocks))

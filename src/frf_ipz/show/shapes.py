@@ -53,7 +53,7 @@ class Shape:
     title : str
         Which one.
     motions : tuple of Motion
-        The models first, then the measurement.
+        Updated and nominal model where there are any, then the measurement: drawn in this order.
     """
 
     title: str
@@ -131,7 +131,7 @@ def operating_shape(run: RunContents, hertz: float, blow: str) -> Shape:
         for label, value in zip(labels, values, strict=True)
     }
     motions = [Motion(name="measured", title="measured", dofs=tuple(moved), values=_values(moved))]
-    models = {} if run.updated is None else {"updated": run.updated.model, "nominal": run.updated.nominal}
+    models = {} if run.updated is None else {"nominal": run.updated.nominal, "updated": run.updated.model}
     for name, model in models.items():
         dynamic = s**2 * model.mass + s * model.damping + model.stiffness
         motion = model.expansion @ np.linalg.solve(dynamic, sign * model.row(labels[0].input_dof.unsigned))
@@ -171,8 +171,10 @@ def _models(run: RunContents, number: int) -> dict[str, tuple[ReducedModel, comp
         return {}
     for place, row in enumerate(pairs.targets):
         if row.kind == "pole" and row.measured == number:
-            nominal = (updated.nominal, row.computed_value)
-            return {"updated": (updated.model, complex(updated.after[place])), "nominal": nominal}
+            return {
+                "nominal": (updated.nominal, row.computed_value),
+                "updated": (updated.model, complex(updated.after[place])),
+            }
     return {}
 
 

@@ -70,6 +70,7 @@ class Workbench:
         self._changing = Lock()
         self._before: str | None = None
         self._written: str | None = None
+        self._read: tuple[str, RunContents] | None = None
         self._worker = Worker(self._work)
 
     @property
@@ -86,7 +87,7 @@ class Workbench:
             return ""
 
     def contents(self) -> RunContents:
-        """Read what the folder holds.
+        """Read what the folder holds, once until it holds something else.
 
         Returns
         -------
@@ -98,7 +99,10 @@ class Workbench:
         InputError
             If a file is damaged.
         """
-        return read_contents(read_run(self.folder))
+        stamp = self.stamp
+        if self._read is None or self._read[0] != stamp:
+            self._read = stamp, read_contents(read_run(self.folder))
+        return self._read[1]
 
     def text(self) -> str:
         """Read the pipeline file.

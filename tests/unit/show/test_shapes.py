@@ -67,21 +67,21 @@ def at(motion, dofs):
 
 
 def test_the_operating_shape_of_a_model_is_that_of_its_own_frfs(run):
-    nominal, updated, measured = operating_shape(run, 33.2, "4:+x").motions
-    assert [motion.name for motion in (nominal, updated, measured)] == ["nominal", "updated", "measured"]
+    updated, nominal, measured = operating_shape(run, 33.2, "4:+x").motions
+    assert [motion.name for motion in (updated, nominal, measured)] == ["updated", "nominal", "measured"]
     assert measured.dofs == (Dof(2, "x"), Dof(3, "x"), Dof(5, "x"))
     assert_allclose(at(updated, measured.dofs), measured.values, rtol=ROUNDING)
     assert np.abs(at(nominal, measured.dofs) / measured.values - 1).max() > 0.1
 
 
 def test_a_blow_in_the_negative_direction_turns_the_shape(run):
-    _, updated, measured = operating_shape(run, 33.2, "1:-x").motions
+    updated, _, measured = operating_shape(run, 33.2, "1:-x").motions
     assert_allclose(at(updated, measured.dofs), measured.values, rtol=ROUNDING)
 
 
 @pytest.mark.parametrize("number", range(5))
 def test_a_mode_of_the_updated_model_is_the_measured_one(run, number):
-    nominal, updated, measured = mode_shape(run, number).motions
+    updated, nominal, measured = mode_shape(run, number).motions
     assert set(measured.dofs) == {Dof(2, "x"), Dof(3, "x"), Dof(5, "x")}
     assert_allclose(at(updated, measured.dofs), measured.values, atol=1e-7 * np.abs(measured.values).max(), rtol=0)
     assert "MAC 1.000 at 3 DOFs" in updated.title
