@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -46,6 +46,9 @@ class UpdatedModel:
         Targets that cannot be met, and why.
     warnings : tuple of str
         What the user has to know.
+    parts : DataFrame
+        Change of the stiffness of every part of the FE model, as `along_structure.change_along_structure` gives it;
+        empty where the method has not changed parts.
     """
 
     model: ReducedModel
@@ -58,6 +61,7 @@ class UpdatedModel:
     ensemble: FloatArray
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    parts: pd.DataFrame = field(default_factory=pd.DataFrame)
 
 
 def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:

@@ -16,13 +16,14 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal.ensemble import Posterior, draw_ensemble
 from frf_ipz.updating.minimal.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
 from frf_ipz.updating.minimal.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.minimal.suspects import contradicted, unmet_targets
-from frf_ipz.updating.parameters import generic_basis
+from frf_ipz.updating.parameters import ParameterBasis, generic_basis
 from frf_ipz.updating.tracking import WantedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
@@ -154,6 +155,7 @@ def _updated(
     mass, damping, stiffness = posterior.model()
     model = replace(problem.model, mass=mass, damping=damping, stiffness=stiffness)
     converged = posterior.stiffness_result.converged and posterior.damping_result.converged
+    ensemble, draws = draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble)
     tracked = posterior.damping_result.tracked.values(len(problem.values))
     return UpdatedModel(
         model=model,
@@ -163,6 +165,15 @@ def _updated(
         history=pd.DataFrame([{"phase": name, **row} for name, result in history for row in result.rows]),
         before=problem.computed,
         after=problem.roots_near(model, tracked),
-        ensemble=draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble),
+        ensemble=ensemble,
         unmet=unmet_targets(posterior.stiffness_result, problem.names, left_out),
+        parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
     )
+
+
+def _parts(basis: ParameterBasis, theta: FloatArray, draws: FloatArray) -> pd.DataFrame:
+    """Change of each part; empty where the parameters belong to no place."""
+    count = len(basis.regions)
+    if not count:
+        return pd.DataFrame()
+    return part_table(basis.regions, 1 + basis.amounts(theta)[:count], 1 + basis.amounts(draws)[:, :count])

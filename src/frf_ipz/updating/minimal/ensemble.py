@@ -50,7 +50,7 @@ class Posterior:
         return self.frame.outside(mass), self.frame.outside(damping), self.frame.outside(stiffness)
 
 
-def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
+def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
     """Draw models.
 
     Parameters
@@ -64,25 +64,30 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
 
     Returns
     -------
-    (count, 3, r, r) array
+    members : (count, 3, r, r) array
         Mass, damping and stiffness of each.
+    theta : (count, p) array
+        Parameters of their stiffness and mass.
     """
-    mass, stiffness = _draw_stiffness(posterior, rng, count)
+    theta, mass, stiffness = _draw_stiffness(posterior, rng, count)
     damping = _draw_damping(posterior, rng, count)
     frame = posterior.frame
-    return np.stack([frame.outside(mass), frame.outside(damping), frame.outside(stiffness)], axis=1)
+    return np.stack([frame.outside(mass), frame.outside(damping), frame.outside(stiffness)], axis=1), theta
 
 
-def _draw_stiffness(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+def _draw_stiffness(
+    posterior: Posterior, rng: np.random.Generator, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
     whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
-    mass, stiffness = phase.matrices(unwhiten(phase.terms, result.scales[:-1], whitened))
+    theta = unwhiten(phase.terms, result.scales[:-1], whitened)
+    mass, stiffness = phase.matrices(theta)
     # what the linear step promised for the poles is imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.wanted.frf < 0)
     promised = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
     wanted = np.exp(2 * promised[:, poles])
     shapes = next((roots.right.real for _, roots in result.tracked.groups if len(poles)), None)
-    return mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, wanted)
+    return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, wanted)
 
 
 def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wanted: FloatArray) -> FloatArray:

@@ -1,0 +1,150 @@
+"""Where along the structure a change sits: a factor on the stiffness of every part of the FE model.
+
+A method that has changed the parts says so itself, with the band that its targets leave open. For one that has changed
+the reduced matrices only, the change is read back as the smallest change of the parts that explains it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.updating.minimal.gaussian import solve_step
+from frf_ipz.updating.parameters import structural_basis
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.structure import ReducedModel, StructuralModel
+    from frf_ipz.updating.regions import Region
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+BAND = (0.05, 0.95)
+READ_BACK = 0.02  # of the largest entry of a relative change: what need not be explained by parts
+SIGNS = {-1: "softer", 1: "stiffer"}
+COLUMNS = (
+    "kind",
+    "name",
+    "nodes",
+    "x_m",
+    "y_m",
+    "z_m",
+    "stiffness_ratio",
+    "stiffness_ratio_low",
+    "stiffness_ratio_high",
+)
+
+
+def change_along_structure(updated: UpdatedModel, full: StructuralModel) -> pd.DataFrame:
+    """Say how much softer or stiffer every part of the FE model has become.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The result of an update, by any method.
+    full : StructuralModel
+        The FE model that was reduced.
+
+    Returns
+    -------
+    DataFrame
+        One row a part: ``kind, name, nodes`` (as text), ``x_m, y_m, z_m`` of its middle, ``stiffness_ratio`` (updated
+        over nominal), ``stiffness_ratio_low, stiffness_ratio_high`` (90 % band; NaN where it is read back). Empty for
+        a model without parts.
+    """
+    if len(updated.parts):
+        return updated.parts
+    basis = structural_basis(full, updated.nominal)
+    if not basis.regions:
+        return pd.DataFrame(columns=COLUMNS)
+    changes = _relative(updated.nominal, np.concatenate([basis.stiffness, [_change(updated)]]))
+    of_parts, wanted = changes[:-1].T, changes[-1]
+    root = np.hstack([term.std * term.root for term in basis.terms])
+    noise = (READ_BACK * max(np.abs(wanted).max(), np.finfo(float).tiny)) ** 2 * np.eye(len(wanted))
+    theta = root @ solve_step(of_parts @ root, wanted, noise).mean
+    return part_table(basis.regions, 1 + theta[: len(basis.regions)])
+
+
+def part_table(regions: Sequence[Region], ratios: FloatArray, draws: FloatArray | None = None) -> pd.DataFrame:
+    """Make the table of `change_along_structure`.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        The parts.
+    ratios : (n,) array
+        Stiffness of each, updated over nominal.
+    draws : (m, n) array, optional
+        The same of models drawn from what remains open.
+
+    Returns
+    -------
+    DataFrame
+        One row a part.
+    """
+    none = draws is None or not len(draws)
+    low, high = np.full((2, len(regions)), np.nan) if draws is None or none else np.quantile(draws, BAND, axis=0)
+    places = np.array([region.coordinates_m for region in regions]).reshape(-1, 3)
+    values = (
+        [region.kind for region in regions],
+        [region.name for region in regions],
+        [" ".join(str(node) for node in region.nodes) for region in regions],
+        *places.T,
+        ratios,
+        low,
+        high,
+    )
+    return pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))
+
+
+def notable_changes(parts: pd.DataFrame) -> tuple[str, ...]:
+    """Name the stretches whose stiffness differs beyond the band, the largest change first.
+
+    Parameters
+    ----------
+    parts : DataFrame
+        From `change_along_structure`.
+
+    Returns
+    -------
+    tuple of str
+        One sentence a stretch of neighbouring rows; none where every band holds 1, or there are no bands.
+    """
+    ratio = parts["stiffness_ratio"].to_numpy(float)
+    low, high = parts["stiffness_ratio_low"].to_numpy(float), parts["stiffness_ratio_high"].to_numpy(float)
+    sign = np.where(high < 1, -1, np.where(low > 1, 1, 0))
+    ends = np.flatnonzero(np.diff(sign)) + 1
+    stretches = [rows for rows in np.split(np.arange(len(sign)), ends) if len(rows) and sign[rows[0]]]
+    stretches.sort(key=lambda rows: -np.abs(np.log(ratio[rows])).max())
+    return tuple(_sentence(parts, rows, int(sign[rows[0]])) for rows in stretches)
+
+
+def _sentence(parts: pd.DataFrame, rows: np.ndarray, sign: int) -> str:
+    ratio = parts["stiffness_ratio"].to_numpy(float)
+    most = parts.iloc[int(rows[np.argmax(np.abs(np.log(ratio[rows])))])]
+    first, last = parts.iloc[int(rows[0])], parts.iloc[int(rows[-1])]
+    where = f"{first['name']}" if len(rows) == 1 else f"{first['name']} to {last['name']}"
+    return (
+        f"{where} (nodes {first['nodes'].split()[0]} to {last['nodes'].split()[-1]}): {SIGNS[sign]} than modelled, "
+        f"most at {most['name']}: {most['stiffness_ratio']:.3g} times "
+        f"({most['stiffness_ratio_low']:.3g} to {most['stiffness_ratio_high']:.3g})"
+    )
+
+
+def _change(updated: UpdatedModel) -> FloatArray:
+    change = updated.model.stiffness - updated.nominal.stiffness
+    return np.asarray((change + change.T) / 2)
+
+
+def _relative(model: ReducedModel, matrices: FloatArray) -> FloatArray:
+    """Upper triangles of changes, relative to ``omega_i omega_j`` in the model's modes: (n, k)."""
+    poles = undamped_poles(model.mass, model.stiffness)
+    shapes, squares = poles.right.real, np.maximum(poles.values.real, 0.0)
+    moving = squares > 1e-9 * squares.max()  # rigid-body modes have no stiffness to be relative to
+    scaled = shapes[:, moving] / np.sqrt(squares[moving])
+    inside = scaled.T @ matrices @ scaled
+    return np.asarray(inside[:, *np.triu_indices(inside.shape[1])])
