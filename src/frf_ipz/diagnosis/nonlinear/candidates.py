@@ -1,16 +1,23 @@
-"""The laws and places worth a closer look: screened, refined, and their neighbours too."""
+"""The laws and places that explain best: screened, refined, simulated, and their neighbours too.
+
+Short stretches first: within them even strongly nonlinear motion is predictable, and a rough start is good enough. What
+is best there is then fitted on the long ones.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.nonlinear.refine import LawFit, Start, refine
 from frf_ipz.diagnosis.nonlinear.screen import LinearFit, screen
+from frf_ipz.diagnosis.nonlinear.shoot import shoot
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.plant import Plant
@@ -18,13 +25,18 @@ if TYPE_CHECKING:
 
 OF_EACH_LAW = 3  # places that are refined
 OF_ALL = 5
+SIMULATED = 2  # places of each law that are simulated on short stretches
+TURNS = 6  # of the refinement
+FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
+HOPELESS = 30.0  # times the smallest cost
+FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
-CLIMBS = 6  # steps to better neighbours
-TURNS = 6
+CLIMBS = 8  # steps to better neighbours
 
 
-def find_candidates(stretches: Stretches, linear: LinearFit, laws: Sequence[Law]) -> list[LawFit]:
-    """Find the laws and places that explain stretches best.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Track:
+    """Stretches of one length, and the linear model fitted to them.
 
     Parameters
     ----------
@@ -32,40 +44,102 @@ def find_candidates(stretches: Stretches, linear: LinearFit, laws: Sequence[Law]
         The data.
     linear : LinearFit
         The linear model.
+    """
+
+    stretches: Stretches
+    linear: LinearFit
+
+    def shoot(self, fit: LawFit, iterations: int) -> LawFit:
+        """Fit a law by simulation, from a fit to these or other stretches."""
+        known = sum(self.linear.freedom.sizes[:4])
+        unknowns = fit.unknowns
+        if len(unknowns) != len(self.linear.unknowns) or fit.n_rows != self.linear.n_rows:
+            unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
+        start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=unknowns)
+        return shoot(self.stretches, self.linear.freedom, start, iterations=iterations)
+
+
+def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawFit]:
+    """Find the laws and places that explain stretches best.
+
+    Parameters
+    ----------
+    short, long : Track
+        The data.
     laws : sequence of Law
         To be tried.
 
     Returns
     -------
     list of LawFit
-        The smallest cost first.
+        Fits to the long stretches, the smallest cost first.
     """
-    guesses = screen(stretches, linear, laws)
-    unknowns = linear.unknowns.copy()
-    unknowns[: sum(linear.freedom.sizes[:4])] = 0.0
+    rough, late = _refined(short, laws), _refined(long, laws)
+    chosen = [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]]
+    early = _simulated(short, _different(chosen))
+    _climb(short, early)
+    early.sort(key=lambda fit: fit.cost)
+    finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
+    fits = _simulated(long, _different(finalists))
+    _climb(long, fits)
+    return sorted(fits, key=lambda fit: fit.cost)
+
+
+def _of(law: Law, fits: Iterable[LawFit]) -> list[LawFit]:
+    return [fit for fit in fits if fit.law is law]
+
+
+def _different(fits: Iterable[LawFit]) -> list[LawFit]:
+    """Keep the first of each law and place that does something."""
+    found: dict[tuple[str, int], LawFit] = {}
+    for fit in fits:
+        if fit.strength != 0:
+            found.setdefault((fit.law.name, fit.place), fit)
+    return list(found.values())
+
+
+def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+    guesses = screen(track.stretches, track.linear, laws)
+    unknowns = track.linear.unknowns.copy()
+    unknowns[: sum(track.linear.freedom.sizes[:4])] = 0.0
     chosen = [guess for law in laws for guess in [g for g in guesses if g.law is law][:OF_EACH_LAW]]
     chosen += [guess for guess in guesses[:OF_ALL] if guess not in chosen]
     fits = []
     for guess in chosen:
         start = Start(law=guess.law, place=guess.place, strength=guess.strength, shape=guess.shape, unknowns=unknowns)
-        fits.append(refine(stretches, linear.freedom, start, n_turns=TURNS, known=False))
-    _climb(stretches, linear, fits)
+        fit = refine(track.stretches, track.linear.freedom, start, n_turns=TURNS, known=False)
+        fits.append(fit if fit.strength else replace(fit, strength=guess.strength, shape=guess.shape))
     return sorted(fits, key=lambda fit: fit.cost)
 
 
-def _climb(stretches: Stretches, linear: LinearFit, fits: list[LawFit]) -> None:
-    """Refine the neighbours of the best fit, as long as one of them is better."""
+def _simulated(track: Track, fits: Sequence[LawFit]) -> list[LawFit]:
+    """Fit by simulation; those that stay hopeless after a few steps only so far."""
+    found = [track.shoot(fit, FIRST) for fit in fits]
+    least = min((fit.cost for fit in found), default=np.inf)
+    return [track.shoot(fit, MORE) if fit.cost < HOPELESS * least else fit for fit in found]
+
+
+def _climb(track: Track, fits: list[LawFit]) -> None:
+    """Fit the neighbours of the best fit, as long as one of them is better."""
     done = {(fit.law.name, fit.place) for fit in fits}
     for _ in range(CLIMBS if fits else 0):
         best = min(fits, key=lambda fit: fit.cost)
-        near = neighbours(linear.freedom.plant, best.place, NEIGHBOURS)
+        near = neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS)
         new = [place for place in near if (best.law.name, place) not in done]
         if not new:
             return
-        for place in new:
-            done.add((best.law.name, place))
-            start = Start(law=best.law, place=place, strength=best.strength, shape=best.shape, unknowns=best.unknowns)
-            fits.append(refine(stretches, linear.freedom, start, n_turns=TURNS, known=True))
+        done |= {(best.law.name, place) for place in new}
+        fits += _simulated(track, [_moved(track, best, place) for place in new])
+
+
+def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
+    """Bring a law to another place, where it moves as much and does as much work as at its own."""
+    shapes: FloatArray = track.linear.freedom.plant.at_places.shapes
+    here, there = shapes[fit.place], shapes[place]
+    ratio = float(here @ there / max(float(here @ here), 1e-300))
+    if ratio <= 0:
+        return replace(fit, place=place)
+    return replace(fit, place=place, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
 
 def neighbours(plant: Plant, place: int, count: int) -> list[int]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
-from frf_ipz.diagnosis.nonlinear.candidates import find_candidates
+from frf_ipz.diagnosis.nonlinear.candidates import Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
-PERIODS = 320.0  # of the top of the band: length of the stretches that are fitted
+SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.0  # mean square over the expected one, of a law that explains the recordings
 FOUND_NATS = 25.0  # evidence that a law needs
@@ -124,13 +124,14 @@ def search_laws(
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
     plant, noise = make_plant(model, observations), read_noise(observations)
-    window = Window(duration_s=PERIODS / observations.band_hz[1])
-    stretches = transform(training, plant, noise, window)
-    freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
-    linear = fit_linear(stretches, freedom)
-    fits = find_candidates(stretches, linear, chosen_laws(options))
+    tracks = []
+    for periods in (SHORT, LONG):
+        stretches = transform(training, plant, noise, Window(duration_s=periods / observations.band_hz[1]))
+        freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
+        tracks.append(Track(stretches=stretches, linear=fit_linear(stretches, freedom)))
+    fits = find_candidates(tracks[0], tracks[1], chosen_laws(options))
     del held_out
-    return _judge(stretches, linearity, plant, fits, linear.cost)
+    return _judge(tracks[1].stretches, linearity, plant, fits, tracks[1].linear.cost)
 
 
 def _divide(observations: Observations) -> tuple[Observations, Observations]:

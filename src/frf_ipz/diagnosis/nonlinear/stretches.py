@@ -29,6 +29,8 @@ THIN = 2  # lines are closer than the window resolves: every second one is indep
 EDGE = 40  # samples beside a stretch that moves: they are faded out
 FINER = 8  # times as many samples, where a stretch starts with a jump
 BEFORE = 4  # samples before the pulse
+FIRST_SAMPLES, FIRST_PART = 8, 1e-3  # of a record: what is looked at to see whether it starts at rest
+AT_REST = 0.05  # of a signal's size
 AROUND = 5  # lines over which a response's size is averaged
 OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
 
@@ -207,9 +209,21 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
     if observations.kind == "hammer":
         start = min(EDGE + round(window.start_s / step), shortest - n - EDGE)
         return [_Cut(i, isolate_pulse(blow).blow, start, is_moving=True) for i, blow in enumerate(blows)], n
-    room, count = shortest - n - 2 * EDGE, window.per_record
-    parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
-    return [_Cut(i, blow, start, is_moving=True) for i, blow in enumerate(blows) for start in parts], n
+    room, count, cuts = shortest - n - 2 * EDGE, window.per_record, []
+    for i, blow in enumerate(blows):
+        rests = _starts_at_rest(blow)
+        parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
+        cuts += [_Cut(i, blow, 0, is_moving=False)] * rests
+        cuts += [_Cut(i, blow, start, is_moving=True) for start in (parts[1:] if rests else parts)]
+    return cuts, n
+
+
+def _starts_at_rest(blow: Blow) -> bool:
+    """Nothing moves yet at the first samples."""
+    signals = np.vstack([blow.force, blow.responses])
+    first = max(FIRST_SAMPLES, round(FIRST_PART * blow.n_samples))
+    size = np.sqrt(np.mean(signals**2, 1))
+    return bool(np.all(np.sqrt(np.mean(signals[:, :first] ** 2, 1)) < AT_REST * size))
 
 
 def _lines(cut: _Cut, finer: FloatArray, sigma: float) -> tuple[ComplexArray, FloatArray]:

@@ -16,6 +16,7 @@ class CubicStiffness(Law):
     name = "cubic_stiffness"
     strength_name = "cubic_N_m3"
     strength_can_be_negative = True
+    degree = 4.0
     phrase = "a cubic spring of {} N/m^3"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:

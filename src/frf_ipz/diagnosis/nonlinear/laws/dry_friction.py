@@ -20,6 +20,7 @@ class DryFriction(Law):
     name = "dry_friction"
     strength_name = "friction_N"
     holds = True
+    degree = 1.0
     phrase = "dry friction of {} N"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:

@@ -41,6 +41,8 @@ class Law(ABC):
     strength_can_be_negative: ClassVar[bool] = False
     holds: ClassVar[bool] = False
     """It can hold its place still: in a simulation its force is then constant within a time step."""
+    degree: ClassVar[float] = 2.0
+    """Power of the motion that the work of the force grows with."""
     phrase: ClassVar[str] = ""
     """What sits at the place, in words, with the strength in braces as a number with its unit."""
 
