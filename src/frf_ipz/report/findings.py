@@ -72,6 +72,8 @@ def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:
             ("nothing", "within the stated tolerances") if verdict == "consistent" else ("unknown", SENTENCES[verdict])
         )
     names = " and ".join(finding.effect.replace("_", " ") for finding in diagnosis.findings)
+    if diagnosis.verdict == "unexplained":
+        return "unknown", f"nothing in the catalogue explains it; best in part: {names}"
     sure = min(finding.probability for finding in diagnosis.findings)
     return names, f"probability {sure:.3g}" if sure < 0.999 else "probability above 0.999"
 

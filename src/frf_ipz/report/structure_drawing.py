@@ -125,6 +125,9 @@ KINDS = {
 }
 
 
+BESIDE = {"sensor": "top left", "blow": "bottom right", "point": "bottom left"}  # labels of one node side by side
+
+
 def _dofs(
     kind: str, dofs: Sequence[Dof], positions: FloatArray, place: Mapping[int, int], *, is_line: bool
 ) -> list[Trace]:
@@ -134,8 +137,10 @@ def _dofs(
     name, colour, symbol, where = KINDS[kind]
     rows = [place[dof.node] for dof in known]
     heights = positions[rows, 1] + (SHELF[kind] if is_line else 0.0)
+    where = where if is_line else BESIDE[kind]
     labelled = {"mode": "markers+text", "textposition": where} if len(known) <= MOST_LABELS else {}
-    style: Trace = {"symbol": symbol, "size": 15, "text": [str(dof) for dof in known], "hover": "%{text}", **labelled}
+    size = 15 if is_line or kind == "sensor" else 11
+    style: Trace = {"symbol": symbol, "size": size, "text": [str(dof) for dof in known], "hover": "%{text}", **labelled}
     style["textfont"] = {"color": colour, "size": 12.5}
     return [markers(positions[rows, 0], heights, name, colour, **style)]
 

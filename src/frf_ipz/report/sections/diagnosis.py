@@ -155,7 +155,7 @@ def _findings(diagnosis: Diagnosis) -> Table:
                 _parameters(one),
                 number(one.probability, 3),
                 number(one.log_evidence_gain),
-                one.statement,
+                plain_signs(one.statement),
             ]
             for one in entries
         ]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import eigh
 
+from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.targets import Target
 from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
 from frf_ipz.report.section import Section
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 PART = re.compile(r"stiffness of (?:element|spring|group) (\S+)(?: to (\S+))?")
 MOST_MODES = 30
+BLUE_TO_ORANGE = [[0.0, "#0072b2"], [0.5, "#f2f2f2"], [1.0, "#d55e00"]]
+FEW_STEPS = 20  # iterations that are each named on the axis
 MOST_NAMES = 30  # of targets written under the axis
 MOST_PLACES = 400  # drawn along the structure
 STIFF = 0.01  # of the largest flexibility: at places below, a ratio says nothing
@@ -126,12 +129,13 @@ def _convergence(updated: UpdatedModel) -> Picture:
         style["marker"] = {"symbol": ["circle", "square", "diamond"][rank % 3], "size": 6}
         traces.append(line(place[here], misfit[here], phase, f"@c{rank}", **style))
     scale = "log" if np.all(misfit > 0) else "linear"
+    steps = {"dtick": 1} if len(history) <= FEW_STEPS else {}
     return Picture(
         name="convergence",
         title="Convergence",
         alt=f"Misfit over {counted(len(history), 'iteration')}: from {number(misfit[0])} to {number(misfit[-1])}.",
         traces=tuple(traces),
-        layout=panels({"title": {"text": "Iteration"}}, Axis(title="Misfit of the targets", scale=scale)),
+        layout=panels({"title": {"text": "Iteration"}, **steps}, Axis(title="Misfit of the targets", scale=scale)),
         table=Table(
             caption="Iterations",
             columns=("phase", "iteration", "misfit", "step"),
@@ -206,21 +210,40 @@ def _of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Picture]:
     if len(rows) < 2:
         return []
     names = [updated.nominal.expanded_dofs[row].name for row in rows]
-    axis = int(np.argmax(np.ptp(geometry.coordinates_m, axis=0)))
-    x = geometry.coordinates_m[[place[updated.nominal.expanded_dofs[row].node] for row in rows], axis]
+    positions = project(geometry.coordinates_m)[[place[updated.nominal.expanded_dofs[row].node] for row in rows]]
+    extremes = f"from {number(float(change.min()), 3)} to {number(float(change.max()), 3)} %"
+    is_line = not np.ptp(positions[:, 1])
+    traces, layout = _along(positions, change, names) if is_line else _over(positions, change, names)
     return [
         Picture(
             name="flexibility",
             title="Change along the structure: how much further each place gives way to a force on it",
-            alt=f"Change of the static flexibility at {counted(len(rows), 'place')}: from "
-            f"{number(float(change.min()), 3)} to {number(float(change.max()), 3)} %.",
-            traces=(markers(x, change, "change", "@updated", size=6, text=names, hover="%{text}: %{y:+.3g} %"),),
-            layout=panels({"title": {"text": f"Position {'xyz'[axis]}, m"}}, Axis(title="Change of flexibility, %")),
+            alt=f"Change of the static flexibility at {counted(len(rows), 'place')}: {extremes}.",
+            traces=(traces,),
+            layout=layout,
             note="Updated over nominal model, without motions as a rigid body. The smallest change that meets the "
             "targets: a hint where the model is off, no diagnosis of what is wrong there.",
-            height_px=320,
+            height_px=320 if is_line else 430,
         )
     ]
+
+
+def _along(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
+    """Draw a structure that is a line: change over position."""
+    points = markers(positions[:, 0], change, "change", "@updated", size=6, text=names, hover="%{text}: %{y:+.3g} %")
+    return points, panels({"title": {"text": "Position"}}, Axis(title="Change of flexibility, %"))
+
+
+def _over(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
+    """Draw any other structure: places coloured by the change."""
+    largest = max(float(np.abs(change).max()), np.finfo(float).tiny)
+    hover = "%{text}: %{customdata:+.3g} %"
+    points = markers(positions[:, 0], positions[:, 1], "change", "@updated", text=names, customdata=change, hover=hover)
+    scale = {"title": {"text": "change, %"}, "x": 0, "xanchor": "right", "thickness": 14}
+    points["marker"] = {"color": change, "cmin": -largest, "cmax": largest, "colorscale": BLUE_TO_ORANGE, "size": 11}
+    points["marker"] |= {"colorbar": scale, "line": {"width": 0.8, "color": "@muted"}}
+    bare = {"showgrid": False, "zeroline": False, "showline": False, "ticks": "", "showticklabels": False}
+    return points, {"xaxis": bare, "yaxis": {**bare, "scaleanchor": "x"}}
 
 
 def _flexibility(model: ReducedModel, rows: IntArray) -> FloatArray:
