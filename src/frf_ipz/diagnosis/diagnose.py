@@ -5,7 +5,7 @@ Detection and naming rest on the evidence of each hypothesis; the verdict on wha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,46 +13,33 @@ import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
+from frf_ipz.diagnosis.judging.decision import CONSISTENT, EXPLAINED, decide, gain_over, only_null
 from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
-from frf_ipz.diagnosis.judging.findings import describe, finding_of, is_significant, weigh
+from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.resolving import best_sensor
-from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, Goodness, goodness
+from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
 from frf_ipz.diagnosis.measured.source import divide
-from frf_ipz.diagnosis.search.search import fit_nothing, search, search_second
+from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Gate
     from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.judging.findings import Weighed
+    from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Fit
-    from frf_ipz.diagnosis.search.search import Ranking
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
-CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
+ENOUGH_TO_COMPARE = 2  # blows at a place
 ALIKE_NATS = 5.0  # effects nearer to each other than that are not told apart
 MOST_ALTERNATIVES = 6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
-    """What the search came to."""
-
-    verdict: str
-    null: Fit
-    final: Fit
-    ranking: Ranking  # whose last causes are the ones that final's last cause competes with
-    second: Ranking | None
-    good: Goodness
-    null_good: Goodness
 
 
 def diagnose(
@@ -92,18 +79,19 @@ def diagnose(
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.0, "measuring transfer functions")
     source = divide(observations)
-    gates = check(source)
     bench = set_up(model, source, observations.band_hz, options, _identifiable(effects, scale), free_gains=scale)
-    found = _find(bench, gates, progress)
+    laws = _laws(model, observations, options, progress)
+    gates = check(source, None if laws is None else laws.linearity)
+    nonlinear = laws is not None and laws.is_nonlinear
+    found = only_null(bench) if nonlinear else decide(bench, progress)
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     proof = prove(bench, held_out, found.null, found.final)
     where = disagreement(bench, found.null, proof.curves)
     weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
-    findings = _findings(found, weighed)
-    return Diagnosis(
+    linear = Diagnosis(
         verdict=found.verdict,
-        findings=findings,
+        findings=_findings(found, weighed),
         alternatives=_alternatives(found, weighed),
         mismatch_hz=where[0],
         mismatch_where=where[1],
@@ -115,10 +103,37 @@ def diagnose(
         ambiguity=_ambiguity(bench, found, weighed),
         gates=gates,
         detectability=detectable_sizes(bench, found.null, FOUND_NATS),
-        statement=_statement(found, findings, gates),
         curves=proof.curves,
         numbers=_numbers(found),
         warnings=tuple(gate.statement for gate in gates if not gate.passed),
+    )
+    if laws is not None and laws.is_nonlinear:
+        return _with_law(linear, laws)
+    return replace(linear, statement=_statement(found, linear.findings))
+
+
+def _laws(
+    model: StructuralModel, observations: Observations, options: DiagnoseOptions, progress: Progress
+) -> LawSearch | None:
+    """Ask blows of several levels for what is not linear; None where there are none."""
+    counts = [len(observations.at(dof)) for dof in observations.input_dofs]
+    if max(counts, default=0) < ENOUGH_TO_COMPARE:
+        return None
+    return search_laws(model, observations, options, progress=lambda part, text: progress(0.1 + 0.1 * part, text))
+
+
+def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
+    """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
+    found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > FOUND_NATS)
+    return replace(
+        linear,
+        verdict=laws.verdict,
+        findings=found[:1],
+        alternatives=found[1:],
+        before=laws.before or linear.before,
+        after=laws.after or linear.updated,
+        ambiguity=(),
+        statement=laws.statement,
     )
 
 
@@ -127,101 +142,63 @@ def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
     return effects if scale == "none" else {name: one for name, one in effects.items() if name != "sensor_gain"}
 
 
-def _find(bench: Bench, gates: tuple[Gate, ...], progress: Progress) -> _Found:
-    progress(0.1, "fitting the nominal model")
-    null = fit_nothing(bench)
-    null_good = goodness(bench, null)
-    progress(0.2, "searching for one cause")
-    ranking = search(bench, null)
-    best = ranking.best
-    good = goodness(bench, best)
-    if null_good.is_good and (_gain(best, null) < FOUND_NATS or not is_significant(best, -1)):
-        verdict = CONSISTENT if gates[0].passed else UNEXPLAINED
-        return _Found(
-            verdict=verdict, null=null, final=null, ranking=ranking, second=None, good=null_good, null_good=null_good
-        )
-    if good.is_good:
-        verdict = EXPLAINED if gates[0].passed else UNEXPLAINED
-        return _Found(
-            verdict=verdict, null=null, final=best, ranking=ranking, second=None, good=good, null_good=null_good
-        )
-    progress(0.5, "searching for a second cause")
-    second = search_second(bench, ranking)
-    pair_good = goodness(bench, second.best)
-    if second.best is not second.base and _gain(second.best, best) > SECOND_NATS and pair_good.score < good.score:
-        verdict = EXPLAINED if pair_good.is_good and gates[0].passed else UNEXPLAINED
-        return _Found(
-            verdict=verdict, null=null, final=second.best, ranking=ranking, second=second, good=pair_good,
-            null_good=null_good,
-        )  # fmt: skip
-    final = best if _gain(best, null) > FOUND_NATS else null
-    return _Found(
-        verdict=UNEXPLAINED, null=null, final=final, ranking=ranking, second=None, good=good, null_good=null_good
-    )
-
-
-def _gain(fit: Fit, base: Fit) -> float:
-    return fit.log_evidence - base.log_evidence
-
-
-def _findings(found: _Found, weighed: list[Weighed]) -> tuple[Finding, ...]:
+def _findings(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     causes = found.final.hypothesis.causes
     scale = max(1.0, found.good.misfit)
     if not causes:
         return ()
     if len(causes) == 1 or found.second is None:
-        return (finding_of(weighed[0], _gain(found.final, found.null), scale),)
+        return (finding_of(weighed[0], gain_over(found.final, found.null), scale),)
     competing = weigh(found.second.fits, scale)
     first_alone = found.second.base
-    newest = finding_of(competing[0], _gain(found.final, first_alone), scale)
-    gain = _gain(first_alone, found.null)
+    newest = finding_of(competing[0], gain_over(found.final, first_alone), scale)
+    gain = gain_over(first_alone, found.null)
     older = describe(found.final, 0, newest.probability, gain, scale, (dict(causes[0].place.location),))
     return tuple(sorted((older, newest), key=lambda finding: -finding.log_evidence_gain))
 
 
-def _alternatives(found: _Found, weighed: list[Weighed]) -> tuple[Finding, ...]:
+def _alternatives(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     scale = max(1.0, found.good.misfit)
     if found.second is not None:
         weighed, base = weigh(found.second.fits, scale), found.second.base
     else:
         base = found.null
     rest = weighed if found.final is found.null else weighed[1:]
-    return tuple(finding_of(one, _gain(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
+    return tuple(finding_of(one, gain_over(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
 
 
-def _ambiguity(bench: Bench, found: _Found, weighed: list[Weighed]) -> tuple[Ambiguity, ...]:
+def _ambiguity(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Ambiguity, ...]:
     """Effects that explain the same nearly as well."""
     if found.final is found.null or len(found.final.hypothesis.causes) > 1:
         return ()
-    near = [one for one in weighed if _gain(found.final, one.best) < ALIKE_NATS]
+    near = [one for one in weighed if gain_over(found.final, one.best) < ALIKE_NATS]
     if len(near) < 2:
         return ()
     return (
         Ambiguity(
             effects=tuple(one.name for one in near),
-            separation_nats=_gain(found.final, near[-1].best),
+            separation_nats=gain_over(found.final, near[-1].best),
             resolve_by=best_sensor(bench, near[0].best, near[1].best),
         ),
     )
 
 
-def _statement(found: _Found, findings: tuple[Finding, ...], gates: tuple[Gate, ...]) -> str:
+def _statement(found: Decision, findings: tuple[Finding, ...]) -> str:
     said = " ".join(finding.statement for finding in findings)
     if found.verdict == CONSISTENT:
         return "The nominal model explains the measurement within noise and its tolerances: nothing is missing."
     if found.verdict == EXPLAINED:
         return f"{said} With that, the model explains the measurement."
     partly = f" A part of it is explained: {said}" if said else ""
-    nature = "" if gates[0].passed else f" {gates[0].statement}"
     return (
         "Something is missing that nothing in the catalogue explains: the best explanation leaves "
-        f"{np.sqrt(found.good.misfit):.3g} times the expected misfit.{nature}{partly}"
+        f"{np.sqrt(found.good.misfit):.3g} times the expected misfit.{partly}"
     )
 
 
-def _numbers(found: _Found) -> dict[str, float]:
+def _numbers(found: Decision) -> dict[str, float]:
     return {
-        "evidence_gain_nats": _gain(found.ranking.best, found.null),
+        "evidence_gain_nats": gain_over(found.ranking.best, found.null),
         "hypotheses": float(found.ranking.n_tried),
         "null_misfit": found.null_good.misfit,
         "null_pull": found.null_good.pull,

@@ -194,7 +194,7 @@ class Diagnosis:
                 {
                     "name": gate.name,
                     "value": _plain(gate.value),
-                    "limit": gate.limit,
+                    "limit": _plain(gate.limit),
                     "passed": gate.passed,
                     "statement": gate.statement,
                 }

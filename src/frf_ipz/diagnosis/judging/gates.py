@@ -7,88 +7,59 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Gate
-from frf_ipz.diagnosis.measured.forces import window_energies
-from frf_ipz.diagnosis.measured.from_blows import Survey
-from frf_ipz.diagnosis.observations import spectra
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.measured.source import Source
     from frf_ipz.diagnosis.measured.transfer import Measured
-    from frf_ipz.diagnosis.observations import Blow
+    from frf_ipz.diagnosis.nonlinear.linearity import Linearity
 
-HOMOGENEOUS = 1.5  # mean squared difference of strong and weak blows, over what noise explains
 RECIPROCAL = 4.0  # the same of FRFs the other way round, over noise and tolerances
 COHERENT = 0.5  # noise power over signal power, at the median of the points
-MODEL_FREE = 2e-3  # relative repeatability of blows that nobody can better
 EXCHANGED = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
 
 
-def check(source: Source) -> tuple[Gate, ...]:
+def check(source: Source, linearity: Linearity | None) -> tuple[Gate, ...]:
     """Check a measurement.
 
     Parameters
     ----------
     source : Source
         What was measured.
+    linearity : Linearity, optional
+        How far blows of different levels disagree; None where no place has two blows.
 
     Returns
     -------
     tuple of Gate
         Homogeneity, reciprocity, coherence.
     """
-    return homogeneity(source), reciprocity(source.training), coherence(source.training)
+    return homogeneity(linearity), reciprocity(source.training), coherence(source.training)
 
 
-def homogeneity(source: Source) -> Gate:
-    """Compare strong and weak blows at the same place.
+def homogeneity(linearity: Linearity | None) -> Gate:
+    """Say whether strong and weak blows agree.
 
     Parameters
     ----------
-    source : Source
-        What was measured.
+    linearity : Linearity, optional
+        As for `check`.
 
     Returns
     -------
     Gate
-        Not checked where there are no two blows at a place.
+        Not checked where no place has two blows.
     """
-    value = np.nan
-    if isinstance(source.survey, Survey):
-        pairs = [(group[0], group[-1], place) for place, group in enumerate(source.survey.groups) if len(group) > 1]
-        ratios = [_difference(source.survey, pair, source.training.s) for pair in pairs]
-        value = float(max(ratios, default=np.nan))
-    said = {
-        True: "Strong and weak blows give the same FRFs: the structure behaves linearly.",
-        False: f"FRFs change with the level of the blow, {value:.3g} times more than noise explains: something is not "
-        "linear, or the structure changed from blow to blow.",
-    }
-    if np.isnan(value):
-        return Gate(
-            name="homogeneity",
-            value=value,
-            limit=HOMOGENEOUS,
-            statement="Linearity could not be checked: no place has two blows.",
-        )
-    return Gate(name="homogeneity", value=value, limit=HOMOGENEOUS, statement=said[value <= HOMOGENEOUS])
-
-
-def _difference(survey: Survey, pair: tuple[Blow, Blow, int], s: ComplexArray) -> float:
-    strong, weak, place = pair
-    (force_a, out_a), (force_b, out_b) = spectra((strong, weak), s)
-    frequency = s.imag / (2 * np.pi)
-    kept_s = np.mean([window_energies(s, pulse) for pulse in survey.pulses[place]], axis=0)
-    per_force = 1 / np.abs(force_a) ** 2 + 1 / np.abs(force_b) ** 2
-    total, count = 0.0, 0
-    for column, sensor in enumerate(strong.sensors):
-        first, second = out_a[:, column] / force_a, out_b[:, column] / force_b
-        window = (1 - np.exp(-2 * s.real * strong.duration_s)) / (2 * s.real)
-        noise = survey.responses[sensor.channel].density(frequency) * window * per_force
-        size = np.maximum(np.abs(first), np.abs(second)) ** 2
-        noise += size * (survey.force.density(frequency) * kept_s * per_force + 2 * MODEL_FREE**2)
-        total += float(np.sum(np.abs(first - second) ** 2 / noise))
-        count += len(s)
-    return total / count
+    if linearity is None:
+        statement = "Linearity could not be checked: no place has two blows or records."
+        return Gate(name="homogeneity", value=np.nan, limit=np.nan, statement=statement)
+    statement = (
+        f"Blows do not agree with one linear system, {linearity.score:.3g} times worse than noise explains: something "
+        "is not linear, or the structure changed from blow to blow."
+        if linearity.is_nonlinear
+        else "Blows of all levels agree with one linear system."
+    )
+    return Gate(name="homogeneity", value=linearity.score, limit=linearity.limit, statement=statement)
 
 
 def reciprocity(measured: Measured) -> Gate:

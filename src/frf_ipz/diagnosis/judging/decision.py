@@ -1,0 +1,106 @@
+"""One cause, two, or none: searches until what is left is no more than noise and tolerances, and decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from frf_ipz.diagnosis.judging.findings import is_significant
+from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, Goodness, goodness
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_second
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.progress import Progress
+
+CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decision:
+    """What the search came to.
+
+    Parameters
+    ----------
+    verdict : str
+        ``consistent``, ``explained`` or ``unexplained``.
+    null, final : Fit
+        Of the nominal model with what its tolerances allow, and with what was found.
+    ranking : Ranking
+        Of one cause.
+    second : Ranking, optional
+        Of a second one beside its base, where two were found.
+    good, null_good : Goodness
+        Of what was found, and of the nominal model.
+    """
+
+    verdict: str
+    null: Fit
+    final: Fit
+    ranking: Ranking
+    second: Ranking | None
+    good: Goodness
+    null_good: Goodness
+
+
+def decide(bench: Bench, progress: Progress) -> Decision:
+    """Search, and decide what is missing.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data, model and effects.
+    progress : Progress
+        Told how far it is.
+
+    Returns
+    -------
+    Decision
+        The verdict and the fits that it rests on.
+    """
+    progress(0.2, "fitting the nominal model")
+    null = fit_nothing(bench)
+    null_good = goodness(bench, null)
+    progress(0.3, "searching for one cause")
+    ranking = search(bench, null)
+    best = ranking.best
+    good = goodness(bench, best)
+    one = Decision(
+        verdict=EXPLAINED, null=null, final=best, ranking=ranking, second=None, good=good, null_good=null_good
+    )
+    if null_good.is_good and (gain_over(best, null) < FOUND_NATS or not is_significant(best, -1)):
+        return replace(one, verdict=CONSISTENT, final=null, good=null_good)
+    if good.is_good:
+        return one
+    progress(0.6, "searching for a second cause")
+    second = search_second(bench, ranking)
+    both = goodness(bench, second.best)
+    if second.fits and gain_over(second.best, best) > SECOND_NATS and both.score < good.score:
+        verdict = EXPLAINED if both.is_good else UNEXPLAINED
+        return replace(one, verdict=verdict, final=second.best, second=second, good=both)
+    return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > FOUND_NATS else null)
+
+
+def only_null(bench: Bench) -> Decision:
+    """Fit the nominal model and search for nothing.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and model.
+
+    Returns
+    -------
+    Decision
+        Unexplained, without a cause.
+    """
+    null = fit_nothing(bench)
+    good = goodness(bench, null)
+    nothing = Ranking(base=null, fits=(), n_tried=0)
+    return Decision(verdict=UNEXPLAINED, null=null, final=null, ranking=nothing, second=None, good=good, null_good=good)
+
+
+def gain_over(fit: Fit, base: Fit) -> float:
+    """Give the evidence of a fit over that of another, nats."""
+    return fit.log_evidence - base.log_evidence
