@@ -5,6 +5,7 @@ pint reads units here and nowhere else; behind this module every value is SI.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cache
 from tokenize import TokenError
@@ -218,9 +219,12 @@ def _parse(text: str) -> pint.Quantity[float]:
 
 def _to(value: pint.Quantity[float], wanted: str, problem: str, quantity: str) -> float:
     try:
-        return float(value.to(wanted).magnitude)
+        factor = float(value.to(wanted).magnitude)
     except pint.PintError:
         hint = EXAMPLES.get(quantity, "")
         gram = "; 'g' is the gram, the acceleration of gravity is 'g_0'" if quantity == "acceleration" else ""
         expected = f"expected is {hint}" if hint else f"expected is a unit like {wanted}"
         raise QuantityError(f"{problem}; {expected}{gram}") from None
+    if not math.isfinite(factor) or factor == 0.0:
+        raise QuantityError(f"{problem}: it is {factor:g} {wanted}; write a unit, without a number that is zero or NaN")
+    return factor

@@ -80,6 +80,12 @@ def test_what_amplifiers_do_to_a_pulse_is_no_second_hit(kind):
     assert not is_double(force)
 
 
+def test_strong_noise_is_no_second_hit():
+    rng = np.random.default_rng(3)
+    hits = [half_sine(100.0, 0.02, 0.8e-3) + 5.0 * rng.standard_normal(N_SAMPLES) for _ in range(10)]
+    assert not any(is_double(force) for force in hits)
+
+
 def test_the_extent_of_a_pulse_is_where_it_stands_out():
     force = half_sine(100.0, 0.02, 0.8e-3)
     start, stop = pulse_extent(force, find_pulse(force, threshold=SECOND_PULSE))

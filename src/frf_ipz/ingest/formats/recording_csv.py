@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
+LARGEST = 1e100  # what is larger is no measurement, and its square may be no number
 TIME = re.compile(r"^t(ime)?\b", re.IGNORECASE)
 
 
@@ -95,7 +96,7 @@ def _numbers(layout: TextLayout, names: list[str], wanted: list[int]) -> Iterato
     n_rows, first_empty = 0, -1
     for batch in read_blocks(layout, names, types):
         block = np.column_stack([batch.column(place).to_numpy(zero_copy_only=False) for place in order])
-        finite = np.isfinite(block)
+        finite = np.abs(block) < LARGEST
         empty = ~finite.any(axis=1) & np.isnan(block).all(axis=1)
         if first_empty < 0 and empty.any():
             first_empty = n_rows + int(np.argmax(empty))

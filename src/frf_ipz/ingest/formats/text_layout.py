@@ -16,6 +16,7 @@ HEAD = 1 << 16  # bytes that are looked at
 BOM = b"\xef\xbb\xbf"
 DELIMITERS = (";", "\t", ",", " ")  # in the order they are tried; the blank stands for any run of blanks
 NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
+NEWLINE = re.compile(r"\r\n|\n|\r")  # str.splitlines breaks at more
 TWO_NUMBERS = re.compile(r"\d\s+[+-]?[\d.]")
 DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eE][+-]?\d+)?$")
 NAME_AND_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]$")
@@ -91,7 +92,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
     """
     head = read_head(path)
     whole = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
-    lines = [line.rstrip("\r") for line in decode(whole.removeprefix(BOM)).split("\n")]
+    lines = NEWLINE.split(decode(whole.removeprefix(BOM)))
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
     delimiter = _delimiter([line for _, line in rows[:SAMPLE]])
     first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
@@ -197,7 +198,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
     """
     if delimiter == " ":
         return [field.strip('"') for field in line.split()] or [""]
-    fields = next(csv.reader([line], delimiter=delimiter), [])
+    fields = next(csv.reader([line.replace("\r", " ")], delimiter=delimiter), [])
     return [field.strip() for field in fields] or [""]
 
 

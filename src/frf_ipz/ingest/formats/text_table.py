@@ -145,7 +145,9 @@ def not_a_number(layout: TextLayout, names: Sequence[str], wanted: Sequence[int]
         field = fields[index] if index < len(fields) else ""
         if not is_number(field):
             return _bad_field(layout.path, line, names[index], field)
-    return FileFormatError(layout.path, "holds a value that is not finite", where=f"line {line}")
+    return FileFormatError(
+        layout.path, "holds a value that is infinite or absurdly large; correct the file", where=f"line {line}"
+    )
 
 
 def _explain(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], reason: str) -> FileFormatError:
@@ -185,10 +187,13 @@ def _is_special(field: str) -> bool:
 
 def _rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
     """Give the lines of numbers with their line numbers."""
+    number = 0
     with layout.path.open("rb") as stream:
-        for number, line in enumerate(stream, start=1):
-            if number > layout.n_before and line.strip():
-                yield number, decode(line).rstrip("\r\n")
+        for lines in stream:
+            for line in lines.rstrip(b"\r\n").split(b"\r"):
+                number += 1
+                if number > layout.n_before and line.strip():
+                    yield number, decode(line)
 
 
 def _arrow_delimiter(layout: TextLayout) -> str:
