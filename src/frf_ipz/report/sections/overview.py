@@ -204,10 +204,8 @@ def _missing_card(run: RunContents) -> Card:
     lacking = counts[Verdict.MISSING_IN_MODEL]
     figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "nothing seen"
     unsure = counts[Verdict.AMBIGUOUS]
-    meaning = (
-        "measured without a counterpart" if lacking else "all measured poles and zeros that can be told are paired"
-    )
-    meaning += f"; {unsure} cannot be told" if unsure else ""
+    meaning = "measured without a counterpart" if lacking else "all identifiable poles and zeros are paired"
+    meaning += f"; {unsure} are not identifiable" if unsure else ""
     return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run")
 
 
