@@ -13,7 +13,7 @@ NEAR = 0.02  # relative: a pole within this of a struck one is the struck one
 
 PLACE_OF_POLE = """
 const plot = document.querySelector('#stabilisation .plot');
-const trace = plot.data.find((one) => one.mode === 'markers' && one.name.includes('shape'));
+const trace = plot.data.find((one) => one.mode === 'markers' && one.name.includes(arguments[1]));
 const k = [...trace.x].findIndex((x) => Math.abs(x / arguments[0] - 1) < 0.01);
 const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
 return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offset + yaxis.d2p(trace.y[k])];
@@ -31,6 +31,8 @@ const box = document.querySelector('#stabilisation .plot').getBoundingClientRect
 const x = arguments[0].map((hz) => box.left + xaxis._offset + xaxis.d2p(hz));
 return [...x, box.top + yaxis._offset + yaxis._length / 2];
 """
+
+THEME = "return document.documentElement.dataset.theme"
 
 
 class Page:
@@ -126,7 +128,7 @@ def test_a_pole_struck_in_the_diagram_is_gone_and_stays_gone_on_the_command_line
     assert is_there(demo / "out", STRUCK_HZ)
     comment = (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0]
     page.show("#stabilisation")
-    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ))
+    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ, "shape"))
     page.wait_until(lambda: page.value("#pole-form", "hz"))
     assert float(page.value("#pole-form", "hz")) == pytest.approx(STRUCK_HZ, rel=NEAR)
     page.write("#pole-form", why="a cable that rings")
@@ -149,15 +151,24 @@ def test_a_pole_struck_in_the_diagram_is_gone_and_stays_gone_on_the_command_line
     assert is_there(demo / "out", STRUCK_HZ)
 
 
+def test_every_mode_of_the_fit_has_a_handle_to_click(page, demo):
+    page.show("#stabilisation")
+    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ, "handles"))
+    page.wait_until(lambda: page.value("#pole-form", "hz"))
+    assert min(abs(float(page.value("#pole-form", "hz")) / hertz - 1) for hertz in poles(demo / "out")) < 1e-5
+
+
 def test_a_stretch_that_is_dragged_over_is_left_out(page, demo):
     page.click("[data-drag=select]")
     page.show("#stabilisation")
     low, high, height = page.run(PLACES_OF_BAND, [40.0, 60.0])
     page.drag([(low, height), ((low + high) / 2, height + 5), (high, height + 10)])
     page.wait_until(lambda: page.value("#band-form", "high_hz"))
-    before = page.stamp()
+    before, theme = page.stamp(), page.run(THEME)
+    page.click("#theme")
     page.click("#band-form [value=leave]")
     page.wait_for_results(before)
+    assert page.run(THEME) not in {theme, None}
     ((low_hz, high_hz),) = read_pipeline(demo / "pipeline.toml").file.fit.exclude_hz
     assert (low_hz, high_hz) == (pytest.approx(40.0, rel=0.02), pytest.approx(60.0, rel=0.02))
     assert "1 stretches left out" not in page.find("#stabilisation .note").text

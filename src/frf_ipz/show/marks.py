@@ -7,37 +7,46 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.report.picture import Picture, Trace, line, outline
+from frf_ipz.rational import natural_frequency_hz
+from frf_ipz.report.picture import Picture, Trace, line, markers, outline
 from frf_ipz.report.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.identification.options import FitOptions
 
 DIAGRAM = "stabilisation"
+STRIP = 0.08  # of the height, below the poles: room for the handles
 CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen stretch stay as clear as they were
 
 
-def with_choices(picture: Picture, options: FitOptions) -> Picture:
-    """Draw pins, strikes and what is left out into the stabilisation diagram.
+def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Picture:
+    """Draw pins, strikes and what is left out into the stabilisation diagram, and a handle for every mode of the fit.
 
     Parameters
     ----------
     picture : Picture
         The diagram of the report.
+    fit : ModalFit
+        The fit that it belongs to.
     options : FitOptions
         What the user has chosen.
 
     Returns
     -------
     Picture
-        With further lines and shaded stretches.
+        With further lines, handles and shaded stretches.
     """
     low, high = picture.layout["yaxis"]["range"]
     strikes = [struck.hz for struck in options.strike]
     reasons = [f"struck: {struck.why}" for struck in options.strike]
+    hertz = natural_frequency_hz(fit.model.poles[: fit.n_modes])
+    strip = STRIP * (high - low)
+    place, hover = np.full(len(hertz), low - strip / 2), "%{x:.6g} Hz: click to pin or strike"
     traces = [
+        markers(hertz, place, "handles of the modes", "@ink", hover=hover, symbol="triangle-up", size=12),
         *_uprights("pinned", "@good", options.pin_hz, ["pinned"] * len(options.pin_hz), (low, high)),
         *_uprights("struck", "@bad", strikes, reasons, (low, high)),
     ]
@@ -47,9 +56,10 @@ def with_choices(picture: Picture, options: FitOptions) -> Picture:
     left_out = counted(len(options.exclude_hz), "stretch", "stretches")
     words += [f"{left_out} left out (shaded)"] if options.exclude_hz else []
     note = f"{picture.note} Your choices: {', '.join(words)}." if words else picture.note
-    layout = {**picture.layout, "shapes": [*picture.layout.get("shapes", []), *shapes]}
-    drawn = [{**trace, **CLEAR} if trace.get("mode") == "markers" else trace for trace in picture.traces]
-    return replace(picture, traces=(*drawn, *traces), layout=layout, note=note)
+    below = {**picture.layout["yaxis"], "range": [low - strip, high]}
+    layout = {**picture.layout, "yaxis": below, "shapes": [*picture.layout.get("shapes", []), *shapes]}
+    drawn = [{**trace, **CLEAR} if trace["mode"] == "markers" else trace for trace in (*picture.traces, *traces)]
+    return replace(picture, traces=tuple(drawn), layout=layout, note=note)
 
 
 def _uprights(

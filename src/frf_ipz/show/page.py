@@ -35,7 +35,8 @@ HEAD = (
 )
 STATUS = (
     '<div id="status" role="status" aria-live="polite" hidden><progress id="progress" max="1" value="0"></progress>'
-    '<span id="doing"></span></div><div id="problem" role="alert" hidden></div>'
+    '<span id="doing"></span></div><div id="problem" role="alert" hidden><span></span> '
+    '<button type="button" id="read">Close</button></div>'
 )
 SCRIPTS = (
     '<script src="plotly.js"></script><script src="page.js"></script><script src="show.js"></script></body></html>'
@@ -128,7 +129,7 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
     blocks = list(section.blocks)
     if section.anchor == "stabilization" and run.fit is not None:
         blocks = [
-            with_choices(block, choices.fit) if isinstance(block, Picture) and block.name == DIAGRAM else block
+            with_choices(block, run.fit, choices.fit) if isinstance(block, Picture) and block.name == DIAGRAM else block
             for block in blocks
         ]
         blocks.insert(1, Markup(html=pole_controls(run.fit)))

@@ -87,8 +87,10 @@ def mode_shape(run: RunContents, number: int) -> Shape:
     powers = np.array([label.quantity.power for label in fit.labels])
     measured = _largest_row(fit.labels, fit.model.residues[number] / pole**powers)
     frequency = float(natural_frequency_hz(fit.model.poles[number : number + 1])[0])
-    motions = [_scaled(Motion(name="measured", title="measured", dofs=tuple(measured), values=_values(measured)))]
-    for name, (model, wanted) in _models(run, number).items():
+    models = _models(run, number)
+    title = "measured" if models or run.updated is None else "measured; the model has no counterpart of this mode"
+    motions = [_scaled(Motion(name="measured", title=title, dofs=tuple(measured), values=_values(measured)))]
+    for name, (model, wanted) in models.items():
         root, vector = _mode_near(model, wanted)
         found = Motion(name=name, title=name, dofs=model.expanded_dofs, values=model.expansion @ vector)
         motions.insert(0, _onto(found, motions[-1], abs(root) / (2 * np.pi)))

@@ -95,6 +95,13 @@ def test_a_run_without_a_model_has_the_measured_shape_alone(run):
     assert [motion.name for motion in operating_shape(run, 20.0, "4:+x").motions] == ["measured"]
 
 
+def test_a_mode_that_the_model_lacks_is_said_to_be_without_counterpart(run):
+    del run.pairs.targets[2]
+    (measured,) = mode_shape(run, 2).motions
+    assert "no counterpart" in measured.title
+    assert len(mode_shape(run, 3).motions) == 3
+
+
 def test_what_was_not_measured_is_refused(run):
     for wrong in (-1, 5):
         with pytest.raises(InputError, match="has no mode"):

@@ -37,9 +37,8 @@
   }
 
   function complain(text) {
-    const box = find("#problem");
-    box.textContent = text;
-    box.hidden = !text;
+    find("#problem span").textContent = text;
+    find("#problem").hidden = !text;
   }
 
   function showChoices(html) {
@@ -85,12 +84,23 @@
     const form = find("#shape-form");
     sessionStorage.setItem(MEMORY, JSON.stringify({
       axis: axis && { type: axis.type, range: axis.range }, dragmode,
+      theme: document.documentElement.dataset.theme, scale: find("#scale").textContent,
+      hidden: all(".chooser input").filter((box) => !box.checked).map((box) => box.value),
       shape: form && Object.fromEntries(new FormData(form)), blows: Boolean(find("#blow-choices[open]")),
     }));
   }
 
   const remembered = JSON.parse(sessionStorage.getItem(MEMORY) || "{}");
   sessionStorage.removeItem(MEMORY);
+
+  function restoreLook() {
+    if (!remembered.scale) return;
+    if (document.documentElement.dataset.theme !== remembered.theme) find("#theme").click();
+    if (find("#scale").textContent !== remembered.scale) find("#scale").click();
+    const boxes = all(".chooser input");
+    boxes.forEach((box) => { box.checked = !remembered.hidden.includes(box.value); });
+    if (boxes.length) boxes[0].dispatchEvent(new Event("change"));
+  }
 
   // --- Pictures ----------------------------------------------------------------------------------------------------
 
@@ -303,6 +313,7 @@
       loadShape();
       find("#shapes").scrollIntoView();
     } else if (button.id === "hide-sensor") hideSensor();
+    else if (button.id === "read") complain("");
   }
 
   function start() {
@@ -313,7 +324,8 @@
       if (blow) change({ kind: "blow", name: blow, use: event.target.value });
       if (event.target.name === "dof") offerToHide();
     });
-    if (remembered.blows) find("#blow-choices").open = true;
+    if (remembered.blows && find("#blow-choices")) find("#blow-choices").open = true;
+    restoreLook();
     whenDrawn("stabilisation", listenToDiagram);
     whenDrawn("structure", listenToStructure);
     startShapes();
