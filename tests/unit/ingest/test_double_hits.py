@@ -67,14 +67,16 @@ def test_pulses_may_push_the_other_way():
     assert is_double(force - half_sine(20.0, 0.04, 0.8e-3))
 
 
-@pytest.mark.parametrize("kind", ["ringing", "hum", "undershoot"])
+@pytest.mark.parametrize("kind", ["ringing", "slow ringing", "hum", "undershoot", "hump"])
 def test_what_amplifiers_do_to_a_pulse_is_no_second_hit(kind):
     time = np.arange(N_SAMPLES) / RATE_HZ
     after = np.maximum(time - 0.0208, 0.0)
     force = half_sine(100.0, 0.02, 0.8e-3) + 0.01 * np.random.default_rng(2).standard_normal(N_SAMPLES)
     force += {
         "ringing": np.where(after > 0, 8.0 * np.exp(-after / 2e-3) * np.sin(2 * np.pi * 3600.0 * after), 0.0),
+        "slow ringing": np.where(after > 0, 2.0 * np.exp(-after / 0.03) * np.sin(2 * np.pi * 200.0 * after), 0.0),
         "hum": 1.0 * np.sin(2 * np.pi * 50.0 * time),
+        "hump": np.where(after > 0, 12.0 * (after / 0.02) * np.exp(-after / 0.02), 0.0),
         "undershoot": np.where(after > 0, -4.0 * np.exp(-after / 0.3), 0.0),
     }[kind]
     assert not is_double(force)
