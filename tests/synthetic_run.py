@@ -10,6 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, Diagnosis, Gate, Misfit
+from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.dofs import Dof
 from frf_ipz.export.state_space import to_state_space
 from frf_ipz.fe.options import ReduceOptions
@@ -37,9 +39,11 @@ class Folder(SimpleNamespace):
         return name in self.stale
 
 
-def synthetic_folder(*, without=()):
+def synthetic_folder(*, without=(), diagnosed=False):
     """A folder with the results of every stage but some."""
     results = {name: result for name, result in synthetic_results().items() if name not in without}
+    if diagnosed:
+        results["diagnose"] = synthetic_diagnosis(results["fit"].labels, results["model"].geometry.nodes.tolist())
     stages = {name: {"key": f"{place:064x}", "seconds": 0.1 * place} for place, name in enumerate(results)}
     record = {
         "frf_ipz": "0.1.0",
@@ -216,4 +220,61 @@ def many_frfs(n_frfs, n_lines):
             averages=np.full(n_frfs, 5),
         ),
         blows=pd.DataFrame(),
+    )
+
+
+def synthetic_diagnosis(labels, nodes):
+    """A diagnosis that has found a mass and a gain, with everything that a picture is drawn from."""
+    frequency = np.linspace(10, 500, 60)
+    shape = (len(frequency), len(labels))
+    misfit = [
+        {"frf": str(label), "low_hz": low, "high_hz": 2 * low, "before": 30.0 / (1 + place), "after": 1.0}
+        for place, label in enumerate(labels)
+        for low in (10.0, 20.0, 40.0)
+    ]
+    mass = Finding(
+        effect="added_mass",
+        location={"nodes": (nodes[1],)},
+        parameters={"mass_kg": Estimate(value=0.0123, std=0.0004, low=0.0115, high=0.0131)},
+        probability=0.98,
+        log_evidence_gain=812.4,
+        statement=f"A mass of 12.3 g (+- 0.4 g) sits at node {nodes[1]} that the model lacks.",
+    )
+    gain = Finding(
+        effect="sensor_gain",
+        location={"channels": (labels[0].output_channel,)},
+        parameters={"gain_ratio": Estimate(value=-1.0, std=0.01, low=-1.02, high=-0.98)},
+        probability=0.9995,
+        log_evidence_gain=99.0,
+        statement="The sensor's sign is flipped.",
+    )
+    return Diagnosis(
+        verdict="explained",
+        findings=(mass, gain),
+        alternatives=(replace(mass, effect="local_stiffness", log_evidence_gain=3.0, probability=0.01),),
+        mismatch_hz=frequency[:5],
+        mismatch_where="all FRFs disagree",
+        mismatch=pd.DataFrame(misfit),
+        before=Misfit(training=0.41, held_out=0.43, training_noise=80.0, held_out_noise=82.0),
+        updated=Misfit(training=0.2, held_out=0.22, training_noise=40.0, held_out_noise=41.0),
+        after=Misfit(training=0.02, held_out=0.02, training_noise=1.0, held_out_noise=1.1),
+        held="blows",
+        ambiguity=(
+            Ambiguity(effects=("added_mass", "local_stiffness"), separation_nats=4.0, resolve_by="Strike 4:+z."),
+        ),
+        gates=(
+            Gate(name="homogeneity", value=0.9, limit=1.5, statement="The structure behaves linearly."),
+            Gate(name="reciprocity", value=np.nan, limit=4.0, statement="Reciprocity could not be checked."),
+        ),
+        detectability={"added_mass": {"mass_kg": 0.001}},
+        statement="What is missing has been found.",
+        curves=Curves(
+            s=1.0 + 2j * np.pi * frequency,
+            labels=tuple(labels),
+            measured=np.ones(shape, complex),
+            nominal=np.full(shape, 2.0 + 0j),
+            updated=np.full(shape, 1.5 + 0j),
+            explained=np.full(shape, 1.01 + 0j),
+            expected=np.full(shape, 0.01),
+        ),
     )

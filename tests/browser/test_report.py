@@ -36,7 +36,7 @@ def errors(browser):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "report.html"
-    write_report(synthetic_folder(), path)
+    write_report(synthetic_folder(diagnosed=True), path)
     return path
 
 

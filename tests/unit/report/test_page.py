@@ -49,10 +49,10 @@ def data_of(text):
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    return page_of(synthetic_folder(), tmp_path_factory.mktemp("page"))
+    return page_of(synthetic_folder(diagnosed=True), tmp_path_factory.mktemp("page"))
 
 
-def test_every_section_but_the_diagnosis_is_there(page):
+def test_every_section_is_there_in_the_order_of_the_chain(page):
     anchors = re.findall(r'<section id="([^"]+)"', page)
     assert anchors == [
         "overview",
@@ -64,10 +64,11 @@ def test_every_section_but_the_diagnosis_is_there(page):
         "pairing",
         "updating",
         "prediction",
+        "diagnosis",
         "state-space",
         "provenance",
     ]
-    assert len(SECTIONS) == len(anchors) + 1
+    assert len(SECTIONS) == len(anchors)
 
 
 def test_nothing_is_fetched_from_elsewhere(page):
@@ -109,7 +110,7 @@ def test_plotly_knows_all_that_the_pictures_ask_for(page):
     for picture in data["pictures"].values():
         figure = go.Figure(data=plain(picture["data"]), layout=plain(picture["layout"]))
         for trace in figure.data:
-            assert trace.y is None or len(trace.y) == len(trace.x)
+            assert trace.type == "heatmap" or len(trace.y) == len(trace.x)
 
 
 def test_a_run_that_ends_with_the_fit_says_what_was_found(tmp_path):
@@ -123,6 +124,12 @@ def test_a_run_without_points_of_interest_states_the_measured_ones(tmp_path):
     text = page_of(synthetic_folder(without=("predict", "reference")), tmp_path)
     assert "Error at the measured points" in text
     assert '<section id="prediction"' not in text
+
+
+def test_a_run_without_a_diagnosis_has_no_such_section(tmp_path):
+    text = page_of(synthetic_folder(), tmp_path)
+    assert '<section id="diagnosis"' not in text
+    assert "no diagnosis was run" in text
 
 
 def test_recordings_alone_make_a_page(tmp_path):

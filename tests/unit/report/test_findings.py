@@ -1,0 +1,89 @@
+"""The first screen and the section say what a diagnosis has found."""
+
+from dataclasses import replace
+
+import pytest
+
+from frf_ipz.report.contents import read_contents
+from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
+from frf_ipz.report.picture import Picture
+from frf_ipz.report.sections.diagnosis import build
+from frf_ipz.report.table import Table
+from synthetic_run import synthetic_folder
+
+
+@pytest.fixture(scope="module")
+def run():
+    return read_contents(synthetic_folder(diagnosed=True))
+
+
+def block(run, kind, name):
+    return next(
+        one
+        for one in build(run).blocks
+        if isinstance(one, kind) and name in {getattr(one, "name", ""), getattr(one, "caption", "")}
+    )
+
+
+def test_findings_are_the_verdict(run):
+    first, others = verdict_of(run.diagnosis)
+    assert first.startswith("A mass of 12.3 g (± 0.4 g) sits at node")
+    assert others == "The sensor's sign is flipped."
+
+
+def test_the_least_certain_finding_is_stated(run):
+    assert said_in_short(run.diagnosis) == ("added mass and sensor gain", "probability 0.98")
+
+
+def test_nothing_missing_is_said(run):
+    diagnosis = replace(run.diagnosis, verdict="consistent", findings=())
+    assert verdict_of(diagnosis) == ("Nothing significant is missing from the model.", "")
+    assert said_in_short(diagnosis)[0] == "nothing"
+
+
+def test_what_nothing_explains_is_unknown(run):
+    diagnosis = replace(run.diagnosis, verdict="unexplained")
+    assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
+    assert verdict_of(diagnosis)[1].startswith("A part of it is explained: A mass")
+    assert said_in_short(diagnosis)[0] == "unknown"
+    assert said_in_short(replace(diagnosis, findings=()))[0] == "unknown"
+
+
+def test_places_of_findings_are_marked_on_the_structure(run):
+    nodes = run.geometry.nodes.tolist()
+    sensor = run.labels[0].output_dof.node
+    assert marked_nodes(run.diagnosis, run.frfs) == {nodes[1]: "added mass", sensor: "sensor gain"}
+
+
+def test_elements_are_marked_at_all_their_nodes(run):
+    finding = replace(run.diagnosis.findings[0], location={"elements": (3, 5)})
+    assert sorted(marked_nodes(replace(run.diagnosis, findings=(finding,)), run.frfs)) == [3, 4, 5, 6]
+
+
+def test_the_map_holds_misfits_before_and_after(run):
+    before, after = block(run, Picture, "mismatch").traces
+    assert before["z"].shape == (len(run.labels), 3)
+    assert 10 ** before["z"][1, 0] == pytest.approx(15.0, rel=1e-12)
+    assert (after["z"] == 0).all()
+
+
+def test_findings_come_before_alternatives(run):
+    table = block(run, Table, "Findings and alternatives")
+    assert [row[0] for row in table.rows] == ["added mass", "sensor gain", "local stiffness"]
+    assert "mass_kg = 0.0123 ± 4e-4" in table.rows[0]
+
+
+def test_proof_on_held_out_data_is_in_percent(run):
+    picture = block(run, Picture, "proof")
+    assert picture.traces[1]["y"].tolist() == pytest.approx([43.0, 22.0, 2.0])
+    assert picture.table.rows[2][2] == "2 %"
+
+
+def test_what_cannot_be_told_apart_is_a_note_with_its_remedy(run):
+    assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in build(run).notes
+
+
+def test_checks_that_could_not_be_made_are_only_in_the_table(run):
+    picture = block(run, Picture, "gates")
+    assert picture.traces[0]["y"] == ["homogeneity"]
+    assert [row[0] for row in picture.table.rows] == ["homogeneity", "reciprocity"]

@@ -1,0 +1,47 @@
+"""Predicted FRFs find their measured counterparts, with the right sign and on the right lines."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.dofs import Dof
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.report.reference import measured_at
+from synthetic_run import synthetic_folder
+
+
+@pytest.fixture(scope="module")
+def results():
+    return synthetic_folder().results
+
+
+def test_the_frf_kept_aside_is_found(results):
+    found = measured_at(results["predict"], results["reference"])
+    np.testing.assert_array_equal(found[0], results["reference"].values[:, 0])
+
+
+def test_signs_of_sensors_turn_the_values(results):
+    reference = results["reference"]
+    label = reference.labels[0]
+    turned = replace(label, output_dof=Dof(label.output_dof.node, label.output_dof.direction, -1))
+    found = measured_at(results["predict"], replace(reference, labels=(turned,)))
+    np.testing.assert_array_equal(found[0], -reference.values[:, 0])
+
+
+def test_another_quantity_is_no_counterpart(results):
+    reference = results["reference"]
+    other = replace(reference.labels[0], quantity=FrfQuantity.ACCELERANCE)
+    assert measured_at(results["predict"], replace(reference, labels=(other,))) == {}
+
+
+def test_lines_that_were_not_measured_are_not_known(results):
+    reference = results["reference"]
+    known = np.arange(reference.n_lines) < 500
+    found = measured_at(results["predict"], reference.lines(known))[0]
+    np.testing.assert_array_equal(np.isfinite(found), known)
+
+
+def test_other_points_are_no_counterpart(results):
+    assert measured_at(results["predict"], results["ingest"].frfs) == {}
+    assert measured_at(results["predict"], None) == {}
