@@ -8,6 +8,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.export.tables import Column, make_table, repeated
+from frf_ipz.identification.root_covariance import pair_blocks
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -122,8 +123,8 @@ def pole_table(fit: ModalFit) -> pa.Table:
         ``poles.parquet``.
     """
     count = fit.n_modes
-    covariance = fit.covariance[: 2 * count, : 2 * count]
-    return make_table(POLE, {"pole_id": range(1, count + 1), **_roots(fit.model.poles[:count], covariance)})
+    blocks = pair_blocks(fit.covariance)[:count]
+    return make_table(POLE, {"pole_id": range(1, count + 1), **_roots(fit.model.poles[:count], blocks)})
 
 
 def zero_table(fit: ModalFit) -> pa.Table:
@@ -140,8 +141,7 @@ def zero_table(fit: ModalFit) -> pa.Table:
         ``zeros.parquet``.
     """
     zeros = fit.zeros
-    start = 2 * fit.n_modes
-    roots = _roots(zeros.values, fit.covariance[start:, start:])
+    roots = _roots(zeros.values, pair_blocks(fit.covariance)[fit.n_modes :])
     return make_table(
         ZERO,
         {
@@ -279,10 +279,8 @@ def _value_columns(values: ComplexArray) -> dict[str, FloatArray]:
     return {"real": values.real.T.ravel(), "imag": values.imag.T.ravel()}
 
 
-def _roots(values: ComplexArray, covariance: FloatArray) -> dict[str, FloatArray]:
+def _roots(values: ComplexArray, blocks: FloatArray) -> dict[str, FloatArray]:
     """Frequency and damping of roots with their standard deviations, to first order."""
-    pairs = np.arange(len(values))
-    blocks = covariance.reshape(len(values), 2, len(values), 2)[pairs, :, pairs, :]
     modulus = np.maximum(np.abs(values), np.finfo(float).tiny)
     to_frequency = np.stack([values.real, values.imag], 1) / (2 * np.pi * modulus)[:, None]
     to_damping = np.stack([-(values.imag**2), values.real * values.imag], 1) / modulus[:, None] ** 3

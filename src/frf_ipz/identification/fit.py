@@ -13,10 +13,11 @@ import numpy as np
 import pandas as pd
 from scipy import sparse
 
-from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
-from frf_ipz.identification.likelihood.compression import Weighted, response
+from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
+from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.likelihood.refinement import Refined, refine
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, all_terms
 from frf_ipz.identification.lines.measured import MeasuredLines, measured_lines, with_noise_of
@@ -25,9 +26,10 @@ from frf_ipz.identification.results.measured_model import measured_model, mode_o
 from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import FoundZeros, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.identification.search.drift import Drift, find_drift
 from frf_ipz.identification.search.judgement import Judgement, judge
 from frf_ipz.identification.search.selection import Selected, select_modes
-from frf_ipz.identification.start.stabilization import Start, start_poles
+from frf_ipz.identification.start.stabilization import start_poles
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
 
 FIXED_POLES = 3  # beside the band, while modes are searched
+DELAY_ROUNDS = 2  # of finding delays and poles in turn
+HELD_ROUNDS = 3  # of fitting residues and finding the noise in turn
 MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, limits the fit
 
 
@@ -43,12 +47,13 @@ class _Fitted:
     """Poles, and what they were fitted to."""
 
     lines: MeasuredLines
-    data: Weighted
     terms: SmoothTerms
     fit: Refined
     judgement: Judgement
     excess: FloatArray
     noise_from: str
+    drift: Drift | None
+    poles_are_held: bool = False
 
 
 def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent) -> ModalFit:
@@ -81,17 +86,94 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
     start = start_poles(frfs, lines, max_order=options.max_order)
     terms = all_terms(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     progress(0.2, "adding and dropping poles")
+    delay_s = np.zeros(frfs.n_frfs)
+    if options.delay:
+        lines, delay_s = _without_delays(frfs, lines, start.poles, terms, options)
+    selected = _selected(lines, start.poles, terms, options)
+    progress(0.7, "refining")
+    fitted = _refined(lines, selected, terms)
+    progress(0.8, "finding zeros and errors")
+    return _as_modal_fit(frfs, fitted, start=start.table, decisions=selected.decisions, delay_s=delay_s)
+
+
+def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> ModalFit:
+    """Fit residues and zeros to measured FRFs, with poles that are known from elsewhere.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Measured FRFs: one is enough.
+    poles : (n_poles,) complex array
+        rad/s, imaginary part > 0; they are not moved and count as exact.
+    options : FitOptions
+        Band and lines to leave out, kind of modes.
+
+    Returns
+    -------
+    ModalFit
+        The fitted model. Where natural frequencies of an FRF are off the poles by a common factor, a warning says by
+        how much, and the FRF is fitted with that factor.
+
+    Raises
+    ------
+    InputError
+        If no lines are left to fit.
+    """
+    lines = measured_lines(frfs, options)
+    terms = all_terms(lines.band_hz, lines.line_hz).first(FIXED_POLES)
+    real_modes = options.modes == "real"
+    for _ in range(1 if lines.known.all() else HELD_ROUNDS):
+        data = replace(lines.weighted(), real_modes=real_modes)
+        fit = refine(data, poles, terms, iterations=0)
+        drift = None
+        found = find_drift(data, fit, terms, poles_are_held=True)
+        if found is not None:
+            drift, fit = found
+            data = replace(data, receptance=drift.moved)
+        judgement = judge(data, fit, terms)
+        lines = with_noise_of(lines, judgement.misfit / data.weight)
+    lines = replace(lines, receptance=data.receptance)
+    fitted = _Fitted(
+        lines=lines,
+        terms=terms,
+        fit=fit,
+        judgement=judgement,
+        excess=_excess(judgement, fit),
+        noise_from="recordings" if lines.known.all() else "misfit",
+        drift=drift,
+        poles_are_held=True,
+    )
+    table = pd.DataFrame(columns=["order", "frequency_hz", "damping_ratio"])
+    return _as_modal_fit(frfs, fitted, start=table, decisions=(), delay_s=np.zeros(frfs.n_frfs))
+
+
+def _selected(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
-    selected = select_modes(data, start.poles, terms, options, noise_is_known=bool(lines.known.all()))
+    selected = select_modes(data, poles, terms, options, noise_is_known=bool(lines.known.all()))
     if not len(selected.fit.poles):
         raise NumericalError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
             "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
         )
-    progress(0.7, "refining")
-    fitted = _refined(lines, selected, terms)
-    progress(0.8, "finding zeros and errors")
-    return _as_modal_fit(frfs, start, selected, fitted)
+    return selected
+
+
+def _without_delays(
+    frfs: FrfSet, lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions
+) -> tuple[MeasuredLines, FloatArray]:
+    """Find the delay of each channel that makes the modes look normal, and take it off.
+
+    Complex residues follow a short delay almost exactly: they give good poles, and say nothing of the delay.
+    """
+    channels = [label.output_channel or label.output_dof.name for label in frfs.labels]
+    numbers = np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
+    advanced, delays = lines, np.zeros(frfs.n_frfs)
+    for _ in range(DELAY_ROUNDS):
+        poles = _selected(advanced, poles, terms, replace(options, modes="complex")).fit.poles
+        data = replace(lines.weighted(shared=True), real_modes=True)
+        delays = find_delays(data, poles, terms, numbers)
+        advanced = replace(lines, receptance=lines.receptance * np.exp(lines.s[:, None] * delays))
+    return advanced, delays
 
 
 def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _Fitted:
@@ -100,52 +182,63 @@ def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _F
     lines = replace(lines, receptance=data.receptance)
     if not lines.known.all():
         lines = with_noise_of(lines, judgement.misfit / data.weight)
-    data = replace(lines.weighted(), real_modes=data.real_modes)
-    fit = refine(data, fit.poles, terms)
-    judgement = judge(data, fit, terms)
-    free = 2 * len(data.s) - fit.system.n_linear
-    excess = np.sqrt(np.sum(np.abs(judgement.misfit) ** 2, axis=0) / free)
+    final = replace(lines.weighted(), real_modes=data.real_modes)
+    if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
+        fit = refine(final, fit.poles, terms)
+        judgement = judge(final, fit, terms)
+    excess = _excess(judgement, fit)
     noise_from = "recordings"
     if not lines.known.all() or np.median(excess) > MODEL_ERROR:
         noise_from = "misfit"
         lines = replace(lines, variance=lines.variance * judgement.level)
-        data = replace(lines.weighted(), real_modes=data.real_modes)
-        fit = refine(data, fit.poles, terms)
+        fit = refine(replace(lines.weighted(), real_modes=data.real_modes), fit.poles, terms)
     return _Fitted(
-        lines=lines, data=data, terms=terms, fit=fit, judgement=judgement, excess=excess, noise_from=noise_from
+        lines=lines,
+        terms=terms,
+        fit=fit,
+        judgement=judgement,
+        excess=excess,
+        noise_from=noise_from,
+        drift=selected.drift,
     )
 
 
-def _as_modal_fit(frfs: FrfSet, start: Start, selected: Selected, fitted: _Fitted) -> ModalFit:
+def _excess(judgement: Judgement, fit: Refined) -> FloatArray:
+    """Misfit over noise of each FRF, as roots of mean squares."""
+    free = 2 * len(judgement.misfit) - fit.system.n_linear
+    return np.asarray(np.sqrt(np.sum(np.abs(judgement.misfit) ** 2, axis=0) / free))
+
+
+def _as_modal_fit(
+    frfs: FrfSet, fitted: _Fitted, *, start: pd.DataFrame, decisions: tuple[dict[str, object], ...], delay_s: FloatArray
+) -> ModalFit:
     lines, fit, terms = fitted.lines, fitted.fit, fitted.terms
-    band = 2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]
-    order, n_modes = mode_order(fit.poles, band)
-    level = (
-        fitted.judgement.missing[-1].level_at(fit.poles) if fitted.noise_from == "misfit" else np.ones(len(fit.poles))
-    )
+    order, n_modes = mode_order(fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))
+    modes = order[:n_modes]
+    is_white = fitted.noise_from == "recordings"
+    level = np.ones(len(fit.poles)) if is_white else fitted.judgement.missing[-1].level_at(fit.poles)
     errors = fit_errors(fit, terms, level)
+    if fitted.poles_are_held:
+        errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
     found = find_zeros(errors, lines.s)
-    of_residues = residue_covariance(errors, lines.powers, order[:n_modes])
     unit = np.abs(lines.s[:, None]) ** lines.powers
     left = lines.receptance - response(fit.system, terms, lines.s)
     return ModalFit(
-        model=measured_model(fit.system, terms, lines.powers, order, np.zeros(frfs.n_frfs)),
+        model=measured_model(fit.system, terms, lines.powers, order, delay_s),
         n_modes=n_modes,
         labels=frfs.labels,
         band_hz=lines.band_hz,
         used_lines=lines.used,
         zeros=found.zeros,
-        covariance=_covariance(errors, found, order[:n_modes]),
-        residue_covariance=of_residues,
+        covariance=_covariance(errors, found, modes),
+        residue_covariance=residue_covariance(errors, lines.powers, modes),
         value_std=value_std(errors, lines.s) * unit,
-        stabilization=start.table,
-        decisions=pd.DataFrame(selected.decisions, columns=["frequency_hz", "damping_ratio", "action", "reason"]),
-        modes=mode_table(
-            fit.poles[order[:n_modes]], fit.system.residues()[order[:n_modes]], fitted.judgement, order[:n_modes]
-        ),
+        stabilization=start,
+        decisions=pd.DataFrame(decisions, columns=["frequency_hz", "damping_ratio", "action", "reason"]),
+        modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.judgement, modes),
         misfit=misfit_table(lines.frequency_hz, left * unit, np.sqrt(lines.variance) * unit, frfs.labels),
         noise_from=fitted.noise_from,
-        warnings=_warnings(frfs, selected, fitted),
+        warnings=_warnings(frfs, fitted),
     )
 
 
@@ -165,7 +258,7 @@ def _covariance(errors: FitErrors, found: FoundZeros, modes: IntArray) -> RootCo
     return RootCovariance(common=np.concatenate([poles, common]), own=sparse.csr_array(own + added))
 
 
-def _warnings(frfs: FrfSet, selected: Selected, fitted: _Fitted) -> tuple[str, ...]:
+def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
     said = []
     excess = fitted.excess
     if fitted.lines.known.all() and np.median(excess) > MODEL_ERROR:
@@ -174,11 +267,18 @@ def _warnings(frfs: FrfSet, selected: Selected, fitted: _Fitted) -> tuple[str, .
             f"{excess.max():.2g} at worst): the structure does what no linear model with these modes does, so standard "
             "deviations are taken from the misfit"
         )
-    if selected.drift is not None:
-        change = selected.drift.relative
-        said.append(
-            f"natural frequencies differ between the FRFs by {np.ptp(change) * 1e6:.3g} ppm, all modes alike: the "
-            f"structure drifted while it was measured; highest in {frfs.labels[int(np.argmax(change))]}, lowest in "
-            f"{frfs.labels[int(np.argmin(change))]}; the poles given are those of the mean"
-        )
+    if fitted.drift is not None:
+        said.append(_about_drift(frfs, fitted.drift, against_poles=fitted.poles_are_held))
     return tuple(said)
+
+
+def _about_drift(frfs: FrfSet, drift: Drift, *, against_poles: bool) -> str:
+    ppm = drift.relative * 1e6
+    if against_poles:
+        each = ", ".join(f"{label} {change:+.3g}" for label, change in zip(frfs.labels, ppm, strict=True))
+        return f"natural frequencies are off the given poles by a common factor, in ppm: {each}; the fit allows for it"
+    return (
+        f"natural frequencies differ between the FRFs by {np.ptp(ppm):.3g} ppm, all modes alike: the structure drifted "
+        f"while it was measured; highest in {frfs.labels[int(np.argmax(ppm))]}, lowest in "
+        f"{frfs.labels[int(np.argmin(ppm))]}; the poles given are those of the mean"
+    )

@@ -86,10 +86,28 @@ class RootCovariance:
             (rad/s)^2.
         """
         parts = self.common.reshape(-1, 2, self.common.shape[1])
-        cross = np.zeros(len(self.common) - 1) if len(self.common) else np.zeros(0)
-        cross[:] = self.own.diagonal(1)
         blocks = np.einsum("kim,kjm->kij", parts, parts)
+        cross = self.own.diagonal(1)[::2]
         blocks[:, [0, 1], [0, 1]] += self.own.diagonal().reshape(-1, 2)
-        blocks[:, 0, 1] += cross[::2]
-        blocks[:, 1, 0] += cross[::2]
+        blocks[:, 0, 1] += cross
+        blocks[:, 1, 0] += cross
         return np.asarray(blocks)
+
+
+def pair_blocks(covariance: FloatArray | RootCovariance) -> FloatArray:
+    """Take the covariance of each root by itself.
+
+    Parameters
+    ----------
+    covariance : (2 n, 2 n) array, or RootCovariance
+        Real and imaginary part of each root in turn.
+
+    Returns
+    -------
+    (n, 2, 2) array
+        Diagonal blocks.
+    """
+    if isinstance(covariance, RootCovariance):
+        return covariance.pair_blocks()
+    pairs = np.arange(len(covariance) // 2)
+    return np.asarray(covariance.reshape(len(pairs), 2, len(pairs), 2)[pairs, :, pairs, :])

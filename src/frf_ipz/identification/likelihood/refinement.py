@@ -43,14 +43,14 @@ class Refined:
         Fisher information of the poles: all real parts, then all imaginary parts.
     lost : (n_lost,) complex array
         Poles that the iteration gave up: they ran out of the band, into the background or into one another.
-    iterations : int
-        Steps made.
+    has_converged : bool
+        No step gains anything that data could show.
     """
 
     system: Compressed
     information: FloatArray
     lost: ComplexArray
-    iterations: int
+    has_converged: bool
 
     @property
     def poles(self) -> ComplexArray:
@@ -86,12 +86,13 @@ def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iteration
     band = float(data.s.imag[0]), float(data.s.imag[-1])
     lost: list[complex] = []
     system, poles = _without_lost(data, poles, terms, band, lost)
-    damping, count = FIRST_DAMPING, 0
+    damping, count, has_converged = FIRST_DAMPING, 0, False
     information, gradient = normal_equations(system)
     while count < iterations and len(system.poles):
         count += 1
         step, gain = _damped_step(information, gradient, damping)
         if gain < SMALL_GAIN:
+            has_converged = True
             break
         trial = compress(data, _moved(system.poles, step, line), terms)
         if np.sum(trial.misfit) > np.sum(system.misfit):
@@ -104,7 +105,7 @@ def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iteration
         if (_gone(system.poles, band)).any():
             system, _ = _without_lost(data, system.poles, terms, band, lost)
         information, gradient = normal_equations(system)
-    return Refined(system=system, information=information, lost=np.array(lost, complex), iterations=count)
+    return Refined(system=system, information=information, lost=np.array(lost, complex), has_converged=has_converged)
 
 
 def normal_equations(system: Compressed) -> tuple[FloatArray, FloatArray]:

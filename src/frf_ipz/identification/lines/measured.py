@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import InputError
 from frf_ipz.identification.likelihood.compression import Weighted
-from frf_ipz.identification.lines.noise import rough_variance
+from frf_ipz.identification.lines.noise import misfit_variance, rough_variance
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
@@ -149,10 +149,9 @@ def with_noise_of(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLines:
     """
     if lines.known.all():
         return lines
-    unit = np.abs(lines.s[:, None]) ** lines.powers
     variance = lines.variance.copy()
     floor = (MODEL_ERROR * np.abs(lines.receptance)) ** 2
-    variance[:, ~lines.known] = (rough_variance(misfit * unit) / unit**2 + floor)[:, ~lines.known]
+    variance[:, ~lines.known] = (misfit_variance(misfit, np.abs(lines.receptance)) + floor)[:, ~lines.known]
     return replace(lines, variance=variance)
 
 

@@ -24,7 +24,7 @@ def rough_variance(values: ComplexArray) -> FloatArray:
     Parameters
     ----------
     values : (n_lines, n_frfs) complex array
-        FRFs, or what a model leaves of them.
+        FRFs.
 
     Returns
     -------
@@ -32,6 +32,36 @@ def rough_variance(values: ComplexArray) -> FloatArray:
         E of the squared modulus of the noise, smooth over the lines.
     """
     return smooth_level(_squared_differences(values))
+
+
+def misfit_variance(misfit: ComplexArray, size: FloatArray) -> FloatArray:
+    """Estimate the variance of noise in what a model leaves.
+
+    Noise of the response is as strong on a peak as beside it, noise that comes with the force follows the response.
+    Each block of lines takes what explains its differences better.
+
+    Parameters
+    ----------
+    misfit : (n_lines, n_frfs) complex array
+        Measured minus model.
+    size : (n_lines, n_frfs) array
+        Modulus of the FRFs.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        E of the squared modulus of the noise.
+    """
+    squares = _squared_differences(misfit)
+    constant = smooth_level(squares)
+    power = np.maximum(size**2, TINY)
+    following = smooth_level(squares / power) * power
+    block = np.minimum(np.arange(len(misfit)) // BLOCK_LINES, max(0, len(misfit) // BLOCK_LINES - 1))
+    starts = np.flatnonzero(np.diff(block, prepend=-1))
+    # minus the logarithm of the likelihood of exponentially distributed squares
+    costs = [np.log(np.maximum(level, TINY)) + squares / np.maximum(level, TINY) for level in (constant, following)]
+    better = np.add.reduceat(costs[1] - costs[0], starts, axis=0) < 0
+    return np.asarray(np.where(better[block], following, constant))
 
 
 def smooth_level(squares: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 BESIDE = (0.9, 1.1)  # of the band's edges: zeros beyond are not listed
-POLISHING = 3  # Newton steps
+POLISHING = 2  # Newton steps
 MIRRORED = 0.5  # of a zero's distance from the axis: its mirror image must lie that close to make a quadruple
 ON_AXIS = 1e-9  # of the modulus: a zero with a smaller imaginary part is real
 ROUGH = 0.05  # relative standard deviation above which a zero is no number

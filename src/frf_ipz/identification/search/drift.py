@@ -33,7 +33,7 @@ class Drift:
     Parameters
     ----------
     relative : (n_frfs,) array
-        Change of all natural frequencies in each FRF, relative, of mean zero.
+        Change of all natural frequencies in each FRF, relative, of mean zero over FRFs unless the poles are held.
     std : (n_frfs,) array
         Its standard deviation, from the noise alone.
     moved : (n_lines, n_frfs) complex array
@@ -45,7 +45,9 @@ class Drift:
     moved: ComplexArray
 
 
-def find_drift(data: Weighted, fit: Refined, terms: SmoothTerms) -> tuple[Drift, Refined] | None:
+def find_drift(
+    data: Weighted, fit: Refined, terms: SmoothTerms, *, poles_are_held: bool = False
+) -> tuple[Drift, Refined] | None:
     """Find the drift between FRFs, if there is one.
 
     Parameters
@@ -56,6 +58,8 @@ def find_drift(data: Weighted, fit: Refined, terms: SmoothTerms) -> tuple[Drift,
         A fit without drift.
     terms : SmoothTerms
         What lies out of band.
+    poles_are_held : bool
+        Poles come from elsewhere: the drift is against them, and one FRF is enough.
 
     Returns
     -------
@@ -63,7 +67,7 @@ def find_drift(data: Weighted, fit: Refined, terms: SmoothTerms) -> tuple[Drift,
         The drift and the fit to the moved FRFs; None where it does not explain the misfit.
     """
     n_frfs = data.receptance.shape[1]
-    if n_frfs < 2 or not len(fit.poles):
+    if (n_frfs < 2 and not poles_are_held) or not len(fit.poles):
         return None
     step, std = stretches(fit.system)
     demanded = n_frfs * np.log(2 * data.receptance.size)
@@ -72,13 +76,16 @@ def find_drift(data: Weighted, fit: Refined, terms: SmoothTerms) -> tuple[Drift,
     relative, best, moved = np.zeros(n_frfs), fit, data.receptance
     for _ in range(ROUNDS):
         relative = relative + step
-        relative = relative - np.average(relative, weights=std**-2)
+        if not poles_are_held:
+            relative = relative - np.average(relative, weights=std**-2)
         if np.abs(relative).max() > LARGEST:
             return None
         moved = _moved(data, best.system, terms, relative)
-        best = refine(replace(data, receptance=moved), best.poles, terms, iterations=ITERATIONS)
+        steps = 0 if poles_are_held else ITERATIONS
+        best = refine(replace(data, receptance=moved), best.poles, terms, iterations=steps)
         step, std = stretches(best.system)
-        step = step - np.average(step, weights=std**-2)
+        if not poles_are_held:
+            step = step - np.average(step, weights=std**-2)
         if np.all(np.abs(step) < SETTLED * std):
             break
     excess = max(fit.misfit - 2 * data.receptance.size, 1.0)

@@ -118,7 +118,8 @@ def select_modes(
         search.note(*_added(fit.poles, better.poles))
         fit, judgement = better, verdict
     search.trusted = search.trusted and bool(np.median(judgement.level) < MODEL_ERROR)
-    fit, judgement = _skim(search, fit)
+    if not search.trusted:
+        fit, judgement = _skim(search, fit)
     return Selected(
         data=search.data, drift=search.drift, fit=fit, judgement=judgement, decisions=tuple(search.decisions)
     )
