@@ -19,6 +19,7 @@ EPILOG = """
   frf-ipz init FOLDER                    writes test.toml and pipeline.toml from the CSVs in FOLDER
   frf-ipz check FOLDER/pipeline.toml     validates everything and draws the set-up
   frf-ipz run FOLDER/pipeline.toml --out RESULTS
+  frf-ipz show RESULTS                   opens the results as a page to look at and to work on
 
 [bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 a fault of the program.
 """

@@ -1,0 +1,100 @@
+"""What the page is made of: the report's sections, forms where something can be changed, and the user's choices."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.identification.options import FitOptions, StruckPole
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.pipeline.config import PipelineFile, PipelineSection
+from frf_ipz.prediction.options import PredictOptions
+from frf_ipz.report.contents import read_contents
+from frf_ipz.report.section import pictures_of, render_section
+from frf_ipz.show.controls import choices_panel
+from frf_ipz.show.marks import with_choices
+from frf_ipz.show.page import page_sections
+from synthetic_run import synthetic_folder
+
+OF_MODEL = ("model", "reduce", "pair", "update", "predict", "export", "reference")
+CHOICES = PipelineFile(
+    pipeline=PipelineSection(test="test.toml"),
+    ingest=IngestOptions(keep=("hits/p_02.csv",), drop=("hits/p_04.csv",)),
+    fit=FitOptions(
+        band_hz=(5.0, 500.0), pin_hz=(20.0,), strike=(StruckPole(hz=50.0, why="mains"),), exclude_hz=((49.0, 51.0),)
+    ),
+    predict=PredictOptions(points=("3:+z",)),
+)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return read_contents(synthetic_folder())
+
+
+def html_of(run, choices=CHOICES):
+    return "\n".join(render_section(section) for section in page_sections(run, choices))
+
+
+def test_all_that_is_chosen_is_listed_with_a_button_each():
+    panel = choices_panel(CHOICES, "", "", "")
+    for text in (
+        "5 to 500 Hz",
+        "pinned at 20",
+        "at 50 Hz struck: mains",
+        "49 to 51 Hz left out",
+        "p_02",
+        "p_04",
+        "3:+z",
+    ):
+        assert text in panel
+    assert panel.count("data-change=") == 7
+
+
+def test_forms_stand_beside_the_pictures(run):
+    html = html_of(run)
+    for part in ("pole-form", "band-form", "point-form", "shape-form", "blow-choices", "modes"):
+        assert html.count(f'id="{part}"') == 1
+    assert html.count("data-fill=") == run.fit.n_modes
+
+
+def test_the_list_of_blows_shows_what_was_chosen_and_what_is_used(run):
+    html = html_of(run)
+    for name, use in (("p_02", "keep"), ("p_04", "drop"), ("p_01", "checks")):
+        row = html.split(f'data-blow="hits/{name}.csv"')[1].split("</tr>")[0]
+        assert f'value="{use}" selected' in row
+        assert row.count("selected") == 1
+
+
+@pytest.mark.parametrize(
+    ("without", "missing"),
+    [
+        (OF_MODEL, {"point-form"}),
+        (("fit", *OF_MODEL), {"point-form", "pole-form", "modes"}),
+        (("ingest", "fit", *OF_MODEL), {"point-form", "pole-form", "modes", "shape-form", "blow-choices"}),
+    ],
+    ids=["no model", "no fit", "nothing"],
+)
+def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
+    html = html_of(read_contents(synthetic_folder(without=without)))
+    forms = {"point-form", "pole-form", "modes", "shape-form", "blow-choices"}
+    assert {form for form in forms if f'id="{form}"' not in html} == missing
+
+
+def test_choices_and_handles_are_drawn_into_the_diagram(run):
+    diagram = next(one for one in pictures_of(page_sections(run, None)) if one.name == "stabilisation")
+    marked = with_choices(diagram, run.fit, CHOICES.fit)
+    names = {trace["name"]: trace for trace in marked.traces}
+    assert np.nanmax(names["pinned"]["x"]) == np.nanmin(names["pinned"]["x"]) == 20.0
+    assert names["struck"]["text"][0] == "struck: mains"
+    assert [(shape["x0"], shape["x1"]) for shape in marked.layout["shapes"]] == [(49.0, 51.0)]
+    handles = names["handles of the modes"]
+    assert list(handles["x"]) == list(run.fit.model.natural_frequency_hz[: run.fit.n_modes])
+    low, high = marked.layout["yaxis"]["range"]
+    assert all(low < place < diagram.layout["yaxis"]["range"][0] for place in handles["y"])
+    assert high == diagram.layout["yaxis"]["range"][1]
+    assert "1 pinned, 1 struck, 1 stretch left out" in marked.note
+
+
+def test_without_a_pipeline_file_there_is_the_report_alone(run):
+    html = html_of(run, None)
+    assert "pole-form" not in html
+    assert "shape-form" in html
