@@ -97,6 +97,14 @@ def test_the_extent_of_a_pulse_is_where_it_stands_out():
     assert stop - start < 3 * len(loud)
 
 
+def test_the_extent_ends_before_what_comes_much_later():
+    alone = half_sine(100.0, 0.02, 0.8e-3)
+    force = alone + half_sine(2.0, 0.5, 0.8e-3)
+    assert pulse_extent(force, find_pulse(force, threshold=SECOND_PULSE)) == pulse_extent(
+        alone, find_pulse(alone, threshold=SECOND_PULSE)
+    )
+
+
 def test_the_width_is_that_at_half_of_the_height():
     pulse = find_pulse(half_sine(100.0, 0.02, 3e-3), threshold=SECOND_PULSE)
     assert pulse.width / RATE_HZ == pytest.approx(2e-3, rel=0.02)  # a half sine is above half for two thirds
