@@ -107,7 +107,7 @@ def init(
 def plot(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with the results of a run.")],
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Which picture; without it, all are named.")
+        str | None, typer.Argument(metavar="NAME", help="Which picture; without it, all are named.")
     ] = None,
     file_format: Annotated[str, typer.Option("--format", "-f", metavar="svg|pdf|png", help="Kind of file.")] = "svg",
     out: Annotated[
