@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, Goodness, goodness
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_second
+from frf_ipz.diagnosis.search.pairs import search_second
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench

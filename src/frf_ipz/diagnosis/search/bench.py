@@ -65,6 +65,10 @@ class Bench:
         """Fit exactly, from a fit with large errors."""
         return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=16)
 
+    def go_on(self, fit: Fit) -> Fit:
+        """Go on with a fit that has not converged."""
+        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=30)
+
 
 def weights_of(measured: Measured, error: float) -> FloatArray:
     """Weigh squared misfits, line by line.

@@ -35,6 +35,7 @@ FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypo
 CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS = 2000.0  # nats behind the best: not looked at any more
 GAIN = 0.5  # nats: a neighbour must be better by that
+SETTLED = 2  # fits that go on until they converge
 MOST_STEPS = 12
 
 
@@ -50,11 +51,14 @@ class Ranking:
         Each one more cause, by falling evidence.
     n_tried : int
         Hypotheses that were looked at.
+    refined : tuple of Start
+        What a wide search led to, by rising cost; empty where none was made.
     """
 
     base: Fit
     fits: tuple[Fit, ...]
     n_tried: int
+    refined: tuple[Start, ...] = ()
 
     @property
     def best(self) -> Fit:
@@ -90,23 +94,44 @@ def search(bench: Bench, base: Fit) -> Ranking:
         All that was fitted.
     """
     size = 2 * bench.data.measured.values.size
-    n_tried, fits = 0, {}
+    n_tried, refined = 0, list[Start]()
+    fits: Fits = {}
     if base.misfit > VERY_NEARLY * size or base.pull > SMALL_PULL:
         starts = wide_search(bench, base)
         n_tried += len(starts)
-        fits = _fitted(bench, base, _refined(bench, base, starts))
+        refined = _refined(bench, base, starts)
+        fits = _fitted(bench, base, refined)
     if base.misfit < NEARLY_RIGHT * size:
         n_tried += _add_close(bench, base, fits)
-    _climb_all(bench, base, fits)
-    ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    return Ranking(base=base, fits=tuple(ranked), n_tried=n_tried)
+    climb_all(bench, base, fits)
+    return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
+
+
+def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
+    """Sort fits by falling evidence; the best ones go on where they have not converged.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    fits : dict
+        By any key.
+
+    Returns
+    -------
+    tuple of Fit
+        The best first.
+    """
+    order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
+    settled = [fit if fit.converged else bench.go_on(fit) for fit in order[:SETTLED]]
+    return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
 
 
 def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
     score = score_on(bench, base, bench.data)
     found = close_search(bench, base)
-    starts = _spread(found, CLOSE_EACH)
+    starts = spread(found, CLOSE_EACH)
     hypotheses = [bench.suppose((*base.hypothesis.causes, start.cause)) for start in starts]
     gains = np.array([score.gain(one, start.values) for one, start in zip(hypotheses, starts, strict=True)])
     for place in np.argsort(-gains)[:CLOSE_FITTED]:
@@ -126,15 +151,28 @@ def _keep(fits: Fits, fit: Fit) -> None:
 def _refined(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
     weights = weights_of(bench.coarse, REFINED_ERROR)
     found = []
-    for start in _spread(starts, PLACES_EACH):
+    for start in spread(starts, PLACES_EACH):
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
         values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
         found.append(Start(cause=start.cause, values=values, cost=cost))
     return sorted(found, key=lambda start: start.cost)
 
 
-def _spread(starts: Iterable[Start], each: int) -> list[Start]:
-    """Take the best places of each effect that are not beside each other."""
+def spread(starts: Iterable[Start], each: int) -> list[Start]:
+    """Take the best places of each effect that are not beside each other.
+
+    Parameters
+    ----------
+    starts : iterable of Start
+        By rising cost.
+    each : int
+        How many of each effect.
+
+    Returns
+    -------
+    list of Start
+        Those taken, by effect.
+    """
     taken: dict[str, list[Start]] = {}
     for start in starts:
         mine = taken.setdefault(start.cause.effect.name, [])
@@ -176,8 +214,18 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
             _keep(fits, bench.fit_from(fit))
 
 
-def _climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
-    """Step to neighbours as long as that makes an effect more probable."""
+def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
+    """Step to neighbours as long as that makes an effect more probable.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already.
+    fits : dict
+        By the key of their last cause, whose place is changed; new fits are added.
+    """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     leaders: dict[str, Fit] = {}
     for fit in ranked:
@@ -216,29 +264,3 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     start = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
     values, _ = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
     return bench.fit(causes, values)
-
-
-def search_second(bench: Bench, first: Ranking) -> Ranking:
-    """Search for two causes: one more beside the best, then that one's best companion.
-
-    Parameters
-    ----------
-    bench : Bench
-        Data and effects.
-    first : Ranking
-        Of one cause.
-
-    Returns
-    -------
-    Ranking
-        Its base has one cause, its fits have two.
-    """
-    beside = search(bench, first.best)
-    if not beside.fits:
-        return beside
-    newest = beside.best.hypothesis.causes[-1]
-    count = beside.best.hypothesis.counts[-1]
-    values = beside.best.values[len(beside.best.values) - count :]
-    alone = bench.fit((newest,), values)
-    exchanged = search(bench, alone)
-    return exchanged if exchanged.best.log_evidence > beside.best.log_evidence + GAIN else beside
