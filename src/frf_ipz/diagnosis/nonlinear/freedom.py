@@ -6,13 +6,13 @@ shapes at sensors and blows (positions, gains, uneven stiffness), and the motion
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.nonlinear.plant import Deviations, Plant, PlantResponse, no_deviations
+from frf_ipz.diagnosis.nonlinear.plant import Deviations, Plant, PlantResponse, no_deviations, respond
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.stretches import Stretches
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
 
 BEYOND = 1.25  # times the top of the band: modes whose parameters are free
+BEYOND_MOVING = 2.0  # the same where stretches start in motion, of which these modes have a part
 UNIFORM = 3**-0.5  # standard deviation of a uniform distribution over its half width
 CORD_SPREAD = 0.7  # of the logarithm of frequency and damping on soft cords: a factor of two
 UNEVEN = 2.0  # times the stiffness tolerance: what uneven stiffness does to shapes
+DIFFERENCE = 1e-5  # of a frequency or damping ratio: step of a derivative
 NEAREST = 4  # nodes that tell the slope of a shape
 START_SPREAD = 30.0  # times the size of a mode's response: a start that is not known at all
 
@@ -140,7 +142,12 @@ class Freedom:
         return np.array([part.reshape(self.starts.shape) * self.starts for part in parts])
 
     def columns(
-        self, stretches: Stretches, response: PlantResponse, place_force: ComplexArray, place_shapes: FloatArray
+        self,
+        stretches: Stretches,
+        response: PlantResponse,
+        place_force: ComplexArray,
+        place_shapes: FloatArray,
+        unknowns: FloatArray | None = None,
     ) -> ComplexArray:
         """Change of the weighted responses by each unknown.
 
@@ -154,6 +161,8 @@ class Freedom:
             Force of the law on the structure, N s.
         place_shapes : (n_modes,) array
             Shapes at the law's place.
+        unknowns : (n_unknowns,) array, optional
+            Where the linear model is: how stretches start changes with frequencies and damping.
 
         Returns
         -------
@@ -182,7 +191,35 @@ class Freedom:
             mine = (stretches.input_of == number)[:, None, None]
             parts.append(seen(np.where(mine, force[:, None] * own, 0.0) * self.inputs[number][:, None]))
         parts += self._start_columns(response, weight)
-        return np.concatenate(parts)
+        columns = np.concatenate(parts)
+        if unknowns is not None and len(self.moving):
+            columns[: 2 * len(modes), self.moving] += self._starts_by_pole(unknowns, response) * weight[self.moving]
+            first = 2 * len(modes)
+            for row, sensor in enumerate(self.plant.sensors):
+                free = _free_motion(response, modes, sensor.quantity.power)
+                seen_starts = (
+                    np.einsum("cbm,cml->mbl", self.starts_of(unknowns), free) * self.sensors[row][:, None, None]
+                )
+                columns[first : first + len(modes), self.moving, row] += seen_starts * weight[self.moving, row]
+                first += len(modes)
+        return columns
+
+    def _starts_by_pole(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
+        """(2 n_free, n_moving, n_sensors, n_lines) change of what sensors show of starts, by poles."""
+        starts, shapes = self.starts_of(unknowns), response.sensor_shapes[:, self.modes]
+        found = []
+        for name, sizes in (("frequency", self.frequency), ("damping", self.damping)):
+            ends = []
+            for way in (DIFFERENCE, -DIFFERENCE):
+                there = replace(response.deviations, **{name: getattr(response.deviations, name) + way})
+                ends.append(respond(self.plant, response.s, there))
+            rows = []
+            for sensor, shape in zip(self.plant.sensors, shapes, strict=True):
+                up, down = (_free_motion(end, self.modes, sensor.quantity.power) for end in ends)
+                scaled = (up - down) * (shape * sizes / (2 * DIFFERENCE))[:, None]
+                rows.append(np.einsum("cbm,cml->mbl", starts, scaled))
+            found.append(np.stack(rows, 2))
+        return np.concatenate(found)
 
     def _start_columns(self, response: PlantResponse, weight: FloatArray) -> list[ComplexArray]:
         columns = np.zeros((2, *self.starts.shape, *weight.shape), complex)
@@ -242,7 +279,8 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
     Freedom
         For the modes of the band and the first ones above it.
     """
-    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
+    beyond = BEYOND_MOVING if stretches.moving.any() else BEYOND
+    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * beyond * top_hz))
     rigid = modes < plant.n_rigid
     frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM
     moving = np.flatnonzero(stretches.moving)

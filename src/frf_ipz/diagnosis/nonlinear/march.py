@@ -1,8 +1,8 @@
 """Goes through time step by step with a law at its place.
 
-The structure is in modal form, each mode as one complex number z with dz/dt = lambda z + force, whose imaginary part over
-the damped frequency is the displacement: exact between the time steps for a force that is linear in time there. The law
-is asked at the end of each step for the force that fits the motion that it itself changes.
+The structure is in modal form, each mode as one complex number z with dz/dt = lambda z + force, whose imaginary part
+over the damped frequency is the displacement: exact between the time steps for a force that is linear in time there.
+The law is asked at the end of each step for the force that fits the motion that it itself changes.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 DIFFERENCE = 1e-6  # of a size: step of a derivative, half the digits of double precision
 SMALLEST = 1e-300
+BLOCK = 32  # time steps that are solved together where the force is linear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -213,25 +214,44 @@ def follow(law: Law, place: Yielding, done: March, changes: FloatArray) -> Float
     by_motion, by_velocity, by_numbers = _slopes(law, done)
     n_changes, n_numbers = len(changes), len(by_numbers)
     n_blows, n_times = done.force.shape
-    modes, readers = place.modes, place.readers
-    given = np.zeros((n_times, n_changes + n_numbers, n_blows))
-    given[:, :n_changes] = (changes[:, 0] * by_motion + changes[:, 1] * by_velocity).transpose(2, 0, 1)
-    given[:, n_changes:] = by_numbers.transpose(2, 0, 1)
-    slopes = np.ascontiguousarray(np.stack([by_motion, by_velocity]).transpose(2, 1, 0))  # time, blow, which
-    found = np.zeros((n_times, n_changes + n_numbers, n_blows))
-    z = np.zeros((n_changes + n_numbers, n_blows, len(modes.turn)), complex)
-    force = np.zeros((n_changes + n_numbers, n_blows))
-    for k in range(n_times):
-        z *= modes.turn
-        z -= force[..., None] * modes.before
-        force = given[k] + np.einsum("cbi,bi->cb", (z @ readers).imag, slopes[k])
-        z -= force[..., None] * modes.after
-        found[k] = force
-    return found.transpose(1, 2, 0)
+    given = np.zeros((n_changes + n_numbers, n_blows, n_times))
+    given[:n_changes] = changes[:, 0] * by_motion + changes[:, 1] * by_velocity
+    given[n_changes:] = by_numbers
+    given = np.ascontiguousarray(given.transpose(1, 2, 0))
+    slopes = np.stack([by_motion, by_velocity], 2)  # blow, time, which
+    block, found = _Block(place), np.zeros_like(given)
+    state = np.zeros((n_blows, n_changes + n_numbers, len(place.weights)), complex)
+    for first in range(0, n_times, BLOCK):
+        here = slice(first, min(first + BLOCK, n_times))
+        found[:, here], state = block.solve(given[:, here], slopes[:, here], state)
+    return found.transpose(2, 0, 1)
+
+
+class _Block:
+    """A number of time steps at once, for a force that is linear in what it does to its place."""
+
+    def __init__(self, place: Yielding) -> None:
+        modes, readers = place.modes, place.readers
+        self.powers = modes.turn ** np.arange(BLOCK + 1)[:, None]  # time, mode
+        self.per_force = modes.turn * modes.after + modes.before
+        kernel = np.vstack([np.zeros((1, 2)), ((self.powers[: BLOCK - 1] * self.per_force) @ readers).imag])
+        late = np.arange(BLOCK)[:, None] - np.arange(BLOCK)
+        self.lower = np.where(late[..., None] > 0, kernel[np.maximum(late, 0)], 0.0)  # time, earlier time, which
+        self.read = np.concatenate([self.powers[:BLOCK].T * reader[:, None] for reader in readers.T], 1)
+
+    def solve(self, given: FloatArray, slopes: FloatArray, state: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+        """Force at the times of the block, (n_blows, n_times, n_changes), and the state after it."""
+        n = given.shape[1]
+        free = (state @ self.read).imag.reshape(*state.shape[:2], 2, BLOCK)[..., :n]
+        right = given + np.einsum("bcit,bti->btc", free, slopes)
+        matrix = np.eye(n) + np.einsum("bti,tki->btk", slopes, self.lower[:n, :n])
+        force = np.linalg.solve(matrix, right)
+        added = force.swapaxes(1, 2) @ (self.powers[n - 1 :: -1] * self.per_force)
+        return force, state * self.powers[n] - added
 
 
 def _slopes(law: Law, done: March) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Derivatives of the force by free motion and velocity, and by the law's numbers times their size."""
+    """Derive the force by free motion and velocity, and by the law's numbers times their size."""
     w, v, step = done.free_motion, done.free_velocity, done.step
     way = DIFFERENCE * max(float(np.abs(w).max()), SMALLEST)
     pace = DIFFERENCE * max(float(np.abs(v).max()), SMALLEST)

@@ -1,7 +1,7 @@
 """Fits a law at its place through a simulation of every blow.
 
-Unlike `refine`, no motion is estimated from the data: the law's force follows from the blows alone, and so does its change
-by each unknown. Steps are damped as long as the simulation gets worse (Levenberg and Marquardt).
+Unlike `refine`, no motion is estimated from the data: the law's force follows from the blows alone, and so does its
+change by each unknown. Steps are damped as long as the simulation gets worse (Levenberg and Marquardt).
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexAr
 
 
 def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
-    """Derivatives of the weighted responses by unknowns, strength and shape (times their size), (.., n_rows)."""
+    """Derive the weighted responses by unknowns, strength and shape (times their size), (.., n_rows)."""
     start, used, n_free = shot.start, stretches.used, len(freedom.modes)
     changes = shot.place.changes(shot.done.force)
     by_force = follow(start.law, shot.yielding, shot.done, changes)
@@ -120,7 +120,7 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
     seen = -to_sensors * lines[:, :, None] * weight
     on_used = replace(shot.response, s=stretches.s[used], modes=shot.response.modes[:, used])
     shapes = freedom.plant.at_places.shapes[start.place]
-    rows = freedom.columns(stretches, on_used, -shot.force[:, used], shapes)
+    rows = freedom.columns(stretches, on_used, -shot.force[:, used], shapes, start.unknowns)
     rows[: 2 * n_free] += seen[: 2 * n_free]
     first = 2 * n_free + freedom.sensors.size
     for number in range(len(freedom.inputs)):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
 THIN = 2  # lines are closer than the window resolves: every second one is independent enough
 EDGE = 40  # samples beside a stretch that moves: they are faded out
-FINER = 8  # times as many samples, where a stretch starts with a jump
+FINER = 6  # times as many samples, where a stretch starts with a jump
 BEFORE = 4  # samples before the pulse
 FIRST_SAMPLES, FIRST_PART = 8, 1e-3  # of a record: what is looked at to see whether it starts at rest
 AT_REST = 0.05  # of a signal's size
@@ -211,10 +211,11 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
         return [_Cut(i, isolate_pulse(blow).blow, start, is_moving=True) for i, blow in enumerate(blows)], n
     room, count, cuts = shortest - n - 2 * EDGE, window.per_record, []
     for i, blow in enumerate(blows):
-        rests = _starts_at_rest(blow)
+        if _starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
+            cuts.append(_Cut(i, blow, 0, is_moving=False))
+            continue
         parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
-        cuts += [_Cut(i, blow, 0, is_moving=False)] * rests
-        cuts += [_Cut(i, blow, start, is_moving=True) for start in (parts[1:] if rests else parts)]
+        cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
 
 

@@ -22,13 +22,13 @@ class CubicStiffness(Law):
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
         """Cube the motion."""
         del v, shape
-        return np.asarray(w**3)
+        return np.asarray(w * w * w)
 
     def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
         """Newton's method for u + beta k u^3 = w."""
         del v
-        u = w
+        u, scale = w, step.motion * step.strength
         for _ in range(NEWTON_STEPS):
-            square = step.motion * step.strength * u * u
+            square = scale * (u * u)
             u = u - (u + square * u - w) / (1 + 3 * square)
-        return np.asarray(step.strength * u**3)
+        return np.asarray(step.strength * u * u * u)
