@@ -143,9 +143,7 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
     held = []
     if observations.kind == "hammer":
         groups = [observations.at(dof) for dof in observations.input_dofs]
-        held = [group[1] for group in groups if len(group) >= LONG_SHAKER = 640.0  # of a shaker, which takes time to shake up a structure
-ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
-LEAST_TO_HOLD]
+        held = [group[1] for group in groups if len(group) >= LEAST_TO_HOLD]
     kept = tuple(blow for blow in observations.blows if not any(blow is other for other in held))
     return replace(observations, blows=kept), replace(observations, blows=tuple(held))
 
