@@ -23,7 +23,7 @@ RIDGE = 1e-13  # of the mean diagonal: far above rounding, far below what moves 
 
 
 def reduced_normal_matrix(theta: FloatArray, H: ComplexArray, order: int, *, real: bool) -> ComplexArray:
-    """Normal matrix of the denominator's coefficients, the numerators eliminated.
+    """Build the normal matrix of the denominator's coefficients, the numerators eliminated.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def driving_points(labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
 def _residue_matrices(
     fit: ModalFit, poles: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...]
 ) -> tuple[ComplexArray, BoolArray]:
-    """Give 2 i omega_d times the receptances' residues, (n_modes, n_outputs, n_inputs), and where they were measured."""
+    """Give 2 i omega_d times the receptances' residues, (n_modes, n_outputs, n_inputs), and what was measured."""
     matrices = np.zeros((len(poles), len(outputs), len(inputs)), complex)
     measured = np.zeros((len(outputs), len(inputs)), bool)
     for column, label in enumerate(fit.labels):
