@@ -124,7 +124,7 @@ def normal_equations(system: Compressed) -> tuple[FloatArray, FloatArray]:
         Of the log likelihood, s/rad.
     """
     jacobian = pole_jacobian(system)
-    flat = jacobian.reshape(jacobian.shape[0] * jacobian.shape[1], -1)
+    flat = jacobian.reshape(jacobian.shape[0] * jacobian.shape[1], jacobian.shape[2])
     return flat.T @ flat, flat.T @ system.z[:, system.n_linear :].ravel()
 
 

@@ -95,6 +95,8 @@ def _of_one(
     s: ComplexArray,
     band: tuple[float, float],
 ) -> _OfOne:
+    if not coefficients.any():  # a channel without any signal has no zeros
+        values = values[:0]
     near = (values.imag > -ON_AXIS * abs(s[-1])) & (np.abs(values) > BESIDE[0] * band[0])
     values = _polished(errors, values[near & (np.abs(values) < BESIDE[1] * band[1])], coefficients)
     values = np.unique(np.round(values, 9))
@@ -173,7 +175,7 @@ def _kinds(values: ComplexArray) -> tuple[ComplexArray, tuple[str, ...]]:
 
 def _in_turn(parts: ComplexArray) -> FloatArray:
     """Rows of real and imaginary parts in turn."""
-    return np.asarray(np.stack([parts.real, parts.imag], axis=1).reshape(2 * len(parts), -1))
+    return np.asarray(np.stack([parts.real, parts.imag], axis=1).reshape(2 * len(parts), parts.shape[1]))
 
 
 def _reasons(

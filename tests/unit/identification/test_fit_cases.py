@@ -1,0 +1,272 @@
+"""What the fitter finds, misses and invents on cases that are hard in one way each."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.identification.fit import fit_modes, fit_residues
+from frf_ipz.identification.options import FitOptions, StruckPole
+from frf_ipz.quantities import FrfQuantity
+from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
+
+LINES_HZ = np.arange(1, 4097) * 0.25
+SPREAD = np.array([60.0, 135.0, 210.0, 340.0, 430.0, 520.0, 655.0, 790.0, 910.0])
+CALIBRATED = 0.5  # 3 standard deviations of the rms of 18 normalised errors
+SEED = 77
+
+
+def poles_of(fit):
+    return fit.model.poles[: fit.n_modes]
+
+
+def assert_complete(fit, truth):
+    assert count(poles_of(fit), truth.poles) == (len(truth.poles), 0, 0)
+
+
+def assert_calibrated(fit, truth):
+    assert np.sqrt(np.mean(normalised_errors(fit, truth.poles) ** 2)) == pytest.approx(1.0, abs=CALIBRATED)
+
+
+def exact(truth, s):
+    return truth.receptance(s) * s[:, None] ** 2
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "damping"),
+    [
+        (np.insert(SPREAD, 4, 340.34), 0.002),  # a pair 0.1 % apart
+        (SPREAD, 0.05),
+        (SPREAD, 0.0003),  # narrower than a line
+        (np.array([500.0]), 0.01),
+    ],
+    ids=["close", "damped", "narrow", "single"],
+)
+def test_kinds_of_modes(frequency_hz, damping):
+    truth = random_modes(frequency_hz, damping, seed=SEED)
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions())
+    assert_complete(fit, truth)
+
+
+def test_three_decades_of_residue():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    small = np.where(np.isin(np.arange(len(SPREAD)), [2, 5]), 10**-1.5, 1.0)
+    truth = replace(truth, outputs=truth.outputs * small, inputs=truth.inputs * small)
+    fit = fit_modes(accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED), FitOptions())
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+
+
+def test_pink_noise():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    values = exact(truth, 2j * np.pi * LINES_HZ)
+    std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0)) * np.sqrt(50 / LINES_HZ)[:, None]
+    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), FitOptions())
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+
+
+@pytest.fixture(name="holed")
+def holed_frfs():
+    """FRFs with hum and two stretches of noise, and where these are."""
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    stretches = [(300.0, 330.0), (600.0, 612.0), *((hum - 1.1, hum + 1.1) for hum in np.arange(50.0, 1024.0, 50.0))]
+    hole = np.any([(low <= LINES_HZ) & (high >= LINES_HZ) for low, high in stretches], axis=0)
+    rng = np.random.default_rng(SEED)
+    size = 0.5 * np.sqrt(np.mean(np.abs(frfs.values) ** 2, axis=0))
+    noise = size * (rng.standard_normal(frfs.values.shape) + 1j * rng.standard_normal(frfs.values.shape))
+    return truth, replace(frfs, values=frfs.values + hole[:, None] * noise), hole, tuple(stretches)
+
+
+def test_lines_of_low_coherence_are_left_out(holed):
+    truth, frfs, hole, _ = holed
+    coherence = np.where(hole[:, None], 0.1, 0.999) * np.ones(frfs.values.shape)
+    fit = fit_modes(replace(frfs, coherence=coherence), FitOptions())
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+    assert not fit.used_lines[hole].any()
+
+
+def test_stretches_that_the_user_leaves_out(holed):
+    truth, frfs, hole, stretches = holed
+    fit = fit_modes(frfs, FitOptions(exclude_hz=stretches))
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+    assert not fit.used_lines[hole].any()
+    omega = fit.zeros.values.imag / 2 / np.pi
+    inside = [any(low + 1 < hz < high - 1 for low, high in stretches[:2]) for hz in omega]
+    assert not fit.zeros.identifiable[np.array(inside) & (np.abs(fit.zeros.values.real) < 10)].any()
+
+
+def test_a_record_that_is_cut_off():
+    truth = replace(random_modes(SPREAD, 0.001, seed=SEED))
+    s, record = 2j * np.pi * LINES_HZ, 4.0
+    left = np.exp(truth.poles.real * record)
+    assert left.max() > 0.2
+    half = (1 - np.exp((truth.poles - s[:, None]) * record)) / (s[:, None] - truth.poles) @ truth.residues()
+    other = (1 - np.exp((truth.poles.conj() - s[:, None]) * record)) / (s[:, None] - truth.poles.conj())
+    values = (half + other @ truth.residues().conj()) * s[:, None] ** 2
+    std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), FitOptions())
+    assert_complete(fit, truth)
+
+
+@pytest.mark.parametrize("noise_known", [True, False])
+def test_a_dead_channel(noise_known):
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    rng = np.random.default_rng(SEED)
+    noise = np.sqrt(frfs.variance / 2) * (
+        rng.standard_normal(frfs.values.shape) + 1j * rng.standard_normal(frfs.values.shape)
+    )
+    dead = np.isin(np.arange(frfs.n_frfs), [2, 3])
+    frfs = replace(frfs, values=np.where(dead, noise, frfs.values))
+    fit = fit_modes(frfs if noise_known else frf_set(LINES_HZ, frfs.values, frfs.labels), FitOptions())
+    assert_complete(fit, truth)
+    assert not fit.zeros.identifiable[np.isin(fit.zeros.frf, [2, 3])].any()
+
+
+def test_a_channel_of_zeros_has_no_zeros():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    values = np.where(np.arange(frfs.n_frfs) == 2, 0.0, frfs.values)
+    fit = fit_modes(frf_set(LINES_HZ, values, frfs.labels), FitOptions())
+    assert_complete(fit, truth)
+    assert 2 not in fit.zeros.frf
+
+
+def test_noise_that_nobody_has_measured():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    fit = fit_modes(frf_set(LINES_HZ, frfs.values, frfs.labels), FitOptions())
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+    assert fit.noise_from == "misfit"
+
+
+def test_a_band_that_does_not_start_at_zero():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions(band_hz=(300.0, 860.0)))
+    inside = replace(truth, frequency_hz=SPREAD[3:8], damping_ratio=truth.damping_ratio[3:8])
+    assert_complete(fit, inside)
+    assert fit.band_hz == (300.0, 860.0)
+
+
+@pytest.mark.parametrize("quantity", list(FrfQuantity))
+def test_the_model_is_in_the_unit_that_was_measured(quantity):
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    s = 2j * np.pi * LINES_HZ
+    values = truth.receptance(s) * s[:, None] ** quantity.power
+    std = 1e-5 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    frfs = with_noise(LINES_HZ, values, labels_of(6, 2, quantity), std, np.random.default_rng(SEED))
+    fit = fit_modes(frfs, FitOptions(band_hz=(20.0, 1000.0)))
+    used = fit.used_lines
+    np.testing.assert_allclose(fit.model(s[used]), values[used], rtol=0, atol=10 * std.max())
+    residues = truth.residues() * truth.poles[:, None] ** quantity.power
+    error = np.abs(fit.model.residues[: len(SPREAD)] - residues)
+    allowed = np.sqrt(np.trace(fit.residue_covariance, axis1=2, axis2=3))
+    assert np.sqrt(np.mean((error / allowed) ** 2)) == pytest.approx(1.0, abs=0.2)  # of 108 complex numbers
+
+
+def test_an_exponential_window_is_taken_back():
+    truth = random_modes(SPREAD, 0.002, seed=SEED)
+    s = 3.0 + 2j * np.pi * LINES_HZ
+    values = exact(truth, s)
+    std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    frfs = with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED))
+    fit = fit_modes(replace(frfs, window_decay_1_s=3.0), FitOptions())
+    assert_complete(fit, truth)
+    assert_calibrated(fit, truth)
+
+
+def test_delays_of_channels():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    delay_s = np.where([label.output_dof.node % 2 for label in frfs.labels], 7.3e-4, -1e-4)
+    late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * delay_s))
+    fit = fit_modes(late, FitOptions(delay=True))
+    assert_complete(fit, truth)
+    np.testing.assert_allclose(fit.model.delay_s, delay_s, rtol=0, atol=5e-7)  # 0.05 % of the shortest period
+    assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
+
+
+def test_pinned_and_struck_poles():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    struck = FitOptions(strike=(StruckPole(hz=430.0, why="the shaker's own resonance"),))
+    fit = fit_modes(frfs, struck)
+    rest = np.delete(SPREAD, 4)
+    assert np.abs(np.abs(poles_of(fit)) / 2 / np.pi - 430.0).min() > 8.0
+    assert all(np.abs(np.abs(poles_of(fit)) / 2 / np.pi - hz).min() < 1.0 for hz in rest)
+    assert "the shaker's own resonance" in set(fit.decisions["reason"])
+    pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0,)))
+    assert "pinned" in set(pinned.decisions["action"])
+    assert count(poles_of(pinned), truth.poles)[0] == len(SPREAD)
+
+
+def test_residues_of_a_single_frf_with_poles_held():
+    truth = random_modes(SPREAD, 0.002, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    drifted = replace(truth, frequency_hz=SPREAD * (1 + 2e-4))
+    last = accelerances(drifted, LINES_HZ, seed=SEED + 1).frfs([5])
+    fit = fit_residues(last, truth.poles, FitOptions())
+    np.testing.assert_array_equal(poles_of(fit), truth.poles)
+    assert len(fit.warnings) == 1
+    assert "off the given poles" in fit.warnings[0]
+    assert float(fit.warnings[0].split(";")[0].split()[-1]) == pytest.approx(200, rel=0.05)
+    assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.05
+    steady = fit_residues(frfs.frfs([5]), truth.poles, FitOptions())
+    assert steady.warnings == ()
+    assert np.sqrt(np.mean(steady.misfit["ratio"] ** 2)) < 1.05
+
+
+def test_drift_between_frfs_is_said():
+    truth = random_modes(SPREAD, 0.001, seed=SEED)
+    drift = np.linspace(-1e-4, 1e-4, 12)
+    columns = [
+        accelerances(replace(truth, frequency_hz=SPREAD * (1 + change)), LINES_HZ, seed=SEED + k).frfs([k]).values
+        for k, change in enumerate(drift)
+    ]
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    fit = fit_modes(replace(frfs, values=np.hstack(columns)), FitOptions())
+    assert_complete(fit, truth)
+    assert "drifted" in fit.warnings[-1]
+    assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(200, rel=0.05)
+
+
+def test_model_error_is_said():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, seed=SEED)
+    fit = fit_modes(replace(frfs, variance=frfs.variance / 4), FitOptions())
+    assert fit.noise_from == "misfit"
+    assert "2 times the noise" in fit.warnings[0]
+    assert_calibrated(fit, truth)
+
+
+def test_noise_alone_has_no_modes():
+    rng = np.random.default_rng(SEED)
+    values = np.zeros((len(LINES_HZ), 4), complex)
+    frfs = with_noise(LINES_HZ, values, labels_of(4, 1), 1e-3, rng)
+    with pytest.raises(InputError, match="no frequency line carries a signal"):
+        fit_modes(frfs, FitOptions())
+    with pytest.raises(NumericalError, match="no mode stands out of the noise"):
+        fit_modes(frfs, FitOptions(band_hz=(10.0, 900.0)))
+
+
+def test_too_few_lines():
+    frfs = accelerances(random_modes(SPREAD, 0.005), LINES_HZ)
+    with pytest.raises(InputError, match="usable frequency lines"):
+        fit_modes(frfs, FitOptions(band_hz=(100.0, 102.0)))
+
+
+def test_tables_say_what_was_found():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions())
+    assert list(fit.modes["quality"]) == ["good"] * len(SPREAD)
+    assert (fit.modes["mpc"] > 0.99).all()
+    assert len(fit.misfit) == 12 * 8
+    assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) == pytest.approx(1.0, abs=0.02)
+    assert fit.stabilization["stable_frequency"].any()
+    assert set(fit.stabilization) >= {"order", "frequency_hz", "damping_ratio", "stable_shape", "taken"}

@@ -1,0 +1,82 @@
+"""What the fitter finds in measurements by others, and whether it says what is wrong with them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from frf_ipz.identification.fit import fit_modes, fit_residues
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+
+DEMO = Path(__file__).parents[3] / "data" / "raw" / "cantilever" / "test.toml"
+DEMO_DAMPING = np.array([0.015, 0.0036, 0.0024, 0.0021])  # data/README.md
+
+
+def frfs_of(path):
+    return estimate_frfs(read_test(path), IngestOptions()).frfs
+
+
+def frequencies(fit):
+    return np.abs(fit.model.poles[: fit.n_modes]) / (2 * np.pi)
+
+
+def test_demo_campaign_has_its_four_modes_and_no_other():
+    fit = fit_modes(frfs_of(DEMO), FitOptions(band_hz=(10.0, 700.0)))
+    assert fit.n_modes == 4
+    np.testing.assert_allclose(
+        fit.model.damping_ratio[:4], DEMO_DAMPING, rtol=0.005, atol=0
+    )  # two are given as rounded
+    assert fit.noise_from == "recordings"
+    assert fit.warnings == ()
+    assert list(fit.modes["quality"]) == ["good"] * 4
+    assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
+
+
+def test_demo_campaign_without_a_band():
+    fit = fit_modes(frfs_of(DEMO), FitOptions())
+    found = frequencies(fit)
+    assert all(np.abs(found - hz).min() < 0.5 for hz in (16.25, 101.83, 284.95, 557.71, 918.9))
+    assert (fit.modes["quality"] == "good").sum() >= 5
+
+
+@pytest.fixture(scope="module")
+def beam(recordings):
+    return frfs_of(recordings / "freefree_beam" / "test.toml")
+
+
+BEAM_BAND = FitOptions(band_hz=(20.0, 999.0))
+BEAM_HZ = np.array([111.994, 306.854, 596.368, 974.137])  # looked at in plots of all nine FRFs
+
+
+@pytest.mark.slow
+def test_free_beam_has_four_modes_and_drifts(beam):
+    fit = fit_modes(beam, BEAM_BAND)
+    assert fit.n_modes == 4
+    np.testing.assert_allclose(frequencies(fit), BEAM_HZ, rtol=1e-4, atol=0)  # the drift between its files
+    assert "drifted while it was measured" in fit.warnings[-1]
+    assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(80, rel=0.15)
+    assert fit.misfit.groupby("frf")["ratio"].median().max() < 1.4
+
+
+@pytest.mark.slow
+def test_ninth_file_of_the_free_beam_with_poles_held(beam):
+    eight = fit_modes(beam.frfs(range(8)), BEAM_BAND)
+    assert eight.n_modes == 4
+    ninth = fit_residues(beam.frfs([8]), eight.model.poles[:4], BEAM_BAND)
+    assert "off the given poles" in ninth.warnings[0]
+    assert float(ninth.warnings[0].split(";")[0].split()[-1]) == pytest.approx(-50, abs=12)
+    assert ninth.misfit["ratio"].median() < 1.2
+    assert ninth.misfit["ratio"].max() < 1.6  # where the 112 Hz peak is, whose half width is less than a line
+
+
+def test_steel_beam(recordings):
+    frfs = frfs_of(recordings / "steel_beam_5x3" / "test.toml")
+    fit = fit_modes(frfs, FitOptions(band_hz=(1.0, 600.0)))
+    seen = (32.7, 51.9, 93.1, 105.7, 172.4, 183.7, 289.0, 377.3, 437.5, 450.1)  # peaks of the plots
+    found = frequencies(fit)
+    assert all(np.abs(found / hz - 1).min() < 5e-3 for hz in seen)
+    assert 13 <= fit.n_modes <= 16
+    assert fit.misfit.groupby("frf")["ratio"].median().max() < 1.5
