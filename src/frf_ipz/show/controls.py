@@ -100,7 +100,8 @@ def pole_controls(fit: ModalFit) -> str:
         '<div class="work"><p class="tools-of-picture" role="group" aria-label="What dragging does">'
         '<button type="button" data-drag="zoom" aria-pressed="true">Drag: zoom</button> '
         '<button type="button" data-drag="select" aria-pressed="false">Drag: choose a stretch</button></p>'
-        '<form id="pole-form"><h3>A pole</h3><p>Click one in the diagram (triangles: the modes of the fit), or write its frequency.</p>'
+        '<form id="pole-form"><h3>A pole</h3>'
+        "<p>Click one in the diagram (triangles: the modes of the fit), or write its frequency.</p>"
         '<p><label>at <input name="hz" type="number" step="any" min="0" required> Hz</label> '
         f'<button name="kind" value="pin">Pin: a mode is here</button></p><p>{REASON} '
         '<button name="kind" value="strike">Strike: no mode</button></p></form>'
