@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.noise import ChannelNoise, read_noise
+from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations

@@ -17,21 +17,21 @@ import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
-from frf_ipz.diagnosis.nonlinear.candidates import Track, find_candidates
-from frf_ipz.diagnosis.nonlinear.freedom import make_freedom
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
+from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
+from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
-from frf_ipz.diagnosis.nonlinear.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.plant import make_plant
-from frf_ipz.diagnosis.nonlinear.screen import fit_linear
-from frf_ipz.diagnosis.nonlinear.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.nonlinear.plant import Plant
-    from frf_ipz.diagnosis.nonlinear.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.progress import Progress

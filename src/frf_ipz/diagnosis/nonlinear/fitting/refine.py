@@ -13,14 +13,14 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.motion import Clock, place_motion
-from frf_ipz.diagnosis.nonlinear.plant import PlantResponse, respond
-from frf_ipz.diagnosis.nonlinear.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
+from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 SETTLED = 1e-3  # relative change of the cost between turns
 DIFFERENCE = 1e-4  # of the shape: its derivative; kinks average out over many samples

@@ -14,15 +14,15 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.motion import Clock, place_motion
-from frf_ipz.diagnosis.nonlinear.plant import PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
+from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, no_deviations, respond
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.diagnosis.nonlinear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 LEAST_MOTION = 1e-9  # of the largest motion of all places: nothing can be said of a place that rests
 

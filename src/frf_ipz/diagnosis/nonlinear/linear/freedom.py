@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.nonlinear.plant import Deviations, Plant, PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.linear.plant import Deviations, Plant, PlantResponse, no_deviations, respond
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.nonlinear.march import Modes, Yielding, make_modes
-from frf_ipz.diagnosis.nonlinear.stretches import FINER
+from frf_ipz.diagnosis.nonlinear.fitting.march import Modes, Yielding, make_modes
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import FINER
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.plant import Deviations
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Deviations
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 DIFFERENCE = 1e-4  # of a frequency or damping ratio: step of a derivative
 REST_DAMPING = 0.05  # of the one mode that stands for all above those that are followed
@@ -50,7 +50,7 @@ class PlaceInTime:
     @property
     def shapes(self) -> FloatArray:
         """(n_modes,) at the place."""
-        return self.freedom.plant.at_places.shapes[self.place]
+        return np.asarray(self.freedom.plant.at_places.shapes[self.place])
 
     @property
     def deviations(self) -> Deviations:
@@ -81,13 +81,13 @@ class PlaceInTime:
     def without_law(self) -> FloatArray:
         """(2, n_blows, n_times) motion and velocity by the blows and by how stretches start."""
         modes, force = self.modes(), self.stretches.fine_force
-        z = modes.drive(self._push())
+        z = modes.drive(self.push())
         moving = self.freedom.moving
         if len(moving):
             z[moving[:, None], self.freedom.modes] += self._free(modes)
         found = np.stack([np.einsum("m,bmt->bt", self.shapes, part) for part in self._read(modes, z)])
         rest = self._rest(force)
-        return found + np.stack([rest, np.gradient(rest, self.step_s, axis=1)])
+        return np.asarray(found + np.stack([rest, np.gradient(rest, self.step_s, axis=1)]))
 
     def changes(self, law_force: FloatArray) -> FloatArray:
         """Change of motion and velocity by unknowns, at a constant force of the law.
@@ -105,7 +105,7 @@ class PlaceInTime:
         """
         freedom, modes = self.freedom, self.modes()
         free = freedom.modes
-        total = self._push()[:, free] - self.shapes[free, None] * law_force[:, None]
+        total = self.push()[:, free] - self.shapes[free, None] * law_force[:, None]
         columns = [self._by_pole(total, which) for which in (0, 1)]
         some = _some(modes, free)
         inputs = freedom.inputs[self.stretches.input_of]
@@ -115,8 +115,8 @@ class PlaceInTime:
             columns += self._by_start(some)
         return np.concatenate([column.transpose(2, 1, 0, 3) for column in columns])
 
-    def _push(self) -> FloatArray:
-        """(n_blows, n_modes, n_times) modal forces of the blows."""
+    def push(self) -> FloatArray:
+        """Give the modal forces of the blows, (n_blows, n_modes, n_times)."""
         shapes = (self.freedom.plant.at_inputs.shapes + self.deviations.inputs)[self.stretches.input_of]
         return np.asarray(shapes[:, :, None] * self.stretches.fine_force[:, None])
 

@@ -20,8 +20,8 @@ from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.noise import ChannelNoise
-    from frf_ipz.diagnosis.nonlinear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise
     from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 
 DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
@@ -67,6 +67,8 @@ class Stretches:
         Which of the observations' blows each stretch is of.
     moving : (n_blows,) bool array
         The structure moves at the start.
+    first_sample : (n_blows,) int array
+        Of the recordings, at the start.
     """
 
     s: ComplexArray
@@ -82,6 +84,7 @@ class Stretches:
     input_of: IntArray
     blow_of: IntArray
     moving: BoolArray
+    first_sample: IntArray
 
     @property
     def n_blows(self) -> int:
@@ -181,6 +184,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         input_of=np.array([plant.inputs.index(cut.blow.input_dof) for cut in cuts]),
         blow_of=np.array([cut.number for cut in cuts]),
         moving=np.array([cut.is_moving for cut in cuts]),
+        first_sample=np.array([cut.start for cut in cuts]),
     )
 
 

@@ -13,17 +13,17 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.march import March, Yielding, follow, march
-from frf_ipz.diagnosis.nonlinear.motion import Clock
-from frf_ipz.diagnosis.nonlinear.place import PlaceInTime
-from frf_ipz.diagnosis.nonlinear.plant import PlantResponse, respond
-from frf_ipz.diagnosis.nonlinear.refine import LawFit, Start
-from frf_ipz.diagnosis.nonlinear.screen import as_real, linear_motion
-from frf_ipz.diagnosis.nonlinear.stretches import FINER
+from frf_ipz.diagnosis.nonlinear.fitting.march import March, Yielding, follow, march
+from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start
+from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.linear.place import PlaceInTime
+from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import FINER
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
 FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step

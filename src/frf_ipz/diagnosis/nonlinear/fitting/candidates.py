@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.nonlinear.refine import LawFit, Start, refine
-from frf_ipz.diagnosis.nonlinear.screen import LinearFit, screen
-from frf_ipz.diagnosis.nonlinear.shoot import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
+from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
+from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.plant import Plant
-    from frf_ipz.diagnosis.nonlinear.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 OF_EACH_LAW = 3  # places that are refined
 OF_ALL = 5

@@ -1,0 +1,1 @@
+"""From all laws at all places to the one that fits best: screening, refinement, simulation."""

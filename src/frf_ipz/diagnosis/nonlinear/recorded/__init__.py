@@ -1,0 +1,1 @@
+"""What single recordings say: noise, and transforms of their stretches."""

@@ -1,0 +1,134 @@
+"""The model with its law in time: whole records as it would have answered, and how far they are from what was measured.
+
+The law sits at its place on the modes of the structure, with the deviations from the nominal model that the fit found.
+It holds for motions of the place up to those that it was fitted to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.nonlinear.fitting.march import march
+from frf_ipz.diagnosis.nonlinear.linear.place import PlaceInTime
+from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import FINER, Window, transform
+from frf_ipz.errors import InputError
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.observations import Observations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Simulation:
+    """How a structure with a law answers the forces of a test.
+
+    Parameters
+    ----------
+    step_s : float
+        Time step, s.
+    measured, simulated : (n_blows, n_sensors, n_samples) array
+        Responses from shortly before each blow on, in the sensors' quantities and signs; 0 where a blow lacks a sensor.
+    motion : (n_blows, n_samples) array
+        Of the law's place, m.
+    force : (n_blows, n_samples) array
+        Of the law, against the motion, N.
+    misfit : (n_blows,) array
+        Norm of measured minus simulated over the norm of measured, on the lines of the band.
+    """
+
+    step_s: float
+    measured: FloatArray
+    simulated: FloatArray
+    motion: FloatArray
+    force: FloatArray
+    misfit: FloatArray
+
+
+def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simulation:
+    """Simulate whole records.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records that start at rest.
+    freedom : Freedom
+        Unknowns of the linear model that the law was fitted with.
+    fit : LawFit
+        The law at its place.
+
+    Returns
+    -------
+    Simulation
+        Of all blows.
+
+    Raises
+    ------
+    InputError
+        If a record starts in motion.
+    """
+    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows))
+    stretches = transform(observations, freedom.plant, read_noise(observations), whole)
+    if stretches.moving.any():
+        raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
+    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
+    done = march(fit.law, (fit.strength, fit.shape), place.yielding(constant=fit.law.holds), *place.without_law())
+    shown = _sensors(place, done.force)
+    measured = _measured(observations, stretches)
+    return Simulation(
+        step_s=stretches.step_s,
+        measured=measured,
+        simulated=shown * (np.abs(measured).max(-1, keepdims=True) > 0),
+        motion=done.motion[:, ::FINER],
+        force=done.force[:, ::FINER],
+        misfit=_misfit(measured, shown, stretches.step_s, observations.band_hz),
+    )
+
+
+def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
+    """(n_blows, n_sensors, n_samples) what sensors show."""
+    plant, stretches, modes = place.freedom.plant, place.stretches, place.modes()
+    push = place.push() - place.shapes[:, None] * law_force[:, None]
+    z = modes.drive(push)
+    displacement, velocity = modes.displacement(z), modes.velocity(z)
+    loss, square = -2 * modes.poles.real[:, None], np.abs(modes.poles[:, None]) ** 2
+    modal = (displacement, velocity, push - loss * velocity - square * displacement)
+    shapes = plant.at_sensors.shapes + place.deviations.sensors
+    at_inputs = (plant.at_sensors.weights @ plant.at_inputs.static)[:, stretches.input_of]
+    at_place = plant.at_sensors.weights @ plant.at_places.static[:, place.place]
+    rest = at_inputs.T[..., None] * stretches.fine_force[:, None] - at_place[:, None] * law_force[:, None]
+    shown = np.zeros(rest[..., ::FINER].shape)
+    for row, sensor in enumerate(plant.sensors):
+        own = rest[:, row]
+        for _ in range(sensor.quantity.power):
+            own = np.gradient(own, place.step_s, axis=-1)
+        shown[:, row] = (np.einsum("m,bmt->bt", shapes[row], modal[sensor.quantity.power]) + own)[:, ::FINER]
+    return shown
+
+
+def _measured(observations: Observations, stretches: Stretches) -> FloatArray:
+    found = np.zeros((stretches.n_blows, stretches.motion.shape[1], stretches.n_samples))
+    keys = list(dict.fromkeys((s.channel, s.dof) for blow in observations.blows for s in blow.sensors))
+    for row, number in enumerate(stretches.blow_of):
+        blow, start = observations.blows[number], stretches.first_sample[row]
+        for sensor, response in zip(blow.sensors, blow.responses, strict=True):
+            found[row, keys.index((sensor.channel, sensor.dof))] = response[start : start + stretches.n_samples]
+    return found
+
+
+def _misfit(measured: FloatArray, simulated: FloatArray, step_s: float, band_hz: tuple[float, float]) -> FloatArray:
+    frequency = np.fft.rfftfreq(measured.shape[-1], step_s)
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    present = np.abs(measured).max(-1, keepdims=True) > 0
+    there, away = (_lines(signals)[..., inside] for signals in (measured, (measured - simulated) * present))
+    return np.asarray(np.linalg.norm(away, axis=(1, 2)) / np.maximum(np.linalg.norm(there, axis=(1, 2)), 1e-300))
+
+
+def _lines(signals: FloatArray) -> ComplexArray:
+    return np.asarray(np.fft.rfft(signals))
