@@ -11,7 +11,7 @@ from frf_ipz.arrays import FloatArray, IntArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-POINTS = 72_000  # of one kind of curve on the whole page: keeps a page of 100 FRFs below 10 MB
+POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 100 FRFs below 10 MB
 BINS = (150, 1200)  # of one curve: the fewest that still look like it, and as many as a screen has columns
 LOGARITHMIC = 0.35  # of the bins are spread evenly over the logarithm of the frequency, the others over the frequency
 

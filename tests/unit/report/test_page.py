@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -10,6 +11,7 @@ import plotly.graph_objects as go
 import pytest
 
 from frf_ipz.report.page import SECTIONS, write_report
+from frf_ipz.updating.updated_model import nothing_to_do
 from synthetic_run import Folder, many_frfs, synthetic_folder
 
 MODEL_STAGES = ("reduce", "pair", "update", "predict", "export", "model", "reference")
@@ -160,3 +162,43 @@ def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
         magnitude = np.frombuffer(base64.b64decode(data["arrays"][trace["y"]["$"]]), "<f4")
         exact = np.abs(recordings.frfs.values[:, place])
         np.testing.assert_allclose([magnitude.max(), magnitude.min()], [exact.max(), exact.min()], rtol=1e-6, atol=0)
+
+
+def test_a_fit_without_modes_and_an_update_without_targets_make_a_page(tmp_path):
+    folder = synthetic_folder()
+    results = folder.results
+    fit = results["fit"]
+    nothing = np.zeros(0, complex)
+    results["fit"] = replace(
+        fit,
+        n_modes=0,
+        model=replace(fit.model, poles=nothing, residues=np.zeros((0, len(fit.labels)), complex)),
+        zeros=replace(
+            fit.zeros, values=nothing, frf=np.zeros(0, int), kind=(), identifiable=np.zeros(0, bool), reason=()
+        ),
+        covariance=np.zeros((0, 0)),
+        residue_covariance=np.zeros((0, len(fit.labels), 2, 2)),
+        modes=fit.modes[:0],
+    )
+    results["pair"] = replace(results["pair"], rows=())
+    results["update"] = nothing_to_do(results["reduce"], "minimal-change")
+    text = page_of(folder, tmp_path)
+    assert "the model is left as it was" in text
+    assert '<section id="updating"' in text
+
+
+def test_records_of_a_shaker_are_drawn_from_their_start(tmp_path):
+    folder = synthetic_folder(without=("fit", *MODEL_STAGES))
+    recordings = folder.results["ingest"]
+    blows = recordings.blows[["blow", "used"]].assign(trigger_s=0.0)
+    folder.results["ingest"] = replace(recordings, blows=blows)
+    assert "Forces as recorded</figcaption>" in page_of(folder, tmp_path)
+
+
+def test_pulses_are_aligned_where_they_set_in(tmp_path):
+    folder = synthetic_folder(without=("fit", *MODEL_STAGES))
+    recordings = folder.results["ingest"]
+    folder.results["ingest"] = replace(recordings, blows=recordings.blows.assign(trigger_s=0.02))
+    data = data_of(page_of(folder, tmp_path))
+    time_ms = np.frombuffer(base64.b64decode(data["arrays"][data["pictures"]["blows"]["data"][0]["x"]["$"]]), "<f4")
+    np.testing.assert_allclose(time_ms, 1e3 * (recordings.traces[0].time_s - 0.02), rtol=1e-6, atol=1e-5)  # in float32

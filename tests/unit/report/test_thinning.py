@@ -37,7 +37,7 @@ def test_few_points_are_left_and_they_ascend():
 
 def test_both_ends_are_kept():
     frequency = np.linspace(1, 2, 10_000)
-    kept = thin(frequency, [np.sin(40 * frequency)], N_BINS)
+    kept = thin(frequency, [np.zeros(10_000)], N_BINS)
     assert kept[0] == 0
     assert kept[-1] == 9_999
 
@@ -59,7 +59,7 @@ def test_short_curves_stay_whole():
     assert len(thin(np.arange(1.0, 400.0), [np.zeros(399)], N_BINS)) == 399
 
 
-@pytest.mark.parametrize("n_curves", [1, 30, 60, 100])
+@pytest.mark.parametrize("n_curves", [1, 30, 60, 160])
 def test_a_page_has_a_bounded_number_of_points(n_curves):
     assert 2 * bins_for(n_curves) * n_curves <= POINTS
     assert BINS[0] <= bins_for(n_curves) <= BINS[1]

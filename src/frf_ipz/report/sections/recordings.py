@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.recordings import Trace as Recorded
     from frf_ipz.report.contents import RunContents
 
-MOST_TRACES = 60  # drawn; more cover each other and make the page large
+MOST_TRACES = 40  # drawn; more cover each other and make the page large
 MOST_PANELS = 4  # channels with a panel each; more share one
 LEGEND_NOTE = "Click a name in the legend to hide or show a blow; dotted: left out. Drag to zoom."
 SHOWN_AT_FIRST = 12  # blows; the others are a click in the legend away

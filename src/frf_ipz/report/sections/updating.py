@@ -231,7 +231,7 @@ def _of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Picture]:
 def _along(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
     """Draw a structure that is a line: change over position."""
     points = markers(positions[:, 0], change, "change", "@updated", size=6, text=names, hover="%{text}: %{y:+.3g} %")
-    return points, panels({"title": {"text": "Position"}}, Axis(title="Change of flexibility, %"))
+    return points, panels({"title": {"text": "Position, m"}}, Axis(title="Change of flexibility, %"))
 
 
 def _over(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
