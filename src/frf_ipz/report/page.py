@@ -109,17 +109,31 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(name)} – frf_ipz</title><style>{_asset('page.css')}</style></head><body>",
             '<a class="skip" href="#overview">Skip to the results</a>',
-            f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{_tools(run)}</div></div>',
+            f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div></div>',
             f'<header class="head"><h1>{escape(name)}</h1></header><main>{body}</main>',
             f"<footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to go "
             "back; with the keyboard: Tab, then arrow keys, + and −, 0.</footer>",
-            f'<script type="application/json" id="page-data">{_data(run, sections)}</script>',
+            f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
             f"<script>{get_plotlyjs()}</script><script>{_asset('page.js')}</script></body></html>",
         ]
     )
 
 
-def _data(run: RunContents, sections: Sequence[Section]) -> str:
+def page_data(run: RunContents, sections: Sequence[Section]) -> str:
+    """Give what the page's script draws from.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    sections : sequence of Section
+        With the pictures.
+
+    Returns
+    -------
+    str
+        JSON that can stand inside a script element.
+    """
     packer = Packer()
     pictures = {
         picture.name: {"data": packer.pack(picture.traces), "layout": packer.pack(picture.layout)}
@@ -138,7 +152,19 @@ def _data(run: RunContents, sections: Sequence[Section]) -> str:
     )
 
 
-def _tools(run: RunContents) -> str:
+def page_tools(run: RunContents) -> str:
+    """Give the tools of the page's bar: which FRFs are shown, how axes are divided, light or dark, print.
+
+    Parameters
+    ----------
+    run : RunContents
+        Says which FRFs there are.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
     buttons = (
         '<button id="scale" type="button" title="Frequency axes: linear or logarithmic">Frequency</button>'
         '<button id="theme" type="button" title="Light or dark">Light / dark</button>'

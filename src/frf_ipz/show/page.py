@@ -7,9 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.report.page import SECTIONS
-from frf_ipz.report.page import _data as page_data
-from frf_ipz.report.page import _tools as page_tools
+from frf_ipz.report.page import SECTIONS, page_data, page_tools
 from frf_ipz.report.picture import Picture
 from frf_ipz.report.section import Markup, Section, render_section
 from frf_ipz.show.controls import (
