@@ -109,7 +109,8 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(name)} – frf_ipz</title><style>{_asset('page.css')}</style></head><body>",
             '<a class="skip" href="#overview">Skip to the results</a>',
-            f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div></div>',
+            f'<div class="bar"><nav aria-label="Sections">{links}</nav>',
+            f'<div class="tools">{page_tools(run)}</div></div>',
             f'<header class="head"><h1>{escape(name)}</h1></header><main>{body}</main>',
             f"<footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to go "
             "back; with the keyboard: Tab, then arrow keys, + and −, 0.</footer>",
