@@ -14,12 +14,33 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.polish import Data, Fit
 
-FOUND_NATS = 25.0  # evidence over the nominal model's: what a finding needs
+FOUND_NATS = 24.0  # evidence over the nominal model's: what a finding needs
 SECOND_NATS = 40.0  # evidence of a second finding over the first one's alone
-MOST_MISFIT = 1.15  # sum of squares over the number of values
 MOST_PULL = 45.0  # sum of squares of what cannot be known
-MOST_OF_PIECE = 2.2  # misfit of an FRF over a piece of the band
 PIECES = 6  # of the band, by points
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a fit may leave where nothing is missing.
+
+    Parameters
+    ----------
+    misfit : float
+        Sum of squares over the number of values.
+    piece : float
+        The same of an FRF over a piece of the band.
+    """
+
+    misfit: float
+    piece: float
+
+
+LIMITS = {  # by what was looked at: the coarser its noise is known, the wider
+    "hammer": Limits(misfit=1.0, piece=2.3),
+    "random": Limits(misfit=1.25, piece=2.5),
+    "frf": Limits(misfit=1.6, piece=4.5),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,21 +55,24 @@ class Goodness:
         Sum of squares of what cannot be known, in standard deviations.
     worst_piece : float
         Largest mean square of an FRF over a piece of the band.
+    limits : Limits
+        What they may be.
     """
 
     misfit: float
     pull: float
     worst_piece: float
+    limits: Limits
 
     @property
     def is_good(self) -> bool:
         """True where nothing is left to explain."""
-        return self.misfit <= MOST_MISFIT and self.pull <= MOST_PULL and self.worst_piece <= MOST_OF_PIECE
+        return self.score <= 1
 
     @property
     def score(self) -> float:
         """Largest of the figures over their limits."""
-        return max(self.misfit / MOST_MISFIT, self.pull / MOST_PULL, self.worst_piece / MOST_OF_PIECE)
+        return max(self.misfit / self.limits.misfit, self.pull / MOST_PULL, self.worst_piece / self.limits.piece)
 
 
 def goodness(bench: Bench, fit: Fit) -> Goodness:
@@ -69,7 +93,7 @@ def goodness(bench: Bench, fit: Fit) -> Goodness:
     white = _white(bench.data, fit)
     pieces = [piece for piece in np.array_split(white, PIECES, axis=2) if piece.size]
     worst = max(float(np.mean(piece**2, axis=(1, 2)).max()) for piece in pieces)
-    return Goodness(misfit=float(np.mean(white**2)), pull=fit.pull, worst_piece=worst)
+    return Goodness(misfit=float(np.mean(white**2)), pull=fit.pull, worst_piece=worst, limits=LIMITS[bench.kind])
 
 
 def _white(data: Data, fit: Fit) -> np.ndarray:

@@ -31,6 +31,8 @@ class Source:
         Far from the axis; near it; near it and never fitted.
     survey : Survey or FrfSurvey
         Noise and resonances of what is fitted.
+    kind : str
+        What was looked at: blows of a ``hammer``, ``random`` records from rest, or ``frf``.
     held : str
         What was kept for the check: ``blows`` or ``lines``.
     held_names : tuple of str
@@ -41,6 +43,7 @@ class Source:
     training: Measured
     held_out: Measured
     survey: Survey | FrfSurvey
+    kind: str
     held: str
     held_names: tuple[str, ...] = ()
 
@@ -73,10 +76,16 @@ def divide(observations: Observations) -> Source:
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
     near = measure(found, s)
     if not kept:
-        return _by_points(coarse, near, found)
+        return _by_points(coarse, near, found, observations.kind)
     held = measure(like(found, replace(observations, blows=kept)), s)
     return Source(
-        coarse=coarse, training=near, held_out=held, survey=found, held="blows", held_names=tuple(sorted(names))
+        coarse=coarse,
+        training=near,
+        held_out=held,
+        survey=found,
+        kind=observations.kind,
+        held="blows",
+        held_names=tuple(sorted(names)),
     )
 
 
@@ -98,10 +107,10 @@ def _of_frfs(observations: Observations) -> Source:
     found = survey_frfs(observations.frfs, observations.band_hz)
     coarse = measure_frfs(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
     near = measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
-    return _by_points(coarse, near, found)
+    return _by_points(coarse, near, found, "frf")
 
 
-def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey) -> Source:
+def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
     number = np.arange(len(near.s))
     held = number % EVERY == EVERY // 2
     return Source(
@@ -109,5 +118,6 @@ def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey) -> S
         training=points_of(near, np.flatnonzero(~held)),
         held_out=points_of(near, np.flatnonzero(held)),
         survey=found,
+        kind=kind,
         held="lines",
     )

@@ -39,6 +39,8 @@ class Bench:
         The same, with larger errors: for first steps.
     thin : Data
         Fewer points near the axis: for a first look at small effects.
+    kind : str
+        What was looked at: blows of a ``hammer``, ``random`` records from rest, or ``frf``.
     """
 
     specimen: Specimen
@@ -48,6 +50,7 @@ class Bench:
     data: Data
     early: Data
     thin: Data
+    kind: str
 
     def suppose(self, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
         """Make a hypothesis."""

@@ -90,6 +90,12 @@ class Hypothesis:
         """Upper bounds as searched."""
         return self.searched(np.array([parameter.high for parameter in self.parameters]))
 
+    def start_at(self, values: FloatArray) -> FloatArray:
+        """Turn physical values, brought within the bounds, into what is searched along."""
+        bounds = [(parameter.low, parameter.high) for parameter in self.parameters]
+        inside = [np.clip(value, low, high) for value, (low, high) in zip(values, bounds, strict=True)]
+        return np.clip(self.searched(np.array(inside)), self.low, self.high)
+
     def searched(self, values: FloatArray) -> FloatArray:
         """Turn physical values into what is searched along: logarithms, or parts of the range."""
         return np.array(

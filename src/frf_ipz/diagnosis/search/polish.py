@@ -155,7 +155,7 @@ def polish(
     Fit
         The best found.
     """
-    start = np.clip(hypothesis.searched(values), hypothesis.low, hypothesis.high)
+    start = hypothesis.start_at(values)
     point = _at(hypothesis, data, start, np.zeros(hypothesis.nuisance.size) if unknown is None else unknown)
     slope = _linearise(hypothesis, data, point)
     damping, converged = FIRST_DAMPING, False

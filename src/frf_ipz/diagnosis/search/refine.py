@@ -72,7 +72,7 @@ def refine(
         response = hypothesis.respond(hypothesis.physical(searched), unknown, measured.s)
         return np.asarray(measured.values - response.values)
 
-    point = np.clip(hypothesis.searched(values), hypothesis.low, hypothesis.high)
+    point = hypothesis.start_at(values)
     misfit = misfit_at(point)
     cost, damping = robust_misfit(misfit, weights), 1e-2
     if not len(point):

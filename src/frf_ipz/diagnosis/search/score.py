@@ -53,7 +53,7 @@ class Score:
 
     def gain(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Half the fall of the sum of squares that one linear step from some values promises, nats."""
-        start = hypothesis.searched(np.concatenate([self.base.values, values]))
+        start = hypothesis.start_at(np.concatenate([self.base.values, values]))
         fixed = len(self.base.values)
         misfit = self._misfit(hypothesis, start)
         moves = []
@@ -72,7 +72,7 @@ class Score:
 
     def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Half the fall of the sum of squares at some values, nats."""
-        misfit = self._misfit(hypothesis, hypothesis.searched(np.concatenate([self.base.values, values])))
+        misfit = self._misfit(hypothesis, hypothesis.start_at(np.concatenate([self.base.values, values])))
         return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
 
     def weigh(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:

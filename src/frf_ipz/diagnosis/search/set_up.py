@@ -87,6 +87,7 @@ def set_up(
         data=with_errors(source.training, options, free_gains=free_gains),
         early=with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR),
         thin=with_errors(few, options, free_gains=free_gains),
+        kind=source.kind,
     )
 
 
