@@ -37,9 +37,10 @@ def test_demo_campaign_has_its_four_modes_and_no_other():
 
 def test_demo_campaign_without_a_band():
     fit = fit_modes(frfs_of(DEMO), FitOptions())
-    found = frequencies(fit)
-    assert all(np.abs(found - hz).min() < 0.5 for hz in (16.25, 101.83, 284.95, 557.71, 918.9))
-    assert (fit.modes["quality"] == "good").sum() >= 5
+    assert fit.n_modes == 5  # the fifth lies above the pipeline's band
+    damping = np.append(DEMO_DAMPING, 0.0027)
+    np.testing.assert_allclose(fit.model.damping_ratio[:5], damping, rtol=0.005, atol=0)
+    assert 1200 < fit.band_hz[1] < 1260  # the anti-alias filter takes the rest
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,111 @@
+"""CPU time and memory of the fitter against the poles of sdypy-EMA and the fit of scikit-rf, on the sets of the bench.
+
+Run with ``pytest tests/benchmarks --benchmark-only -s`` where the extra ``peers`` is installed; numbers are CPU seconds
+of one thread (set OPENBLAS_NUM_THREADS=1), ours and the peers' in the same run.
+"""
+
+import contextlib
+import importlib.util
+import io
+import resource
+import time
+
+import numpy as np
+import pytest
+
+from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.lines.measured import measured_lines
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.identification.start.stabilization import start_poles
+from synthetic_frfs import of_bench
+
+ROUNDS = 3
+ORDERS = {"b": 60, "c": 100}  # of the peer: what its own examples use, as in the bench
+POLES_FASTER = {"b": 2.0, "c": 20.0}  # pole step against sdypy-EMA's
+WHOLE_FASTER = {"c": 2.0}  # whole fit with covariance against sdypy-EMA's pole step alone
+AUTO_FASTER = 50.0  # whole fit against scikit-rf's auto_fit on set b
+MEMORY_MB = 300.0  # above the data, on set c
+
+
+@pytest.fixture(scope="module")
+def truth_sets(bench_fit):
+    spec = importlib.util.spec_from_file_location("make_truth", bench_fit / "make_truth.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return {name: getattr(module, f"set_{name}")() for name in "bc"}
+
+
+def cpu_seconds(work):
+    """Median CPU seconds after one run to warm up."""
+    work()
+    seconds = []
+    for _ in range(ROUNDS):
+        start = time.process_time()
+        work()
+        seconds.append(time.process_time() - start)
+    return float(np.median(seconds))
+
+
+def sdypy_seconds(truth, order):
+    ema = pytest.importorskip("sdypy.EMA", reason="needs the extra 'peers'")
+    rows = truth["H"].reshape(-1, truth["H"].shape[2])
+
+    def poles():
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            model = ema.Model(
+                rows,
+                truth["f"],
+                lower=0.5 * truth["fn"][0],
+                upper=truth["f"][-1],
+                pol_order_high=order,
+                frf_form="accelerance",
+            )
+            model.get_poles(method="lscf", show_progress=False)
+
+    return cpu_seconds(poles)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the peer
+@pytest.mark.parametrize("name", ["b", "c"])
+def test_against_sdypy(benchmark, truth_sets, name):
+    truth = truth_sets[name]
+    frfs = of_bench(truth)
+    peer = sdypy_seconds(truth, ORDERS[name])
+    options = FitOptions()
+    lines = measured_lines(frfs, options)
+    poles = cpu_seconds(lambda: start_poles(frfs, lines))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    whole = cpu_seconds(lambda: fit_modes(frfs, options))
+    memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    benchmark.extra_info.update(peer_cpu_s=peer, poles_cpu_s=poles, whole_cpu_s=whole, memory_mb=memory)
+    print(
+        f"\nset {name}: poles {poles:.3f} s, whole fit {whole:.3f} s, sdypy-EMA's poles {peer:.3f} s of CPU: "
+        f"{peer / poles:.1f} and {peer / whole:.2f} times faster; {memory:.0f} MB more at the peak"
+    )
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert peer >= POLES_FASTER[name] * poles
+    assert peer >= WHOLE_FASTER.get(name, 0.0) * whole
+    assert memory < MEMORY_MB
+
+
+@pytest.mark.filterwarnings("ignore")  # of the peer
+def test_against_auto_fit(benchmark, truth_sets):
+    skrf = pytest.importorskip("skrf", reason="needs the extra 'peers'")
+    fitting = pytest.importorskip("skrf.vectorFitting", reason="needs the extra 'peers'")
+    truth = truth_sets["b"]
+    rows = truth["H"].reshape(-1, truth["H"].shape[2])[:, 1:]
+    ports = int(np.ceil(np.sqrt(len(rows))))  # it takes square networks only
+    square = np.zeros((ports * ports, rows.shape[1]), complex)
+    square[: len(rows)] = rows
+    values = square.reshape(ports, ports, -1).transpose(2, 0, 1) / np.sqrt(np.mean(np.abs(rows[0]) ** 2))
+    network = skrf.Network(frequency=skrf.Frequency.from_f(truth["f"][1:], unit="hz"), s=values)
+    start = time.process_time()
+    with contextlib.redirect_stdout(io.StringIO()):
+        fitting.VectorFitting(network).auto_fit(enforce_dc=False)
+    peer = time.process_time() - start
+    frfs = of_bench(truth)
+    ours = cpu_seconds(lambda: fit_modes(frfs, FitOptions()))
+    benchmark.extra_info.update(peer_cpu_s=peer, ours_cpu_s=ours)
+    print(f"\nset b: whole fit {ours:.3f} s, scikit-rf's auto_fit {peer:.2f} s of CPU: {peer / ours:.0f} times faster")
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert peer >= AUTO_FASTER * ours
