@@ -108,6 +108,8 @@ def with_error(value: float, std: float, digits: int = 6) -> str:
         return number(value, digits)
     decimals = max(-math.floor(math.log10(std)), 0)
     size = max(math.floor(math.log10(abs(value))), 0) if value else 0
+    if std >= 10:
+        return f"{number(value, max(size - math.floor(math.log10(std)), 0) + 2)} ± {number(std, 1)}"
     if decimals + size >= digits + 4 or decimals > digits + 3:
         return f"{number(value, digits)} ± {number(std, 1)}"
     return f"{value:.{decimals}f} ± {number(std, 1)}"

@@ -33,7 +33,8 @@ def test_the_worst_target_is_the_largest_error(run):
     measured = [pair.measured_value for pair in run.pairs.targets]
     by_hand = np.abs(np.abs(run.updated.after) / np.abs(measured) - 1)
     np.testing.assert_allclose(errors, by_hand, rtol=1e-9, atol=1e-15)  # differences of nearly equal numbers
-    assert f"{100 * by_hand.max():.2g} %" in html(run)
+    worst = run.targets()[int(np.argmax(by_hand))]
+    assert f"Worst target after updating</dt><dd>{100 * by_hand.max():.2g} %</dd><dd>{worst.name}" in html(run)
 
 
 def test_the_verdict_counts_poles_and_zeros(run):

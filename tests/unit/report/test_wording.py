@@ -25,14 +25,15 @@ def test_number(value, digits, text):
     ("value", "std", "text"),
     [
         (16.08312, 0.0041, "16.083 ± 0.004"),
-        (1234.4, 20.0, "1234 ± 2e1"),
+        (1234.4, 20.0, "1234 ± 20"),
+        (90224191.0, 1.1e7, "9.0e7 ± 1e7"),
         (0.36, np.nan, "0.36"),
         (0.36, np.inf, "0.36"),
-        (284.951234, 1e-9, "284.951 ± 1.0e-9"),
+        (284.951234, 1e-9, "284.951 ± 1e-9"),
     ],
 )
 def test_a_number_has_the_digits_its_deviation_supports(value, std, text):
-    assert with_error(value, std).replace("20", "2e1").replace("1e-9", "1.0e-9") == text
+    assert with_error(value, std) == text
 
 
 def test_small_errors_do_not_claim_digits():

@@ -75,7 +75,7 @@ def _map(diagnosis: Diagnosis) -> Picture:
             values[place] = row[column]
         traces.append(_heat(values, names, bands, (rank, column, top)))
     shared = {"type": "category", "autorange": "reversed"}
-    axes = Axis(title="model as it is", options=shared), Axis(title="with the findings", options=shared)
+    axes = Axis(title="as it is", options=shared), Axis(title="with findings", options=shared)
     x = {"title": {"text": "Band, Hz"}, "type": "category", "tickangle": -40}
     return Picture(
         name="mismatch",
@@ -84,7 +84,7 @@ def _map(diagnosis: Diagnosis) -> Picture:
         traces=tuple(traces),
         layout=panels(x, *axes),
         note=f"1 is as good as the measurement. {diagnosis.mismatch_where}",
-        height_px=int(np.clip(200 + 44 * len(names), 260, 900)),
+        height_px=int(np.clip(240 + 44 * len(names), 380, 900)),
     )
 
 
@@ -160,7 +160,8 @@ def _findings(diagnosis: Diagnosis) -> Table:
             for one in entries
         ]
     columns = ("effect", "", "where", "parameters", "probability", "evidence, nats", "in words")
-    return Table(caption="Findings and alternatives", columns=columns, rows=rows, file="diagnosis.json")
+    caption = "Findings and alternatives" if diagnosis.findings else "What was tried and is not needed"
+    return Table(caption=caption, columns=columns, rows=rows, file="diagnosis.json")
 
 
 def _parameters(finding: Finding) -> str:
