@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
@@ -23,14 +22,18 @@ from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
+from frf_ipz.diagnosis.nonlinear.proof import prove, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.diagnosis import Misfit
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -73,6 +76,8 @@ class LawSearch:
         The structure that the law sits on; None for a linear system, as what follows.
     fit : LawFit, optional
         The best law at its place.
+    freedom : Freedom, optional
+        Unknowns of the linear model that it was fitted with; `simulate` needs them.
     """
 
     verdict: str
@@ -84,6 +89,7 @@ class LawSearch:
     statement: str = ""
     plant: Plant | None = None
     fit: LawFit | None = None
+    freedom: Freedom | None = None
 
     @property
     def is_nonlinear(self) -> bool:
@@ -134,8 +140,19 @@ def search_laws(
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         tracks.append(Track(stretches=stretches, linear=fit_linear(stretches, freedom)))
     fits = find_candidates(tracks[0], tracks[1], chosen_laws(options))
-    del held_out
-    return _judge(tracks[1].stretches, linearity, plant, fits, tracks[1].linear.cost)
+    found = _judge(tracks[1].stretches, linearity, plant, fits, tracks[1].linear.cost)
+    if found.fit is None:
+        return found
+    progress(0.9, "proving on what was not fitted")
+    before, after = prove(tracks[1], _held_out(held_out, plant, noise, tracks[1]), found.fit)
+    return replace(found, freedom=tracks[1].linear.freedom, before=before, after=after)
+
+
+def _held_out(held_out: Observations, plant: Plant, noise: ChannelNoise, track: Track) -> Stretches | None:
+    """Transform what is held out as what was fitted; nothing where no place has blows to spare."""
+    if not held_out.blows:
+        return None
+    return transform(held_out, plant, noise, Window(duration_s=track.stretches.duration_s, floor=FINE))
 
 
 def _divide(observations: Observations) -> tuple[Observations, Observations]:
@@ -167,7 +184,7 @@ def _judge(
         linearity=linearity,
         findings=findings,
         linear_limit=_linear_limit(stretches, linear_cost) / scale,
-        statement=findings[0].statement
+        statement=f"{findings[0].statement} {working_range(best, plant)}"
         if explained
         else f"Weak and strong blows disagree, and no law of the catalogue explains how: {left:.3g} times the expected "
         f"misfit is left by the best one ({findings[0].effect}).",

@@ -229,6 +229,11 @@ class Freedom:
                 columns[:, number, :, blow, row] = free * self.starts[number][:, None] * weight[blow, row]
         return list(columns.reshape(-1, self.starts.shape[1], *weight.shape)) if len(self.moving) else []
 
+    def without_starts(self, unknowns: FloatArray) -> tuple[Freedom, FloatArray]:
+        """Leave out how stretches start, for others that start at rest."""
+        none = replace(self, starts=self.starts[:0], moving=self.moving[:0])
+        return none, unknowns[: none.n_unknowns]
+
     def _split(self, unknowns: FloatArray) -> list[FloatArray]:
         return np.split(unknowns, np.cumsum(self.sizes)[:-1])
 

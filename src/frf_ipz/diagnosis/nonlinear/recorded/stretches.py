@@ -92,6 +92,11 @@ class Stretches:
         return len(self.force)
 
     @property
+    def duration_s(self) -> float:
+        """Length of a stretch, s."""
+        return self.n_samples * self.step_s
+
+    @property
     def sigma_1_s(self) -> float:
         """Real part of the lines."""
         return float(self.s[0].real)
@@ -147,7 +152,6 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     cuts, n = _cuts(observations, window, step)
     sigma = DECAYS / (n * step)
     s = np.asarray(sigma + 2j * np.pi * np.fft.rfftfreq(n, step))
-    powers = np.array([sensor.quantity.power for sensor in plant.sensors])
     force = np.zeros((len(cuts), len(s)), complex)
     start_force, fine_force = np.zeros((len(cuts), 2)), np.zeros((len(cuts), FINER * n))
     motion = np.zeros((len(cuts), len(plant.sensors), len(s)), complex)
@@ -159,16 +163,14 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         lines, start_force[number] = _lines(cut, finer, sigma)
         force[number], motion[number, rows] = lines[0], lines[1:]
         present[number, rows] = True
-    motion /= s ** powers[:, None]
-    frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
-    energy = (1 - np.exp(-2 * DECAYS)) / (2 * sigma)
-    own = [noise.response_energy(_noise_row(noise, sensor), frequency, energy) for sensor in plant.sensors]
-    known = np.array(own) / np.abs(s) ** (2 * powers[:, None])
+    motion /= s ** np.array([sensor.quantity.power for sensor in plant.sensors])[:, None]
     low, high = observations.band_hz
+    frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
     floor = np.where(frequency <= high, window.floor, OUTSIDE)
+    known, of_force = _noise(plant, noise, s, sigma)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
-    of_force = noise.force_energy(frequency, energy) / np.maximum(np.abs(force) ** 2, 1e-300)
-    variance = known + (floor**2 + np.minimum(of_force, 1.0)[:, None]) * size
+    forced = np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)
+    variance = known + (floor**2 + forced[:, None]) * size
     variance[~present] = np.inf
     return Stretches(
         s=s,
@@ -186,6 +188,17 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         moving=np.array([cut.is_moving for cut in cuts]),
         first_sample=np.array([cut.start for cut in cuts]),
     )
+
+
+def _noise(plant: Plant, noise: ChannelNoise, s: ComplexArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+    """Variances of `Stretches.motion`, (n_sensors, n_lines), and of `Stretches.force`, (n_lines,), by noise."""
+    frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
+    energy = (1 - np.exp(-2 * DECAYS)) / (2 * sigma)
+    own = [
+        noise.response_energy(_noise_row(noise, sensor), frequency, energy) / np.abs(s) ** (2 * sensor.quantity.power)
+        for sensor in plant.sensors
+    ]
+    return np.array(own), noise.force_energy(frequency, energy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

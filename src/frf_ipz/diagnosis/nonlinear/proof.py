@@ -1,0 +1,100 @@
+"""Figures of what a law explains, on what it was fitted to and on what it was not shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.diagnosis import Misfit
+from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
+from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
+from frf_ipz.diagnosis.nonlinear.linear.plant import respond
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+
+
+def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit, Misfit]:
+    """Compare the linear model with its tolerances, and the law, with what was fitted and what was held out.
+
+    Parameters
+    ----------
+    track : Track
+        What was fitted, and the linear model.
+    held_out : Stretches, optional
+        What was not.
+    fit : LawFit
+        The law at its place.
+
+    Returns
+    -------
+    before, after : Misfit
+        Not a number where nothing was held out, or where it starts in motion.
+    """
+    freedom, stretches = track.linear.freedom, track.stretches
+    training = (
+        _figures(stretches, _linear(stretches, freedom, track.linear.unknowns)),
+        _figures(stretches, fit.misfit),
+    )
+    other = [(np.nan, np.nan), (np.nan, np.nan)]
+    if held_out is not None and not held_out.moving.any():
+        resting, unknowns = freedom.without_starts(fit.unknowns)
+        start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=unknowns)
+        simulated = shoot(held_out, resting, start, iterations=0).misfit
+        plain = _linear(held_out, resting, freedom.without_starts(track.linear.unknowns)[1])
+        other = [_figures(held_out, plain), _figures(held_out, simulated)]
+    before, after = (
+        Misfit(training=mine[0], held_out=its[0], training_noise=mine[1], held_out_noise=its[1])
+        for mine, its in zip(training, other, strict=True)
+    )
+    return before, after
+
+
+def _linear(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> FloatArray:
+    """Weighted misfit of the linear model."""
+    response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
+    shown = linear_motion(stretches, freedom, response)
+    shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+    used = stretches.used
+    return as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
+
+
+def _figures(stretches: Stretches, misfit: FloatArray) -> tuple[float, float]:
+    """Norm of the misfit over that of the measured, and over what noise and the model's errors make one expect."""
+    used = stretches.used
+    deviation = np.sqrt(stretches.variance[:, :, used])
+    present = np.isfinite(deviation)
+    left = misfit.view(complex).reshape(deviation.shape)
+    away = np.linalg.norm((left * np.where(present, deviation, 0.0))[present])
+    size = np.linalg.norm(stretches.motion[:, :, used][present])
+    expected = np.sqrt(np.mean(np.abs(left[present]) ** 2) / 2)
+    return float(away / size), float(expected)
+
+
+def working_range(fit: LawFit, plant: Plant) -> str:
+    """Say for which motions of its place a law was seen.
+
+    Parameters
+    ----------
+    fit : LawFit
+        The law.
+    plant : Plant
+        The structure.
+
+    Returns
+    -------
+    str
+        A sentence.
+    """
+    largest = np.abs(fit.motion).max(1)
+    return (
+        f"It was seen for motions of {plant.places[fit.place].words} of up to {largest.max():.3g} m; the weakest blow "
+        f"reached {largest.min():.3g} m."
+    )
