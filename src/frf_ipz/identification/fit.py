@@ -27,7 +27,7 @@ from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import FoundZeros, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.judgement import Judgement, judge
+from frf_ipz.identification.search.judgement import Judgement, judge, peak_levels
 from frf_ipz.identification.search.selection import Selected, select_modes
 from frf_ipz.identification.start.stabilization import start_poles
 from frf_ipz.progress import Progress, silent
@@ -203,6 +203,17 @@ def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _F
     )
 
 
+def _levels(fitted: _Fitted) -> FloatArray:
+    """Factor on the variance of each pole: 1 where the noise is that of the recordings."""
+    poles = fitted.fit.poles
+    if fitted.noise_from == "recordings":
+        return np.ones(len(poles))
+    data = fitted.lines.weighted()
+    left = (data.receptance - response(fitted.fit.system, fitted.terms, data.s)) * data.weight
+    alike = fitted.judgement.missing[-1].level_at(poles)
+    return np.asarray(np.maximum(alike, peak_levels(data, fitted.fit, left)))
+
+
 def _excess(judgement: Judgement, fit: Refined) -> FloatArray:
     """Misfit over noise of each FRF, as roots of mean squares."""
     free = 2 * len(judgement.misfit) - fit.system.n_linear
@@ -215,9 +226,7 @@ def _as_modal_fit(
     lines, fit, terms = fitted.lines, fitted.fit, fitted.terms
     order, n_modes = mode_order(fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))
     modes = order[:n_modes]
-    is_white = fitted.noise_from == "recordings"
-    level = np.ones(len(fit.poles)) if is_white else fitted.judgement.missing[-1].level_at(fit.poles)
-    errors = fit_errors(fit, terms, level)
+    errors = fit_errors(fit, terms, _levels(fitted))
     if fitted.poles_are_held:
         errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
     found = find_zeros(errors, lines.s)

@@ -118,6 +118,30 @@ def pole_gains(system: Compressed) -> FloatArray:
     return gains
 
 
+def peak_levels(data: Weighted, fit: Refined, misfit: ComplexArray) -> FloatArray:
+    """Find how large the misfit is on the lines that tell where a pole is.
+
+    Parameters
+    ----------
+    data : Weighted
+        Lines and weights.
+    fit : Refined
+        The fit.
+    misfit : (n_lines, n_frfs) complex array
+        Over the noise.
+
+    Returns
+    -------
+    (n_poles,) array
+        Mean square over that of noise, lines and FRFs weighed by the square of their slope with the pole.
+    """
+    slope = np.abs(data.s[:, None] - fit.poles) ** -4
+    residues = np.abs(fit.system.residues().T) ** 2
+    told = np.einsum("lp,lp->p", slope, data.weight**2 @ residues)
+    missed = np.einsum("lp,lp->p", slope, (data.weight**2 * np.abs(misfit) ** 2 / 2) @ residues)
+    return np.asarray(missed / told)
+
+
 def _over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
     """Let the best subset of FRFs decide: a local mode shows in a few only, and need not pay for all the others."""
     n_frfs = drops.shape[1]
