@@ -1,0 +1,15 @@
+"""How long a large page takes to be written, and how large it is."""
+
+import pytest
+from synthetic_run import Folder, many_frfs
+
+from frf_ipz.report.page import write_report
+
+
+@pytest.mark.benchmark(group="report")
+def test_a_page_of_100_frfs_with_50_000_lines(benchmark, tmp_path):
+    folder = Folder(results={"ingest": many_frfs(100, 50_000)}, record={"stages": {}}, stale=())
+    path = tmp_path / "report.html"
+    benchmark.pedantic(write_report, args=(folder, path), rounds=3)
+    benchmark.extra_info["megabytes"] = path.stat().st_size / 1e6
+    print(f"\nreport.html: {benchmark.extra_info['megabytes']:.1f} MB")
