@@ -1,9 +1,9 @@
 """How long a large page takes to be written, and how large it is."""
 
 import pytest
-from synthetic_run import Folder, many_frfs
 
 from frf_ipz.report.page import write_report
+from synthetic_run import Folder, many_frfs
 
 
 @pytest.mark.benchmark(group="report")
