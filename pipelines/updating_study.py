@@ -62,6 +62,8 @@ def main() -> None:
     points = pd.concat(frames, ignore_index=True)
     with pd.option_context("display.width", 200, "display.max_columns", 20, "display.float_format", "{:.3g}".format):
         print(summary(points).to_string())
+        worse = points[points["minimal-change"] > points["nominal"]]
+        print("worse than nominal:\n", worse[["seed", "kind", "frfs", *METHODS]].to_string(index=False))
         print(about_updates(points).to_string())
 
 
@@ -160,10 +162,12 @@ def _one_group(group: pd.DataFrame) -> dict[str, float]:
 def about_updates(points: pd.DataFrame) -> pd.Series:
     """How the updates went, one structure at a time."""
     each = points.groupby("seed").first()
+    medians = points.groupby("seed")[["nominal", "minimal-change"]].median()
     return pd.Series(
         {
             "structures": len(each),
             "converged": int(each.converged.sum()),
+            "worse than nominal %": 100 * np.mean(medians["minimal-change"] > medians["nominal"]),
             "with a target unmet": int((each.unmet > 0).sum()),
             "iterations, median": each.iterations.median(),
             "iterations, most": each.iterations.max(),

@@ -24,6 +24,9 @@ from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.regions import Region, reduced_regions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.dofs import Dof
     from frf_ipz.structure import ReducedModel, StructuralModel
 
 GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a modulus or a thickness that is off
@@ -31,6 +34,7 @@ STRETCH_STD = 0.05  # of each term with a correlation length
 STRETCH_LENGTHS = (0.05, 0.2)  # correlation lengths, as parts of the structure's extent
 REST_STD = 0.005  # of a relative change that no part expresses, beside parts
 FREE_STD = 0.05  # of the same where the model has no parts
+SENSOR_KG = 2e-3  # of the mass of a sensor that the model knows nothing of: accelerometers weigh some grams
 MASS_STD = 0.02  # masses are known better than stiffness
 DOUBT = 1.0  # standard deviation of the logarithm of each of these: the data may ask for larger or smaller ones
 SAME_PLACE = 1e-9  # two parts at one place differ by this much of their variance, so that it has a root
@@ -176,8 +180,10 @@ def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = 
     )
 
 
-def structural_basis(full: StructuralModel, model: ReducedModel, *, mass: bool = False) -> ParameterBasis:
-    """Factors on the parts of the FE model, and what they cannot express.
+def structural_basis(
+    full: StructuralModel, model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof] = ()
+) -> ParameterBasis:
+    """Factors on the parts of the FE model, sensors that weigh something, and what they cannot express.
 
     Parameters
     ----------
@@ -186,20 +192,24 @@ def structural_basis(full: StructuralModel, model: ReducedModel, *, mass: bool =
     model : ReducedModel
         What it was reduced to.
     mass : bool
-        Let the masses change too.
+        Let the masses of the parts change too.
+    sensors : sequence of Dof
+        Sensors whose own mass is not known: it then sits there during the whole test, and may be estimated.
 
     Returns
     -------
     ParameterBasis
-        The generic one where the model has no parts, or only one.
+        The generic one in the place of parts where the model has none, or only one.
     """
     regions = reduced_regions(full, model)
     if len(regions) < 2:
-        return generic_basis(model)
-    parts = _part_basis(regions, stiffness=True)
-    if mass:
-        parts = join(parts, _part_basis(regions, stiffness=False))
-    return join(parts, generic_basis(model, std=REST_STD, common=False))
+        basis = generic_basis(model)
+    else:
+        basis = _part_basis(regions, stiffness=True)
+        if mass:
+            basis = join(basis, _part_basis(regions, stiffness=False))
+        basis = join(basis, generic_basis(model, std=REST_STD, common=False))
+    return join(basis, _sensor_basis(model, sensors)) if sensors else basis
 
 
 def join(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
@@ -249,6 +259,21 @@ def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatAr
     """
     root = np.hstack([scale * term.root for scale, term in zip(scales, terms, strict=True)])
     return np.asarray(whitened @ root.T)
+
+
+def _sensor_basis(model: ReducedModel, sensors: Sequence[Dof]) -> ParameterBasis:
+    """Mass of each sensor, kg; one that measures a rotation is left alone."""
+    places = [dof for dof in dict.fromkeys(dof.unsigned for dof in sensors) if not dof.direction.startswith("r")]
+    rows = np.array([model.row(dof) for dof in places]).reshape(len(places), len(model.dofs))
+    mass = np.einsum("ki,kj->kij", rows, rows)
+    return ParameterBasis(
+        names=tuple(f"mass of the sensor at {dof.name}" for dof in places),
+        mass=mass,
+        damping=np.zeros_like(mass),
+        stiffness=np.zeros_like(mass),
+        logarithmic=np.zeros(len(places), bool),
+        terms=(PriorTerm(name="mass of sensors", root=np.eye(len(places)), std=SENSOR_KG),),
+    )
 
 
 def _part_basis(regions: tuple[Region, ...], *, stiffness: bool) -> ParameterBasis:

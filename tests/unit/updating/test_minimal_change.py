@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import sparse
 
 from frf_ipz.fe.options import ReduceOptions
 from frf_ipz.fe.reduction import reduce_model
@@ -141,6 +142,22 @@ def test_noisier_targets_are_met_less():
     error = [np.abs(np.log(np.abs(each.after) / np.abs(values))).max() for each in near]
     assert error[1] > 3 * error[0]
     assert near[1].history.size_of_change.iloc[0] < near[0].history.size_of_change.iloc[0]
+
+
+def test_the_mass_of_a_sensor_is_found():
+    """What a test adds to every structure: without it the stiffness has to make up for it, and is wrong."""
+    bench = set_up(21)
+    sensor, grams = bench.case.sensors[0], 3e-3
+    place = bench.case.nominal.place(sensor)
+    added = np.zeros(bench.case.nominal.mass_all.shape)
+    added[place, place] = grams
+    real = replace(bench.case.nominal, mass_all=bench.case.nominal.mass_all + sparse.csr_array(added))
+    fit = synthetic_fit(Truth(real, bench.case.damping), bench.labels, bench.fit.band_hz, rng=np.random.default_rng(0))
+    basis = structural_basis(bench.case.nominal, bench.reduced, sensors=bench.case.sensors[:1])
+    updated = update_model(bench.reduced, fit, pair(fit, bench.reduced), basis=basis)
+    row = bench.reduced.row(sensor)
+    found = row @ (updated.model.mass - bench.reduced.mass) @ row / (row @ row) ** 2
+    assert_allclose(found, grams, rtol=0.2)
 
 
 def chosen_parameters(bench, elements):

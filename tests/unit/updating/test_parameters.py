@@ -84,6 +84,16 @@ def test_masses_change_only_when_asked(full):
     assert np.abs(basis.mass[of_mass].sum(0) - model.mass).max() < EXACT * np.abs(model.mass).max()
 
 
+def test_a_sensor_may_weigh_something(full):
+    model = reduced(full)
+    basis = structural_basis(full, model, sensors=(Dof(21, "z"), Dof(21, "z", -1), Dof(5, "ry")))
+    of_sensors = np.flatnonzero([name.startswith("mass of the sensor") for name in basis.names])
+    assert [basis.names[place] for place in of_sensors] == ["mass of the sensor at 21:z"]
+    row = model.row(Dof(21, "z"))
+    assert_allclose(basis.mass[of_sensors[0]], np.outer(row, row), rtol=1e-12)
+    assert not basis.stiffness[of_sensors].any()
+
+
 def test_without_parts_the_generic_parameters_are_used(full):
     model = reduced(full)
     basis = structural_basis(replace(full, parts=()), model)

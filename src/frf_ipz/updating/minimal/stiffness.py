@@ -15,7 +15,8 @@ from frf_ipz.numerics.pencils import undamped_sensitivity
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, follow
 
-SLACK = 1e-5  # relative standard deviation of what a reduced model cannot express of a real structure
+POLE_SLACK = 1e-7  # relative standard deviation of what a reduced model cannot express of a real pole: it has its modes
+ZERO_SLACK = 1e-5  # the same of a zero, which the modes left out move as well
 INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
 
@@ -54,7 +55,7 @@ class StiffnessPhase:
     @property
     def slack(self) -> FloatArray:
         """Standard deviations of what no parameter explains, (n,)."""
-        return np.full(len(self.targets), SLACK)
+        return np.where(self.wanted.frf < 0, POLE_SLACK, ZERO_SLACK)
 
     def matrices(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mass and stiffness for some parameters.
