@@ -221,7 +221,8 @@ def vibration(plant: Plant, controller: control.StateSpace | None) -> float:
         A = closed(plant, controller)
         B = np.vstack([B, np.asarray(controller.B) * plant.sensor_direct])
         C = np.hstack([C, np.zeros((1, len(controller.A)))])
-    inside = (OMEGA >= 2 * np.pi * BAND_HZ[0]) & (OMEGA <= 2 * np.pi * BAND_HZ[1])
+    hertz = OMEGA / (2 * np.pi)
+    inside = (hertz >= BAND_HZ[0]) & (hertz <= BAND_HZ[1])
     return float(np.sqrt(np.trapezoid(np.abs(transfer(A, B, C)[inside]) ** 2, OMEGA[inside]) / np.pi))
 
 
