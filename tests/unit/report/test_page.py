@@ -202,3 +202,23 @@ def test_pulses_are_aligned_where_they_set_in(tmp_path):
     data = data_of(page_of(folder, tmp_path))
     time_ms = np.frombuffer(base64.b64decode(data["arrays"][data["pictures"]["blows"]["data"][0]["x"]["$"]]), "<f4")
     np.testing.assert_allclose(time_ms, 1e3 * (recordings.traces[0].time_s - 0.02), rtol=1e-6, atol=1e-5)  # in float32
+
+
+def test_a_run_that_names_no_points_predicts_nothing(tmp_path):
+    folder = synthetic_folder()
+    prediction = folder.results["predict"]
+    empty = {
+        name: getattr(prediction, name)[:, :0] for name in ("values", "nominal", "magnitude_low", "magnitude_high")
+    }
+    zeros = replace(
+        prediction.zeros,
+        values=np.zeros(0, complex),
+        frf=np.zeros(0, int),
+        kind=(),
+        identifiable=np.zeros(0, bool),
+        reason=(),
+    )
+    folder.results["predict"] = replace(prediction, labels=(), zeros=zeros, zero_std=np.zeros((0, 2)), **empty)
+    text = page_of(folder, tmp_path)
+    assert '<section id="prediction"' not in text
+    assert "and predicts" not in text
