@@ -216,10 +216,7 @@ def read_state_space(path: Path) -> StateSpaceModel:
         If the file is no such state space.
     """
     try:
-        if _suffix(path) == ".json":
-            values = json.loads(path.read_text(encoding="utf-8"))
-        else:
-            values = loadmat(path)
+        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
         names = {name: tuple(str(_text(text)) for text in np.ravel(values[name])) for name in NAMES}
         sizes = [len(names[name]) for name in ("state_names", "input_names", "output_names")]
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in _shapes(*sizes).items()}

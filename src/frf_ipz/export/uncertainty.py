@@ -1,0 +1,159 @@
+"""How far the plant may be from its model: a multiplicative uncertainty weight for every output.
+
+A robust design takes every plant ``(1 + w Delta) G`` with ``|Delta| <= 1`` into account. The weight is an upper bound
+of what the members of the posterior do, of second order, stable and without zeros in the right half plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize
+
+from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.errors import InputError
+from frf_ipz.prediction.members import Members
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import control
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+QUANTILE = 0.95  # of the members
+SMALLEST = 1e-6  # relative error below which a bound would only follow rounding
+BOUND = 1.0 + 1e-9  # so that rounding leaves the bound above
+STARTS = ((0.1, 1.0), (1.0, 10.0), (0.1, 10.0), (0.5, 2.0))  # corners of the weight, over the middle of the band
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UncertaintyWeights:
+    """Relative errors of the members, and weights that bound them.
+
+    Parameters
+    ----------
+    output_names : tuple of str
+        DOF labels.
+    frequency_hz : (n_lines,) array
+        Hz.
+    relative_error : (n_lines, n_outputs) array
+        Norm over all inputs of (member minus model) over that of the model: the 95 % quantile over the members.
+    numerators, denominators : (n_outputs, 3) array
+        Polynomials in s, highest power first, of the weight of each output.
+    """
+
+    output_names: tuple[str, ...]
+    frequency_hz: FloatArray
+    relative_error: FloatArray
+    numerators: FloatArray
+    denominators: FloatArray
+
+    def __post_init__(self) -> None:
+        count = len(self.output_names)
+        require_shape("the relative errors", self.relative_error, (len(self.frequency_hz), count))
+        require_shape("the numerators", self.numerators, (count, 3))
+        require_shape("the denominators", self.denominators, (count, 3))
+
+    def to_control(self) -> tuple[control.TransferFunction, ...]:
+        """Give the weights to python-control, one an output."""
+        import control  # here, since it takes a second and loads pyplot
+
+        return tuple(control.tf(above, below) for above, below in zip(self.numerators, self.denominators, strict=True))
+
+
+def uncertainty_weights(
+    updated: UpdatedModel, labels: Sequence[FrfLabel], points: Sequence[Dof], frequency_hz: FloatArray
+) -> UncertaintyWeights:
+    """Bound the relative error that the posterior leaves, for every sensor and point of interest.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        With an ensemble.
+    labels : sequence of FrfLabel
+        What was measured: its blows are the inputs, its sensors the first outputs.
+    points : sequence of Dof
+        Points of interest.
+    frequency_hz : (n_lines,) array
+        Where the bound has to hold, above 0, Hz.
+
+    Returns
+    -------
+    UncertaintyWeights
+        In the order of the outputs of `to_state_space`; the quantity of an output does not matter to a relative error.
+
+    Raises
+    ------
+    InputError
+        If the method of updating has drawn no ensemble.
+    """
+    if not len(updated.ensemble):
+        raise InputError(
+            f"the update by '{updated.method}' has no ensemble, so nothing is known of its uncertainty; use [update] "
+            "method = 'minimal-change' with ensemble = 200"
+        )
+    s = 2j * np.pi * np.asarray(frequency_hz, float)
+    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *points]))
+    inputs = tuple(dict.fromkeys(label.input_dof for label in labels))
+    errors = np.stack([_relative_error(updated, output, inputs, s) for output in outputs], axis=1)
+    weights = [_bound(np.asarray(frequency_hz, float), error) for error in errors.T]
+    return UncertaintyWeights(
+        output_names=tuple(str(output) for output in outputs),
+        frequency_hz=np.asarray(frequency_hz, float),
+        relative_error=errors,
+        numerators=np.array([above for above, _ in weights]),
+        denominators=np.array([below for _, below in weights]),
+    )
+
+
+def _relative_error(updated: UpdatedModel, output: Dof, inputs: Sequence[Dof], s: ComplexArray) -> FloatArray:
+    model = updated.model
+    lowest = float(np.abs(s).min())
+    mean = Members(ensemble=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
+    members = Members(ensemble=updated.ensemble, lowest_rad_s=lowest)
+    size, distance = np.zeros(len(s)), np.zeros((len(updated.ensemble), len(s)))
+    for force in inputs:
+        rows = model.row(output), model.row(force)
+        nominal = mean.receptance(*rows, s)
+        size += np.abs(nominal[0]) ** 2
+        distance += np.abs(members.receptance(*rows, s) - nominal) ** 2
+    return np.asarray(np.quantile(np.sqrt(distance / size), QUANTILE, axis=0))
+
+
+def _bound(frequency_hz: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the biquadratic weight above the curve that lies closest to it on the mean in dB."""
+    wanted = np.log(np.maximum(error, SMALLEST))
+    middle = 2 * np.pi * float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
+    s = 2j * np.pi * frequency_hz / middle
+
+    def excess(logs: FloatArray) -> FloatArray:
+        above, below = _polynomials(logs)
+        shape = np.log(np.abs(np.polyval(above, s) / np.polyval(below, s)))
+        return np.asarray(shape - wanted)
+
+    def cost(logs: FloatArray) -> float:
+        gap = excess(logs)
+        return float(np.mean(gap) - gap.min() + 1e-3 * (logs @ logs))
+
+    starts = [
+        np.array([np.log(low), 0.0, np.log(high), 0.0]) for low, high in (*STARTS, *(pair[::-1] for pair in STARTS))
+    ]
+    found = min((minimize(cost, start, method="Nelder-Mead") for start in starts), key=lambda result: result.fun)
+    above, below = _polynomials(found.x)
+    gain = BOUND * float(np.exp(-excess(found.x).min()))
+    time = np.array([1 / middle**2, 1 / middle, 1.0])
+    return gain * above * time, below * time
+
+
+def _polynomials(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator from logarithms of corners and damping; all roots in the left half plane."""
+    corner, damping, other, other_damping = np.exp(np.clip(logs, -12, 12))
+    return (
+        np.array([1.0, 2 * damping * corner, corner**2]),
+        np.array([1.0, 2 * other_damping * other, other**2]),
+    )
