@@ -176,6 +176,22 @@ def test_a_stretch_that_is_dragged_over_is_left_out(page, demo):
     assert page.find("[data-drag=select]").get_attribute("aria-pressed") == "true"
 
 
+def test_zooming_in_brings_all_lines_of_the_frfs(page, demo):
+    lines = pq.read_table(
+        demo / "out" / "frf.parquet", filters=[("frequency_hz", ">", 299.9), ("frequency_hz", "<", 303.1)]
+    )
+    frequencies = sorted(set(lines["frequency_hz"].to_pylist()))
+    inside = "return [...document.querySelector('#frf .plot').data[0].x].filter((x) => x > 299.9 && x < 303.1).length"
+    page.show("#frf")
+    page.run(
+        "const plot = document.querySelector('#frf .plot'), isLog = plot.layout.xaxis.type === 'log';"
+        "const end = (hz) => (isLog ? Math.log10(hz) : hz);"
+        "Plotly.relayout(plot, {'xaxis.range[0]': end(300), 'xaxis.range[1]': end(303)});"
+    )
+    page.wait_until(lambda: page.run("return !!document.querySelector('#frf .plot').dataset.sharp"))
+    assert page.run(inside) == len(frequencies)
+
+
 def test_a_blow_is_dropped(page, demo):
     page.click("#blow-choices summary")
     before = page.stamp()

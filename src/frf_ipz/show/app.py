@@ -15,11 +15,11 @@ from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainT
 from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
-from frf_ipz.report.page import _asset as report_asset
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.page import render_choices, render_page
-from frf_ipz.show.shape_drawing import draw_shape
-from frf_ipz.show.shapes import mode_shape, operating_shape
+from frf_ipz.show.pictures.shape_drawing import draw_shape
+from frf_ipz.show.pictures.shapes import mode_shape, operating_shape
+from frf_ipz.show.pictures.zoom import zoomed_traces
 from frf_ipz.show.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -54,14 +54,15 @@ def build_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
         Route("/state", _answering(bench, _state)),
         Route("/choices", _answering(bench, _choices)),
         Route("/shape", _answering(bench, _shape)),
+        Route("/zoom", _answering(bench, _zoom)),
         Route("/change", _answering(bench, _change), methods=["POST"]),
         Route("/run", _answering(bench, _run), methods=["POST"]),
         Route("/run/{path:path}", _answering(bench, _file)),
         Route("/plotly.js", _fixed(get_plotlyjs(), SCRIPT)),
-        Route("/page.js", _fixed(report_asset("page.js"), SCRIPT)),
-        Route("/page.css", _fixed(report_asset("page.css"), STYLE)),
-        Route("/show.js", _fixed(_asset("show.js"), SCRIPT)),
-        Route("/show.css", _fixed(_asset("show.css"), STYLE)),
+        Route("/page.js", _fixed(_asset("report", "page.js"), SCRIPT)),
+        Route("/page.css", _fixed(_asset("report", "page.css"), STYLE)),
+        Route("/show.js", _fixed(_asset("show", "show.js"), SCRIPT)),
+        Route("/show.css", _fixed(_asset("show", "show.css"), STYLE)),
     ]
     app = Starlette(routes=[Mount(f"/{token}", routes=routes)])
     return Guard(app, port=port, token=token)
@@ -92,6 +93,16 @@ def _shape(bench: Workbench, request: Request) -> Response:
     except ValueError as error:
         raise InputError(str(error)) from None
     return JSONResponse(draw_shape(shape, run.geometry))
+
+
+def _zoom(bench: Workbench, request: Request) -> Response:
+    asked = request.query_params
+    try:
+        stretch = float(asked.get("low", "nan")), float(asked.get("high", "nan"))
+        shown = [int(place) for place in asked.get("frfs", "").split(",")]
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return JSONResponse({"traces": zoomed_traces(bench.contents(), stretch, shown)})
 
 
 def _change(bench: Workbench, request: Request) -> Response:
@@ -151,5 +162,5 @@ def _fixed(text: str, kind: str) -> Callable[[Request], Awaitable[Response]]:
     return endpoint
 
 
-def _asset(name: str) -> str:
-    return (files("frf_ipz.show") / "assets" / name).read_text(encoding="utf-8")
+def _asset(part: str, name: str) -> str:
+    return (files(f"frf_ipz.{part}") / "assets" / name).read_text(encoding="utf-8")

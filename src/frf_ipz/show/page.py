@@ -18,7 +18,7 @@ from frf_ipz.show.controls import (
     pole_controls,
     shape_controls,
 )
-from frf_ipz.show.marks import DIAGRAM, with_choices
+from frf_ipz.show.pictures.marks import DIAGRAM, with_choices
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.config import PipelineFile

@@ -76,6 +76,21 @@ def test_shapes_of_a_mode_and_at_a_frequency(client):
         assert client.get(HOME + "shape", params=wrong).status_code == 400, wrong
 
 
+def test_frfs_of_a_stretch_come_with_all_their_lines(client, bench):
+    frfs = bench.contents().frfs
+    inside = (frfs.frequency_hz >= 99.9) & (frfs.frequency_hz <= 104.1)
+    answer = client.get(HOME + "zoom", params={"low": "100", "high": "104", "frfs": "1"}).json()
+    magnitude = next(trace for trace in answer["traces"] if min(trace["y"]) > 0 and len(trace["y"]) >= inside.sum())
+    assert set(frfs.frequency_hz[inside].round(6)) <= {round(x, 6) for x in magnitude["x"]}
+    assert len(client.get(HOME + "zoom", params={"low": "0", "high": "50", "frfs": "0,1"}).json()["traces"]) == 2 * len(
+        answer["traces"]
+    )
+    for wrong in ({"frfs": "2"}, {"frfs": "-1"}, {"frfs": ""}, {"frfs": "x"}, {"frfs": "0", "low": "nan"}, {}):
+        asked = {"low": "100", "high": "104", **wrong} if wrong else {}
+        assert client.get(HOME + "zoom", params=asked).status_code == 400, wrong
+    assert client.get(HOME + "zoom", params={"low": "1e6", "high": "2e6", "frfs": "0"}).status_code == 400
+
+
 @pytest.mark.parametrize(
     "headers",
     [

@@ -10,8 +10,8 @@ from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.section import pictures_of, render_section
 from frf_ipz.show.controls import choices_panel
-from frf_ipz.show.marks import with_choices
 from frf_ipz.show.page import page_sections
+from frf_ipz.show.pictures.marks import with_choices
 from synthetic_run import synthetic_folder
 
 OF_MODEL = ("model", "reduce", "pair", "update", "predict", "export", "reference")

@@ -132,6 +132,32 @@
     setDrag(remembered.dragmode || "zoom");
   }
 
+  // The page holds of long FRFs what a screen can show; zoomed in, all lines of those that are shown are asked for.
+  let zoomTimer = 0;
+  function listenToFrfs(plot) {
+    plot.on("plotly_relayout", () => {
+      clearTimeout(zoomTimer);
+      zoomTimer = setTimeout(() => sharpen(plot), 250);
+    });
+  }
+
+  async function sharpen(plot) {
+    const { range, type } = plot.layout.xaxis;
+    const [low, high] = range.map((end) => (type === "log" ? 10 ** end : end));
+    const places = [...plot.data.keys()].filter((k) => plot.data[k].visible !== false && plot.data[k].meta);
+    const frfs = [...new Set(places.map((k) => plot.data[k].meta.frf))];
+    if (!frfs.length) return;
+    let traces;
+    try {
+      ({ traces } = await ask(`zoom?${new URLSearchParams({ low, high, frfs })}`));
+    } catch (error) {
+      return; // nothing was measured there: the picture stays as it is
+    }
+    if (traces.length !== places.length) return;
+    Plotly.restyle(plot, { x: traces.map((trace) => trace.x), y: traces.map((trace) => trace.y) }, places);
+    plot.dataset.sharp = `${low} ${high}`;
+  }
+
   function setDrag(mode) {
     dragmode = mode;
     all("[data-drag]").forEach((button) => button.setAttribute("aria-pressed", button.dataset.drag === mode));
@@ -328,6 +354,7 @@
     restoreLook();
     whenDrawn("stabilisation", listenToDiagram);
     whenDrawn("structure", listenToStructure);
+    whenDrawn("frf", listenToFrfs);
     startShapes();
     follow();
   }

@@ -13,8 +13,8 @@ from frf_ipz.fe.response import model_frfs
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.show.shape_drawing import REACH, draw_shape
-from frf_ipz.show.shapes import Motion, Shape, mode_shape, operating_shape
+from frf_ipz.show.pictures.shape_drawing import REACH, draw_shape
+from frf_ipz.show.pictures.shapes import Motion, Shape, mode_shape, operating_shape
 from frf_ipz.structure import Geometry
 
 ROUNDING = 1e-9  # of the largest value: a 5 by 5 solve, and eigenvectors of a lightly damped pencil

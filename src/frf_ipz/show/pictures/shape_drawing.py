@@ -11,7 +11,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.show.shapes import Motion, Shape
+    from frf_ipz.show.pictures.shapes import Motion, Shape
     from frf_ipz.structure import Geometry
 
 FLAT = 1e-6  # of the largest extent: thinner than this is flat

@@ -1,0 +1,60 @@
+"""FRFs of a stretch with all their lines: the page itself holds only what a screen can show of the whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frf_ipz.errors import InputError
+from frf_ipz.report.section import pictures_of
+from frf_ipz.report.sections import frfs as frf_section
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.report.contents import RunContents
+
+DIGITS = 8  # of a number: neighbouring lines of a long record differ in the sixth
+
+
+def zoomed_traces(run: RunContents, stretch_hz: tuple[float, float], shown: Sequence[int]) -> list[dict[str, Any]]:
+    """Draw some FRFs over a stretch, as the report draws all of them over everything.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    stretch_hz : pair of float
+        From, to, Hz; a line on each side of it is drawn too.
+    shown : sequence of int
+        Which FRFs.
+
+    Returns
+    -------
+    list of dict
+        ``x`` and ``y`` of each trace, FRF by FRF; null where a value is not known.
+
+    Raises
+    ------
+    InputError
+        If there are no such FRFs or lines.
+    """
+    recordings = run.recordings
+    if recordings is None or not shown or not all(0 <= place < recordings.frfs.n_frfs for place in shown):
+        raise InputError("this run has no such FRFs")
+    frequency = recordings.frfs.frequency_hz
+    first, last = np.searchsorted(frequency, stretch_hz)
+    inside = np.zeros(len(frequency), bool)
+    inside[max(int(first) - 1, 0) : int(last) + 1] = True
+    if not np.isfinite(stretch_hz).all() or np.count_nonzero(inside) < 2:
+        raise InputError(f"no lines were measured from {stretch_hz[0]:g} to {stretch_hz[1]:g} Hz")
+    part = replace(recordings, frfs=recordings.frfs.frfs(shown).lines(inside))
+    section = frf_section.build(replace(run, recordings=part, fit=None))
+    (picture,) = pictures_of([] if section is None else [section])
+    return [{axis: _numbers(trace[axis]) for axis in ("x", "y")} for trace in picture.traces]
+
+
+def _numbers(values: Any) -> list[float | None]:  # noqa: ANN401  arrays or lists, as traces hold them
+    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in np.asarray(values, float)]
