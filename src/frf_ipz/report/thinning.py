@@ -63,7 +63,7 @@ def thin(frequency_hz: FloatArray, curves: Sequence[FloatArray], n_bins: int) ->
     if n_lines <= 2 * n_bins:
         return np.arange(n_lines)
     starts = _starts(frequency_hz, n_bins)
-    kept = [np.array([0, n_lines - 1])]
+    kept = [np.zeros(1, int)]  # the last line is a bin of its own
     for curve in curves:
         kept += [_extreme(curve, starts), _extreme(-curve, starts)]
     return np.unique(np.concatenate(kept))
