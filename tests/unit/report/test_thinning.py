@@ -59,7 +59,7 @@ def test_short_curves_stay_whole():
     assert len(thin(np.arange(1.0, 400.0), [np.zeros(399)], N_BINS)) == 399
 
 
-@pytest.mark.parametrize("n_curves", [1, 30, 60, 160])
+@pytest.mark.parametrize("n_curves", [1, 30, 60, 140])
 def test_a_page_has_a_bounded_number_of_points(n_curves):
     assert 2 * bins_for(n_curves) * n_curves <= POINTS
     assert BINS[0] <= bins_for(n_curves) <= BINS[1]
