@@ -75,7 +75,7 @@ def error_ellipses(roots: ComplexArray, covariance: FloatArray) -> tuple[FloatAr
     --------
     >>> root, covariance = np.array([-1.0 + 100j]), np.array([[[0.01, 0.0], [0.0, 0.01]]])
     >>> hertz, _ = error_ellipses(root, covariance)
-    >>> round(2 * np.pi * (hertz.max() - hertz.min()) / 2 / 0.1, 2)
+    >>> round(float(2 * np.pi * (hertz.max() - hertz.min()) / 2 / 0.1), 2)
     2.45
     """
     known = np.isfinite(covariance).all(axis=(1, 2)) & (np.abs(roots) > 0)
