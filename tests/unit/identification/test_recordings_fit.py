@@ -81,3 +81,16 @@ def test_steel_beam(recordings):
     assert all(np.abs(found / hz - 1).min() < 5e-3 for hz in seen)
     assert 13 <= fit.n_modes <= 16
     assert fit.misfit.groupby("frf")["ratio"].median().max() < 1.5
+
+
+def test_raw_blows_of_a_lightly_damped_structure(recordings):
+    frfs = frfs_of(recordings / "raw_hammer" / "test.toml")
+    fit = fit_modes(frfs, FitOptions(band_hz=(500.0, 6500.0)))
+    peaks = (810.3, 851.6, 900.0, 2640.2, 3007.5, 3035.3, 3669.0, 3689.4, 4127.6, 4163.2, 4391.7, 4421.0, 4470.0)
+    found = frequencies(fit)
+    assert all(np.abs(found / hz - 1).min() < 1e-3 for hz in (*peaks, 5031.0, 5073.8, 5969.6, 6076.7))
+    assert fit.n_modes < 40
+    assert "times the noise of the recordings" in fit.warnings[0]
+    used = fit.used_lines
+    values, model = frfs.values[used], fit.model(frfs.s[used])
+    assert np.median(np.abs(model / values - 1)) < 0.02

@@ -20,6 +20,7 @@ GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the da
 GOOD_SIGNIFICANCE = 5.0  # times what the BIC demands
 COLLINEAR = 0.9  # phase collinearity of a mode that looks normal
 ALIKE = 0.9  # MAC between two modes at which the shapes do not tell them apart
+FEWEST_FRFS = 3  # whose shapes can differ
 CLOSE = 0.02  # relative distance of two modes whose shapes are compared for it
 
 
@@ -46,7 +47,7 @@ def mode_table(poles: ComplexArray, residues: ComplexArray, judgement: Judgement
     assurance = modal_assurance(shapes, shapes)
     np.fill_diagonal(assurance, 0.0)
     near = np.abs(np.abs(poles)[:, None] / np.abs(poles) - 1) < CLOSE
-    confused = np.max(assurance * near, axis=1, initial=0.0)
+    confused = np.max(assurance * near, axis=1, initial=0.0) * (len(shapes) >= FEWEST_FRFS)
     rows = {
         "pole_id": np.arange(1, len(poles) + 1),
         "frequency_hz": natural_frequency_hz(poles),

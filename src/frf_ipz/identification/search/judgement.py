@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import Compressed, Weighted, response
 from frf_ipz.identification.lines.noise import smooth_level
 from frf_ipz.identification.search.candidates import Candidates, find_candidates
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 LEVEL_SCATTER = 1.6  # a level found from one block of lines exceeds its expectation by this about once in a thousand
+FAR = 10.0  # mean square of the misfit over that of noise, above which modes are missing
+NEEDED = 0.02  # part of such a misfit that a pole must take off to stay
 GROWTH = 3  # a search proposes at most one pole for so many that there are, and two
 
 
@@ -45,6 +47,9 @@ class Judgement:
         What each pole takes off minus twice the log likelihood, over what the BIC demands for it.
     damping_std : (n_poles,) array
         Standard deviation of each damping, relative.
+    is_needed : (n_poles,) bool array
+        The model is far from the lines, and would be clearly farther without the pole: whatever its significance, which
+        suffers from the modes that are still missing.
     """
 
     frequency_hz: FloatArray
@@ -53,6 +58,7 @@ class Judgement:
     missing: tuple[Candidates, ...]
     significance: FloatArray
     damping_std: FloatArray
+    is_needed: BoolArray
 
 
 def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
@@ -80,14 +86,16 @@ def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
     leveled = find_candidates(frequency, misfit / np.sqrt(level), most)
     missing = (find_candidates(frequency, misfit, most), leveled) if (level > 1).any() else (leveled,)
     factor = _level_near(data, fit.poles, level) * leveled.level_at(fit.poles)[:, None]
-    drops = pole_gains(fit.system) / factor
+    gains = pole_gains(fit.system)
+    far = fit.misfit > FAR * 2 * data.receptance.size
     return Judgement(
         frequency_hz=frequency,
         misfit=misfit,
         level=level,
         missing=missing,
-        significance=_over_bic(drops, 2 * len(data.s)),
+        significance=_over_bic(gains / factor, 2 * len(data.s)),
         damping_std=_damping_std(fit) * np.sqrt(np.median(factor, axis=1)),
+        is_needed=far & (gains.sum(axis=1) > NEEDED * fit.misfit),
     )
 
 

@@ -23,6 +23,7 @@ ROUNDS = 8  # of adding poles
 CLEARER = 0.6  # times the misfit before: what was refused then may be proposed again
 ROUGH_ITERATIONS = 12  # of a fit whose poles are still to be judged
 UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole says nothing
+SURE = 6.0  # times what the BIC demands: such a pole stays even where its damping is uncertain
 NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or struck
 MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
 NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
@@ -163,7 +164,8 @@ def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
     while True:
         judgement = judge(search.data, fit, search.terms)
         struck = _near_struck(search, fit.poles)
-        weak = (judgement.significance < 1) | (judgement.damping_std > UNCERTAIN)
+        uncertain = (judgement.damping_std > UNCERTAIN) & (judgement.significance < SURE)
+        weak = ((judgement.significance < 1) | uncertain) & ~judgement.is_needed
         artefacts = [""] * len(fit.poles) if search.trusted else find_artefacts(search.data, fit, judgement)
         bad = struck | (
             (weak | np.array([bool(reason) for reason in artefacts], bool)) & ~_protected(search, fit.poles)
