@@ -21,7 +21,7 @@ CONTRACT = {
     "pairs.parquet": "verdict distance",
     "parameters.parquet": "iteration",
 }
-SHAPE, AMPLITUDE, MEDIAN_DB = 0.98, 0.98, 1.0  # what the demo has to reach at the point of interest
+SHAPE, AMPLITUDE, MEDIAN_DB = 0.99, 0.99, 0.3  # at the point of interest; measured are 0.9996, 0.9997 and 0.12
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +62,8 @@ def test_all_files_of_the_contract_are_there(run):
 def test_the_model_file_holds_matrices_and_dofs(run):
     with np.load(run.path / "updated_model.npz") as model:
         assert set(model.files) == {"M", "B", "K", "dofs"}
-        assert model["M"].shape == model["B"].shape == model["K"].shape == (6, 6)
-        assert list(model["dofs"]) == ["9:z", "29:z", "49:z", "69:z", "89:z", "101:z"]
+        assert model["M"].shape == model["B"].shape == model["K"].shape == (len(model["dofs"]),) * 2
+        assert {"49:z", "69:z", "89:z", "101:z"} <= set(model["dofs"])
 
 
 def test_the_state_space_reproduces_the_prediction(run):

@@ -59,7 +59,7 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
         reduced = stages.reduce(desk, model, fit, corrected_by=diagnosis)
         pairs = stages.pair(desk, fit, reduced)
         yield "pair"
-        updated = stages.update(desk, reduced, fit, pairs)
+        updated = stages.update(desk, model, reduced, fit, pairs)
         yield "update"
         stages.predict(desk, updated, fit, frfs)
         yield "predict"

@@ -23,9 +23,11 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.pairing.assignment import pair as pair_roots
+from frf_ipz.pipeline.sensors import unweighed_sensors
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.rational import without_window
 from frf_ipz.report.page import write_report
+from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
@@ -232,13 +234,17 @@ def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
     )
 
 
-def update(desk: Desk, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs) -> UpdatedModel:
+def update(
+    desk: Desk, model: StructuralModel, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs
+) -> UpdatedModel:
     """Bring the reduced model to the measured poles and zeros.
 
     Parameters
     ----------
     desk : Desk
         The work.
+    model : StructuralModel
+        The FE model, whose parts may be softer or stiffer than they should be.
     reduced : ReducedModel
         The reduced FE model.
     modal_fit : ModalFit
@@ -252,10 +258,16 @@ def update(desk: Desk, reduced: ReducedModel, modal_fit: ModalFit, pairs: Pairs)
         The updated model.
     """
     options = desk.job.pipeline.file.update
+    sensors = unweighed_sensors(desk.job.test, modal_fit.labels)
+
+    def compute(progress: Progress) -> UpdatedModel:
+        basis = structural_basis(model, reduced, mass=options.mass, sensors=sensors)
+        return update_model(reduced, modal_fit, pairs, options, basis=basis, progress=progress)
+
     return desk.stage(
         "update",
-        {"options": asdict(options), "after": desk.after("pair")},
-        lambda progress: update_model(reduced, modal_fit, pairs, options, progress=progress),
+        {"options": asdict(options), "sensors": repr(sensors), "after": desk.after("pair")},
+        compute,
         lambda result: {
             "pairs.parquet": _parquet(tables.pair_table(pairs, modal_fit.labels, result.after)),
             "parameters.parquet": _parquet(tables.history_table(result)),
