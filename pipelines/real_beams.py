@@ -1,0 +1,72 @@
+"""Predict what was left out of real measurements, and compare.
+
+python pipelines/real_beams.py TEST.toml MODEL.toml LOW_HZ HIGH_HZ [output|input] [NODE ...]
+
+Every FRF with one of the nodes as its output (or input) is kept from the fit and the update, and predicted. Without
+nodes each one is left out in turn. Scales of real channels are rarely known, so X_A and dB are given after one real
+factor for what was left out, which is stated; X_S needs none.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import frf_ipz
+from frf_ipz.arrays import ComplexArray
+from frf_ipz.updating.parameters import structural_basis
+
+
+def main(test: Path, model: Path, band_hz: tuple[float, float], side: str, nodes: list[int]) -> None:
+    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(test), frf_ipz.IngestOptions()).frfs
+    full = frf_ipz.read_model(model)
+    for node in nodes or sorted({_node(label, side) for label in frfs.labels}):
+        table = leave_out(frfs, full, band_hz, side, node)
+        print(f"\n{side} at node {node} left out\n", table.to_string(float_format="{:.4g}".format))
+
+
+def leave_out(frfs: frf_ipz.FrfSet, full: object, band_hz: tuple[float, float], side: str, node: int) -> pd.DataFrame:
+    """Predict the FRFs of one node from all others: one row a model."""
+    places = range(len(frfs.labels))
+    out = [place for place in places if _node(frfs.labels[place], side) == node]
+    rest = frfs.frfs([place for place in places if place not in out])
+    fit = frf_ipz.fit_modes(rest, frf_ipz.FitOptions(band_hz=band_hz))
+    ends = {"actuators": frfs.input_dofs, "sensors": frfs.output_dofs}
+    reduced = frf_ipz.reduce_model(full, frf_ipz.ReduceOptions(), points=(), band_hz=fit.band_hz, **ends)
+    pairs = frf_ipz.pair(fit, reduced)
+    updated = frf_ipz.update_model(reduced, fit, pairs, basis=structural_basis(full, reduced))
+    left_out = frfs.frfs(out).lines(frfs.in_band(band_hz))
+    models = {
+        "nominal": reduced,
+        "measured poles, nominal shapes": frf_ipz.with_measured_poles(reduced, pairs),
+        "updated": updated.model,
+    }
+    rows = {
+        name: judge(left_out.values, frf_ipz.model_frfs(each, left_out.labels, left_out.s))
+        for name, each in models.items()
+    }
+    return pd.DataFrame(rows).T.assign(status=updated.status.name, targets=len(pairs.targets))
+
+
+def judge(measured: ComplexArray, predicted: ComplexArray) -> dict[str, float]:
+    """Medians over the FRFs that were left out."""
+    factor = float(np.vdot(predicted, measured).real / np.vdot(predicted, predicted).real)
+    plain, scaled = (frf_ipz.compare_frfs(measured, each * predicted) for each in (1.0, factor))
+    return {
+        "X_S": float(np.median(plain.shape)),
+        "factor": factor,
+        "X_A": float(np.median(scaled.amplitude)),
+        "dB": float(np.median(scaled.median_db)),
+    }
+
+
+def _node(label: frf_ipz.FrfLabel, side: str) -> int:
+    return label.output_dof.node if side == "output" else label.input_dof.node
+
+
+if __name__ == "__main__":
+    test, model, low, high, side, *nodes = sys.argv[1:]
+    main(Path(test), Path(model), (float(low), float(high)), side, [int(node) for node in nodes])

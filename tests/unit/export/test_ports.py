@@ -1,0 +1,32 @@
+"""Inputs and outputs carry their units, for rotations too."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.dofs import Dof
+from frf_ipz.export.options import ExportOptions
+from frf_ipz.export.ports import choose_ports
+from frf_ipz.frf import FrfLabel
+from frf_ipz.quantities import FrfQuantity
+
+TURNED = FrfLabel(Dof(1, "ry"), Dof(2, "rz"), FrfQuantity.MOBILITY)
+
+
+def test_rotations_have_moments_and_radians():
+    ports = choose_ports((TURNED,), (Dof(3, "z"),), ExportOptions(), {})
+    assert ports.input_units == ("N m",)
+    assert [output.unit for output in ports.outputs] == ["rad/s", "m/s"]
+
+
+def test_a_sensor_that_two_blows_share_is_one_output_in_its_first_quantity():
+    other = FrfLabel(Dof(1, "ry"), Dof(4, "z"), FrfQuantity.RECEPTANCE)
+    ports = choose_ports((TURNED, other), (), ExportOptions(), {})
+    assert [str(dof) for dof in ports.inputs] == ["2:+rz", "4:+z"]
+    assert [output.quantity for output in ports.outputs] == [FrfQuantity.MOBILITY]
+
+
+@pytest.mark.parametrize("wanted", ["displacement", "velocity", "acceleration"])
+def test_all_outputs_can_be_of_one_kind(wanted):
+    ports = choose_ports((TURNED,), (Dof(3, "z"),), ExportOptions(outputs=wanted), {})
+    powers = np.array([output.quantity.power for output in ports.outputs])
+    assert np.all(powers == ("displacement", "velocity", "acceleration").index(wanted))
