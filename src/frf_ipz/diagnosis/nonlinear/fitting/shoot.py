@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
 FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
 SETTLED = 3e-3  # relative drop of the cost
+TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
 LONGEST = 0.5  # relative change of a law's number in one step
 WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
 
@@ -46,7 +47,8 @@ class _Shot:
 
     @property
     def cost(self) -> float:
-        cost = float(self.misfit @ self.misfit + self.start.unknowns @ self.start.unknowns)
+        with np.errstate(all="ignore"):  # of a motion that runs away
+            cost = float(self.misfit @ self.misfit + self.start.unknowns @ self.start.unknowns)
         return cost if np.isfinite(cost) else np.inf
 
 
@@ -70,6 +72,8 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
         The best simulation.
     """
     shot, damping = _fire(stretches, freedom, start), FIRST_DAMPING
+    while not np.isfinite(shot.cost):  # a softening spring that is too strong runs away
+        shot = _fire(stretches, freedom, replace(shot.start, strength=TAMER * shot.start.strength))
     rows = _slopes(stretches, freedom, shot)
     for _ in range(iterations):
         before = shot.cost
@@ -90,14 +94,14 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
 def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
     yielding = place.yielding(constant=start.law.holds)
-    with np.errstate(over="ignore", invalid="ignore"):  # a step too far may run away: its cost is infinite
-        done = march(start.law, (start.strength, start.shape), yielding, *place.without_law())
     response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns))
-    force = _lines(stretches, done.force, holds=start.law.holds)
-    shown = linear_motion(stretches, freedom, response) - response.to_sensors(start.place) * force[:, None]
-    shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
     used = stretches.used
-    misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
+    with np.errstate(all="ignore"):  # a step too far may run away: its cost is infinite
+        done = march(start.law, (start.strength, start.shape), yielding, *place.without_law())
+        force = _lines(stretches, done.force, holds=start.law.holds)
+        shown = linear_motion(stretches, freedom, response) - response.to_sensors(start.place) * force[:, None]
+        shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+        misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
     return _Shot(start=start, response=response, place=place, yielding=yielding, done=done, force=force, misfit=misfit)
 
 

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from frf_ipz.diagnosis.nonlinear.fitting.march import Yielding, follow, make_modes, march
+from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
+
+OMEGA, RATIO, STEP_S, N_TIMES = 2 * np.pi * 5.0, 0.02, 1e-4, 6000
+SECOND_ORDER = 2e-5  # of the largest motion: the force is linear within steps of 1/2000 of a period
+DERIVATIVE = 1e-6  # relative: central differences of a march, with 6 digits left
+
+
+def oscillator(*, constant=False):
+    modes = make_modes(np.array([OMEGA]), np.array([RATIO]), STEP_S, constant=constant)
+    return Yielding(modes=modes, weights=np.ones(1))
+
+
+def linear_motion():
+    """Free vibration of a unit mass from a velocity of 1 m/s: motion and velocity, (1, n_times) each."""
+    time = STEP_S * np.arange(N_TIMES)
+    pole = OMEGA * (-RATIO + 1j * np.sqrt(1 - RATIO**2))
+    z = np.exp(pole * time)
+    return (z.imag / pole.imag)[None], ((pole * z).imag / pole.imag)[None]
+
+
+def test_hardening_oscillator_is_integrated():
+    k3 = 3e6
+    done = march(shipped_laws()["cubic_stiffness"], (k3, 0.0), oscillator(), *linear_motion())
+
+    def derivative(_, y):
+        return [y[1], -2 * RATIO * OMEGA * y[1] - OMEGA**2 * y[0] - k3 * y[0] ** 3]
+
+    time = STEP_S * np.arange(N_TIMES)
+    found = solve_ivp(derivative, (0, time[-1]), [0, 1.0], t_eval=time, rtol=1e-10, atol=1e-14).y[0]
+    assert np.abs(found - linear_motion()[0][0]).max() > 0.5 * np.abs(found).max()  # the law matters
+    assert_allclose(done.motion[0], found, rtol=0, atol=20 * SECOND_ORDER * np.abs(found).max())
+
+
+def test_friction_takes_the_same_off_every_half_swing_and_then_sticks():
+    friction = 0.5
+    modes = make_modes(np.array([OMEGA]), np.array([1e-9]), STEP_S, constant=True)
+    time = STEP_S * np.arange(N_TIMES)
+    motion, velocity = np.cos(OMEGA * time)[None] * 3e-3, -OMEGA * np.sin(OMEGA * time)[None] * 3e-3
+    place = Yielding(modes=modes, weights=np.ones(1))
+    done = march(shipped_laws()["dry_friction"], (friction, 0.0), place, motion, velocity)
+    drop, half = 2 * friction / OMEGA**2, np.pi / OMEGA
+    turns = np.array([np.interp(half * k, time, done.motion[0]) for k in range(3)])
+    expected = [3e-3, -(3e-3 - drop), 3e-3 - 2 * drop]
+    assert_allclose(turns, expected, rtol=0, atol=1e-2 * drop)  # a half swing ends within one of 1000 steps
+    assert_allclose(done.velocity[0, -200:], 0.0, atol=1e-9)
+    assert abs(done.force[0, -1]) < friction
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"), [("cubic_stiffness", (3e6, 0.0)), ("gap_contact", (4e3, 4e-3)), ("dry_friction", (12.0, 0.0))]
+)
+def test_small_changes_are_followed(name, numbers):
+    law = shipped_laws()[name]
+    place, (w, v) = oscillator(constant=law.holds), linear_motion()
+    done = march(law, numbers, place, w, v)
+    change = np.stack([0.3 * w, 0.3 * v])[None]
+    found = follow(law, place, done, change)
+
+    def force(scale=0.0, strength=0.0):
+        return march(
+            law, (numbers[0] * (1 + strength), numbers[1]), place, w * (1 + 0.3 * scale), v * (1 + 0.3 * scale)
+        ).force
+
+    h = 1e-6
+    by_change = (force(scale=h) - force(scale=-h)) / (2 * h)
+    by_strength = (force(strength=h) - force(strength=-h)) / (2 * h)
+    assert np.linalg.norm(by_change) > 0
+    for mine, other in zip(found, (by_change, by_strength), strict=False):
+        assert np.linalg.norm(mine - other) <= DERIVATIVE * np.linalg.norm(other)

@@ -1,0 +1,29 @@
+import numpy as np
+from numpy.testing import assert_allclose
+
+from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant, no_deviations, respond
+
+EXACT = 1e-9  # relative: all modes are followed, nothing is left out
+
+
+def test_receptances_are_those_of_the_matrices(chain, strike):
+    plant = make_plant(chain.model, strike())
+    s = 3.0 + 2j * np.pi * np.linspace(2, 80, 9)
+    response = respond(plant, s, no_deviations(plant))
+    full = np.linalg.inv(chain.M * s[:, None, None] ** 2 + chain.C * s[:, None, None] + chain.K)
+    place = next(i for i, p in enumerate(plant.places) if p.location == {"nodes": [3]})
+    own, driven = response.at_place(place)
+    assert_allclose(response.from_inputs()[0], full[:, [1, 3], 0].T, rtol=EXACT, atol=0)
+    assert_allclose(response.to_sensors(place), full[:, [1, 3], 2].T, rtol=EXACT, atol=0)
+    assert_allclose(own, full[:, 2, 2], rtol=EXACT, atol=0)
+    assert_allclose(driven[0], full[:, 2, 0], rtol=EXACT, atol=0)
+
+
+def test_a_spring_feels_its_second_node_less_its_first(chain, strike):
+    plant = make_plant(chain.model, strike())
+    s = np.array([5.0 + 200j])
+    full = np.linalg.inv(chain.M * s[0] ** 2 + chain.C * s[0] + chain.K)
+    across = np.array([0, -1, 1, 0])
+    place = next(i for i, p in enumerate(plant.places) if p.location == {"springs": ["k3"]})
+    own, _ = respond(plant, s, no_deviations(plant)).at_place(place)
+    assert_allclose(own[0], across @ full @ across, rtol=EXACT, atol=0)

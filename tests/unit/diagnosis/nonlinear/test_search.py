@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.nonlinear.search import search_laws
+from frf_ipz.diagnosis.nonlinear.simulate import simulate
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+CASES = {
+    "cubic_stiffness": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}, {"cubic_N_m3": 2e10}),
+    "gap_contact": (
+        lambda w, _: 3e4 * max(w - 2e-4, 0.0),
+        (0, 0, 0, 1),
+        {"nodes": [4]},
+        {"contact_stiffness_N_m": 3e4, "gap_m": 2e-4},
+    ),
+    "dry_friction": (lambda _, v: 0.8 * np.tanh(v / 2e-4), (0, 1, 0, 0), {"nodes": [2]}, {"friction_N": 0.8}),
+}
+PARAMETERS = 0.05  # relative: what the issue asks of the median is 0.03
+HELD_OUT = 0.05  # of the measured response; without the law at least five times as much
+
+
+@pytest.fixture(scope="module", params=CASES)
+def solved(request, chain, strike):
+    law, where, location, parameters = CASES[request.param]
+    observations = strike(law, where)
+    found = search_laws(chain.model, observations, DiagnoseOptions())
+    return request.param, location, parameters, observations, found
+
+
+def test_law_place_and_numbers_are_found(solved):
+    name, location, parameters, _, found = solved
+    assert found.verdict == "explained"
+    first = found.findings[0]
+    assert (first.effect, dict(first.location)) == (name, location)
+    for key, value in parameters.items():
+        assert abs(first.parameters[key].value / value - 1) < PARAMETERS, key
+
+
+def test_nothing_linear_could_gain_as_much(solved):
+    found = solved[-1]
+    assert found.findings[0].log_evidence_gain > found.linear_limit
+
+
+def test_blows_that_were_held_out_are_predicted(solved):
+    found = solved[-1]
+    assert found.after.held_out < HELD_OUT
+    assert found.before.held_out > 5 * found.after.held_out
+
+
+def test_whole_records_of_all_levels_are_simulated(solved):
+    *_, observations, found = solved
+    simulation = simulate(observations, found.freedom, found.fit)
+    assert simulation.simulated.shape == simulation.measured.shape
+    assert (simulation.misfit < 2 * HELD_OUT).all()
+
+
+def test_nothing_is_found_in_a_linear_chain(chain, strike):
+    found = search_laws(chain.model, strike(), DiagnoseOptions())
+    assert found.verdict == "linear"
+    assert found.findings == ()
+
+
+def test_a_law_outside_the_catalogue_is_not_explained(chain, strike):
+    found = search_laws(chain.model, strike(lambda w, _: 1.2e7 * w**2, (0, 0, 1, 0)), DiagnoseOptions())
+    assert found.verdict == "unexplained"
+    assert "disagree" in found.statement
