@@ -133,27 +133,42 @@
   }
 
   // The page holds of long FRFs what a screen can show; zoomed in, all lines of those that are shown are asked for.
-  let zoomTimer = 0;
+  const zoom = { timer: 0, view: "", curve: null };
+
+  function visibleFrfs(plot) {
+    return [...plot.data.keys()].filter((k) => plot.data[k].visible !== false && plot.data[k].meta);
+  }
+
+  function viewOf(plot, places) {
+    return JSON.stringify([plot.layout.xaxis.type, plot.layout.xaxis.range, places]);
+  }
+
   function listenToFrfs(plot) {
-    plot.on("plotly_relayout", () => {
-      clearTimeout(zoomTimer);
-      zoomTimer = setTimeout(() => sharpen(plot), 250);
+    const first = visibleFrfs(plot);
+    if (!first.length) return;
+    Object.assign(zoom, { view: viewOf(plot, first), curve: plot.data[first[0]].x });
+    plot.on("plotly_afterplot", () => {
+      const places = visibleFrfs(plot);
+      const isSharp = places.length && plot.data[places[0]].x === zoom.curve && viewOf(plot, places) === zoom.view;
+      clearTimeout(zoom.timer);
+      if (places.length && !isSharp) zoom.timer = setTimeout(() => sharpen(plot), 250);
     });
   }
 
   async function sharpen(plot) {
+    const places = visibleFrfs(plot);
     const { range, type } = plot.layout.xaxis;
     const [low, high] = range.map((end) => (type === "log" ? 10 ** end : end));
-    const places = [...plot.data.keys()].filter((k) => plot.data[k].visible !== false && plot.data[k].meta);
     const frfs = [...new Set(places.map((k) => plot.data[k].meta.frf))];
-    if (!frfs.length) return;
+    Object.assign(zoom, { view: viewOf(plot, places), curve: plot.data[places[0]].x });
     let traces;
     try {
       ({ traces } = await ask(`zoom?${new URLSearchParams({ low, high, frfs })}`));
     } catch (error) {
       return; // nothing was measured there: the picture stays as it is
     }
-    if (traces.length !== places.length) return;
+    if (traces.length !== places.length || viewOf(plot, visibleFrfs(plot)) !== zoom.view) return;
+    zoom.curve = traces[0].x;
     Plotly.restyle(plot, { x: traces.map((trace) => trace.x), y: traces.map((trace) => trace.y) }, places);
     plot.dataset.sharp = `${low} ${high}`;
   }
