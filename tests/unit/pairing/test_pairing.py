@@ -12,8 +12,9 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.pairing.assignment import pair
-from frf_ipz.pairing.model_roots import model_poles, model_zeros
+from frf_ipz.pairing.model_roots import ModelZeros, model_poles, model_zeros
 from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet
 from updating_bench.synthetic_fit import as_fit
@@ -90,13 +91,18 @@ def test_a_common_factor_on_all_frequencies_is_no_obstacle():
         pairs = pair(measured(stiffer), model)
         assert all(row.verdict is Verdict.PAIRED for row in pairs.rows if row.kind == "pole")
         assert [row.computed for row in pairs.rows if row.kind == "pole"] == list(range(5))
+        zeros = [row for row in pairs.rows if row.kind == "zero" and row.measured >= 0]
+        assert all(row.verdict is Verdict.PAIRED for row in zeros)
+        ratios = [abs(row.measured_value / row.computed_value) for row in zeros]
+        assert_allclose(ratios, np.sqrt(factor), rtol=1e-4)
 
 
-def test_shapes_tell_swapped_modes_apart():
+@pytest.mark.parametrize("quantity", list(FrfQuantity))
+def test_shapes_tell_swapped_modes_apart(quantity):
     """Two loops of one stiffness and another mass each: the heavier one has the lower frequency."""
     model = two_loops(1.00, 1.06)
     swapped = two_loops(1.06, 1.00)
-    pairs = pair(measured(swapped, (label(1, 1), label(2, 2)), zeros=False), model)
+    pairs = pair(measured(swapped, (label(1, 1, quantity), label(2, 2, quantity)), zeros=False), model)
     assert [(row.measured, row.computed) for row in pairs.targets] == [(0, 1), (1, 0)]
 
 
@@ -189,6 +195,9 @@ def test_quadruples_are_listed_once():
             quadruples = zeros.values[np.array(zeros.kind) == "quadruple"]
             seeds_with += len(quadruples) > 0
             assert np.all(quadruples.real < 0)
+            mirrored = np.abs(zeros.values[:, None] + zeros.values.conj()) + 1e9 * np.eye(len(zeros.values))
+            off_axis = np.abs(zeros.values.real) > 0.1 * np.abs(zeros.values)
+            assert mirrored[off_axis & (zeros.values.imag > 0)].min(initial=1e9) > 1.0
             gaps = np.abs(quadruples[:, None] + quadruples.conj()) + np.eye(len(quadruples)) * 1e9
             assert gaps.min(initial=1e9) > 1e-6
     assert seeds_with > 0
@@ -218,6 +227,30 @@ def test_the_slope_at_zeros_is_that_of_the_frf():
     step = 1e-5j * np.abs(zeros.values)
     beside = [model_frfs(model, [one], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
     assert np.array_equal(np.sign(beside[0] - beside[1]), zeros.slope_sign)
+
+
+def test_the_slope_tells_two_zeros_apart():
+    """The nearer one rises where the measured FRF falls: the other one it is."""
+    model = chain(damping=0.001)
+    fit = measured(model)
+    place = int(np.flatnonzero(fit.zeros.frf == 0)[0])
+    alone = replace(
+        fit.zeros,
+        values=fit.zeros.values[[place]],
+        frf=np.array([0]),
+        kind=("complex",),
+        identifiable=np.array([True]),
+        reason=("",),
+    )
+    value = alone.values[0]
+    sign = measured_slope_sign(fit.model, 0, 0, alone.values)[0]
+    one = replace(fit, zeros=alone, covariance=1e-6 * np.eye(2 * fit.n_modes + 2))
+    choice = ModelZeros(
+        values=np.array([0.985 * value, 1.01 * value]), kind=("complex",) * 2, slope_sign=np.array([sign, -sign])
+    )
+    nothing = np.zeros(0), np.zeros(0)
+    assert pair_zeros(one, 0, choice, nothing, 1.0).matching.partner.tolist() == [0]
+    assert pair_zeros(one, 0, choice, nothing, -1.0).matching.partner.tolist() == [1]
 
 
 def test_a_zero_on_a_pole_is_no_obstacle():
