@@ -5,6 +5,7 @@ as a force and a displacement: the coefficient is in V of V1 per V^3 of V2.
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ PIECES = 4
 TOLERANCES = DiagnoseOptions(frequency_tolerance=0.02, damping_tolerance=0.5, gain_tolerance=0.02)
 
 
-def linear_oscillator(force, motion):
+def linear_oscillator(force: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Mass, damping and stiffness of the weak beginning, by an exponentially damped transform."""
     step, n = 1 / RATE_HZ, len(force)
     sigma = 8 / (n * step)
@@ -36,19 +37,21 @@ def linear_oscillator(force, motion):
     return np.linalg.lstsq(both / np.abs(both).max(0), right, rcond=None)[0] / np.abs(both).max(0)
 
 
-def main(folder):
+def main(folder: Path) -> None:
     """Print what is found."""
     data = pd.read_csv(folder / "SNLS80mV.csv", usecols=["V1", "V2"]).to_numpy()[GROWING].T
     force, motion = data - data[:, :50].mean(1, keepdims=True)
     mass, damping, stiffness = linear_oscillator(force[:8000], motion[:8000])
     ratio = damping / (2 * np.sqrt(mass * stiffness))
-    path = Path(sys.argv[2] if len(sys.argv) > 2 else ".") / "silverbox_model.toml"
-    path.write_text(
-        f'[model]\nkind = "lumped"\nname = "silverbox"\n[damping]\nmodal_ratio = {ratio}\n[lumped]\ndirection = "x"\n'
-        f"[[lumped.mass]]\nnode = 1\nmass_kg = {mass}\n[[lumped.spring]]\nid = 'k'\nnodes = [0, 1]\n"
-        f"stiffness_N_m = {stiffness}\n",
-        encoding="utf-8",
-    )
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "model.toml"
+        path.write_text(
+            f'[model]\nkind = "lumped"\nname = "silverbox"\n[damping]\nmodal_ratio = {ratio}\n'
+            f'[lumped]\ndirection = "x"\n[[lumped.mass]]\nnode = 1\nmass_kg = {mass}\n'
+            f'[[lumped.spring]]\nid = "k"\nnodes = [0, 1]\nstiffness_N_m = {stiffness}\n',
+            encoding="utf-8",
+        )
+        model = read_model(path)
     dof = parse_dof("1:+x")
     sensors = (Sensor(channel="V2", dof=dof, quantity=FrfQuantity.RECEPTANCE),)
     cuts = np.array_split(np.arange(len(force)), PIECES)
@@ -59,7 +62,7 @@ def main(folder):
     )  # fmt: skip
     observations = Observations(kind="random", blows=blows, band_hz=(20.0, 180.0))
     print(f"weak: {np.sqrt(stiffness / mass) / 2 / np.pi:.2f} Hz, damping ratio {ratio:.4f}")
-    found = search_laws(read_model(path), observations, TOLERANCES)
+    found = search_laws(model, observations, TOLERANCES)
     print(f"{found.verdict} (linearity {found.linearity.score:.3g} against {found.linearity.limit:g})")
     print(found.statement)
     for finding in found.findings:
