@@ -1,7 +1,7 @@
 """Silverbox: which law an electronic oscillator has, and its coefficient, from a record whose level grows.
 
-Run from the checkout: ``python pipelines/silverbox.py ../shared/recordings/silverbox``. Input V1 and output V2 are taken
-as a force and a displacement: the coefficient is in V of V1 per V^3 of V2.
+Run from the checkout: ``python pipelines/silverbox.py ../shared/recordings/silverbox``. Input V1 and output V2 are
+taken as a force and a displacement: the coefficient is in V of V1 per V^3 of V2.
 """
 
 import sys
