@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
-from frf_ipz.diagnosis.judging.decision import CONSISTENT, EXPLAINED, decide, gain_over, only_null
+from frf_ipz.diagnosis.judging.decision import CONSISTENT, EXPLAINED, UNEXPLAINED, decide, gain_over, only_null
 from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
+CERTAIN = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing is preferred
 ENOUGH_TO_COMPARE = 2  # blows at a place
 ALIKE_NATS = 5.0  # effects nearer to each other than that are not told apart
 MOST_ALTERNATIVES = 6
@@ -83,7 +84,9 @@ def diagnose(
     laws = _laws(model, observations, options, progress)
     gates = check(source, None if laws is None else laws.linearity)
     nonlinear = laws is not None and laws.is_nonlinear
-    found = only_null(bench) if nonlinear else decide(bench, progress)
+    certain = laws is not None and laws.linearity.score > CERTAIN * laws.linearity.limit
+    found = only_null(bench) if certain else decide(bench, progress)
+    nonlinear &= certain or found.verdict == UNEXPLAINED
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     proof = prove(bench, held_out, found.null, found.final)
@@ -107,7 +110,7 @@ def diagnose(
         numbers=_numbers(found),
         warnings=tuple(gate.statement for gate in gates if not gate.passed),
     )
-    if laws is not None and laws.is_nonlinear:
+    if laws is not None and nonlinear:
         return _with_law(linear, laws)
     return replace(linear, statement=_statement(found, linear.findings))
 

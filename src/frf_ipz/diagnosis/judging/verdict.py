@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.polish import Data, Fit
 
-FOUND_NATS = 24.0  # evidence over the nominal model's: what a finding needs
-SECOND_NATS = 40.0  # evidence of a second finding over the first one's alone
+FOUND_NATS = 40.0  # evidence over the nominal model's: what a finding needs
+SECOND_NATS = 50.0  # evidence of a second finding over the first one's alone
 MOST_PULL = 45.0  # sum of squares of what cannot be known
 PIECES = 6  # of the band, by points
 
@@ -37,8 +37,8 @@ class Limits:
 
 
 LIMITS = {  # by what was looked at: the coarser its noise is known, the wider
-    "hammer": Limits(misfit=1.0, piece=2.3),
-    "random": Limits(misfit=1.25, piece=2.5),
+    "hammer": Limits(misfit=1.1, piece=3.0),
+    "random": Limits(misfit=1.6, piece=4.5),
     "frf": Limits(misfit=1.6, piece=4.5),
 }
 

@@ -22,6 +22,7 @@ SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
 LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
 UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
 BEFORE = 32  # samples before a blow that tell the noise
+MOST_BIAS = 0.5  # of the force's power that may be noise
 COMMON_PART = 1e-2  # of the largest: shared errors below are left out
 
 
@@ -270,6 +271,7 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
     labels, values, sizes, covariances, input_of, common = [], [], [], [], [], []
     for place, group in enumerate(found.groups):
         points = _at(group, s)
+        too_small = _bias(found, place, points)
         size = np.maximum(np.abs(points.values), np.abs(_at(group, wide).values))
         crossed = points.force.conj() @ points.force.T / np.outer(points.power, points.power)
         common.append(_common(found, place, points))
@@ -277,7 +279,7 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
             labels.append(
                 FrfLabel(sensor.dof, group[0].input_dof, sensor.quantity, sensor.channel, group[0].input_channel)
             )
-            values.append(points.values[:, column])
+            values.append(points.values[:, column] * too_small)
             sizes.append(size[:, column])
             covariances.append(crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group)))
             input_of.append(place)
@@ -290,6 +292,13 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
         common=tuple(common),
         input_of=np.array(input_of),
     )
+
+
+def _bias(found: Survey, place: int, points: _Lines) -> FloatArray:
+    """Undo what noise of the force takes off the FRFs: it adds to the force's power."""
+    noise = found.force.density(points.frequency_hz)
+    added = noise * np.sum([window_energies(points.s, pulse) for pulse in found.pulses[place]], axis=0)
+    return np.asarray(1 / (1 - np.minimum(added / points.power, MOST_BIAS)))
 
 
 def _at(group: tuple[Blow, ...], s: ComplexArray) -> _Lines:

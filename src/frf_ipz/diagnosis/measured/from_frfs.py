@@ -134,6 +134,38 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     )
 
 
+def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
+    """Take the lines themselves that are nearest to a contour: exact, however narrow a resonance is.
+
+    Parameters
+    ----------
+    found : FrfSurvey
+        Of the FRFs.
+    s : (n_points,) complex array
+        rad/s; only where it is along the band counts.
+
+    Returns
+    -------
+    Measured
+        On lines, with independent errors.
+    """
+    frfs = found.frfs
+    omega = 2 * np.pi * frfs.frequency_hz
+    chosen = np.unique(np.clip(np.searchsorted(omega, s.imag), 0, len(omega) - 1))
+    placed, values = frfs.s[chosen], frfs.values[chosen]
+    wide = _within_reach(found, np.maximum(placed.real, COARSE_WIDTH * placed.imag) + 1j * placed.imag, keep=True)
+    inputs = list(frfs.input_dofs)
+    return Measured(
+        s=placed,
+        labels=frfs.labels,
+        values=values,
+        size=np.maximum(np.abs(values), np.abs(_weights(frfs, wide) @ frfs.values)),
+        covariance=np.array([np.diag(column) for column in found.variance[chosen].T], np.complex128),
+        common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
+        input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
+    )
+
+
 def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> ComplexArray:
     """Bring points near enough to the lines; leave out those at the ends of the band, unless all are wanted."""
     frfs = found.frfs

@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
-from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of
 from frf_ipz.errors import InputError
 
@@ -106,8 +106,16 @@ def _of_frfs(observations: Observations) -> Source:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
     found = survey_frfs(observations.frfs, observations.band_hz)
     coarse = measure_frfs(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
-    near = measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
+    near = _near(found, observations)
     return _by_points(coarse, near, found, "frf")
+
+
+def _near(found: FrfSurvey, observations: Observations) -> Measured:
+    """Smooth what was averaged from running records, for leakage is spread over lines; take others as they are."""
+    if observations.blows:
+        return measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
+    spacing = float(np.median(np.diff(found.frfs.s.imag)))
+    return lines_along(found, fine_contour(found.resonances, observations.band_hz, spacing))
 
 
 def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:

@@ -14,6 +14,7 @@ SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that v
 SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
 ROUGH_PART = 0.15  # of the tolerance: the same from point to point
 FREE = 30.0  # relative standard deviation of a gain that nobody knows: as good as none
+NOISY = 25.0  # points whose noise is a fifth of the FRF tell nothing of gains
 NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
 
 
@@ -47,6 +48,12 @@ class Measured:
     covariance: ComplexArray
     common: tuple[ComplexArray, ...]
     input_of: IntArray
+
+    @property
+    def certain(self) -> ComplexArray:
+        """The values without what may be noise: what multiplies relative errors, or these would follow the noise."""
+        noise = np.array([np.diag(covariance).real for covariance in self.covariance]).T
+        return np.asarray(self.values * np.maximum(1 - NOISY * noise / np.maximum(self.size, 1e-300) ** 2, 0.0))
 
     @property
     def frequency_hz(self) -> FloatArray:
@@ -176,7 +183,7 @@ def _blocks(
         gains = np.eye(len(every))[None] * FREE
     elif free_gains == "common":
         gains = np.concatenate([gains, np.full((1, len(every), 1), FREE)], axis=2)
-    errors = measured.values[:, :, None] * gains
+    errors = measured.certain[:, :, None] * gains
     found = _separately(factors, errors).reshape(-1, gains.shape[2])
     for frfs, directions, shrink in blocks:
         rows = (frfs[:, None] * 2 * len(measured.s) + np.arange(2 * len(measured.s))).ravel()
@@ -187,7 +194,7 @@ def _blocks(
 def _block(
     measured: Measured, factors: ComplexArray, frfs: IntArray, shared: ComplexArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    errors = measured.values[:, frfs, None] * shared[:, None, :]
+    errors = measured.certain[:, frfs, None] * shared[:, None, :]
     columns = _separately(factors[frfs], errors).reshape(-1, shared.shape[1])
     strong = np.sum(columns**2, 0) > NEGLIGIBLE
     return (frfs, *_directions(columns[:, strong]))

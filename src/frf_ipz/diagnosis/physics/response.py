@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.nuisance import Nuisance, Unknowns
 
 RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
+MOST_OF_MASS = 0.5  # of a modal mass: scatter takes no more away
 LEAST_RATIO = 1e-6  # where a model states no damping at all
 SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
 
@@ -207,7 +208,9 @@ def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tupl
     m, rigid = len(unknowns.kappa), len(unknowns.cords)
     block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
     block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
-    values, rotation = linalg.eigh(block, np.eye(m) + unknowns.mu, check_finite=False)
+    least = float(linalg.eigvalsh(unknowns.mu, subset_by_index=(0, 0), check_finite=False)[0]) if m else 0.0
+    mu = unknowns.mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))  # no step may take all mass away
+    values, rotation = linalg.eigh(block, np.eye(m) + mu, check_finite=False)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation
 

@@ -11,7 +11,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
-from frf_ipz.diagnosis.search.polish import Data, Fit, polish
+from frf_ipz.diagnosis.search.polish import Data, Fit, polish, same_modes
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
@@ -67,6 +67,18 @@ class Bench:
     def fit_from(self, fit: Fit) -> Fit:
         """Fit exactly, from a fit with large errors."""
         return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=16)
+
+    def fit_beside(self, hypothesis: Hypothesis, values: FloatArray, base: Fit) -> Fit:
+        """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies."""
+        inside = hypothesis.physical(hypothesis.start_at(values))
+        starts = (base.unknown, same_modes(hypothesis, inside, base))
+        costs = [self._cost(hypothesis, inside, unknown) for unknown in starts]
+        unknown = starts[int(np.argmin(costs))]
+        return polish(hypothesis, self.data, inside, unknown=unknown, iterations=8, tolerance=0.2)
+
+    def _cost(self, hypothesis: Hypothesis, values: FloatArray, unknown: FloatArray) -> float:
+        white = self.data.misfit(hypothesis.respond(values, unknown, self.data.measured.s))
+        return float(white @ white + unknown @ unknown)
 
     def go_on(self, fit: Fit) -> Fit:
         """Go on with a fit that has not converged."""

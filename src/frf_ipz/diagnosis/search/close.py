@@ -17,13 +17,14 @@ from frf_ipz.diagnosis.search.wide import causes_of
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.diagnosis.catalogue.effect import Sketch
+    from frf_ipz.diagnosis.catalogue.effect import Parameter, Sketch
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.hypothesis import Cause
     from frf_ipz.diagnosis.search.polish import Fit
 
 COLUMNS = 600  # signatures that are weighed together
+BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear
 LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
 
 
@@ -90,10 +91,32 @@ def _weigh(
 
 
 def _direct(score: Score, cause: Cause) -> Start:
-    """Try the values that an effect proposes to start from."""
-    bench = score.bench
-    hypothesis = bench.suppose((*score.base.hypothesis.causes, cause), exact=False)
-    grid = cause.effect.starts(bench.specimen, cause.place) if hypothesis.counts[-1] else np.zeros((1, 0))
-    gains = [score.at(hypothesis, values) for values in grid]
-    place = int(np.argmax(gains))
-    return Start(cause=cause, values=grid[place], cost=-gains[place])
+    """Take the first parameter away from where the effect vanishes, by as much as explains most."""
+    hypothesis = score.bench.suppose((*score.base.hypothesis.causes, cause), exact=False)
+    if not hypothesis.counts[-1]:
+        return Start(cause=cause, values=np.zeros(0), cost=-score.at(hypothesis, np.zeros(0)))
+    first, *others = hypothesis.parameters[len(score.base.values) :]
+    rest = [float(np.sqrt(parameter.low * parameter.high)) for parameter in others]
+    neutral, values = _small(first)
+    changed = score.change(hypothesis, np.array([values, *rest]))
+    if first.low < first.neutral < first.high:
+        changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
+    sizes, gains = score.weigh(changed[:, :, None])
+    size, gain = float(sizes[0]), float(gains[0])
+    if first.low < first.neutral < first.high:
+        value = neutral + size * (values - neutral)
+    elif size <= 0:
+        value, gain = values, 0.0
+    else:
+        value = values * size if first.neutral == 0 else values / size
+    return Start(cause=cause, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain)
+
+
+def _small(parameter: Parameter) -> tuple[float, float]:
+    """Where an effect vanishes, and a value just beside."""
+    if np.isinf(parameter.neutral):
+        return parameter.neutral, parameter.high
+    if parameter.low < parameter.neutral < parameter.high:
+        step = BESIDE * (abs(parameter.neutral) or parameter.high - parameter.low)
+        return parameter.neutral, parameter.neutral + step
+    return parameter.neutral, parameter.low

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
     from frf_ipz.diagnosis.search.polish import Data, Fit
 
-STEP = 1e-4  # of a parameter as searched, for its derivative
-LONGEST = 1.0  # of a parameter as searched: farther, nothing is linear
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Score:
@@ -51,24 +48,11 @@ class Score:
     factor: FloatArray
     response: Response
 
-    def gain(self, hypothesis: Hypothesis, values: FloatArray) -> float:
-        """Half the fall of the sum of squares that one linear step from some values promises, nats."""
-        start = hypothesis.start_at(np.concatenate([self.base.values, values]))
-        fixed = len(self.base.values)
-        misfit = self._misfit(hypothesis, start)
-        moves = []
-        for index in range(fixed, len(start)):
-            moved = start.copy()
-            moved[index] += STEP if moved[index] + STEP <= hypothesis.high[index] else -STEP
-            moves.append((self._misfit(hypothesis, moved) - misfit) / (moved[index] - start[index]))
-        left = self._square(misfit, misfit)
-        if moves:
-            curvature = np.array([[self._square(one, other) for other in moves] for one in moves])
-            gradient = np.array([self._square(one, misfit) for one in moves])
-            curvature += np.diag(1e-9 * np.diag(curvature) + 1e-300)
-            step = np.clip(np.linalg.solve(curvature, -gradient), -LONGEST, LONGEST)
-            left += float(2 * gradient @ step + step @ curvature @ step)
-        return 0.5 * (self._square(self.misfit, self.misfit) - left)
+    def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
+        """Change of the FRFs by some values, scatter as in the base."""
+        searched = hypothesis.start_at(np.concatenate([self.base.values, values]))
+        response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, self.data.measured.s)
+        return np.asarray(response.values - self.response.values)
 
     def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Half the fall of the sum of squares at some values, nats."""

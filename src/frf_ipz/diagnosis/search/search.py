@@ -13,7 +13,6 @@ from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
 from frf_ipz.diagnosis.search.refine import refine
-from frf_ipz.diagnosis.search.score import score_on
 from frf_ipz.diagnosis.search.sketches import Start
 from frf_ipz.diagnosis.search.wide import best_start, wide_search
 
@@ -129,16 +128,13 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
 
 def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
-    score = score_on(bench, base, bench.data)
     found = close_search(bench, base)
-    starts = spread(found, CLOSE_EACH)
-    hypotheses = [bench.suppose((*base.hypothesis.causes, start.cause)) for start in starts]
-    gains = np.array([score.gain(one, start.values) for one, start in zip(hypotheses, starts, strict=True)])
-    for place in np.argsort(-gains)[:CLOSE_FITTED]:
-        if gains[place] > max(PROMISING, gains.max() - HOPELESS) or place == int(np.argmax(gains)):
-            values = np.concatenate([base.values, starts[place].values])
-            fit = polish(hypotheses[place], bench.data, values, unknown=base.unknown, iterations=6, tolerance=0.2)
-            _keep(fits, fit)
+    starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
+    for start in starts:
+        if -start.cost > max(PROMISING, -starts[0].cost - HOPELESS) or start is starts[0]:
+            hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
+            values = np.concatenate([base.values, start.values])
+            _keep(fits, bench.fit_beside(hypothesis, values, base))
     return len(found)
 
 
