@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.plotting.targets import Target, target_rows
@@ -46,8 +47,6 @@ class RunContents:
         Where the nodes of the FE model are.
     reference : FrfSet, optional
         Measured FRFs at points of interest that were kept aside.
-    is_lumped : bool
-        The model is lumped: its geometry is a row of masses, not positions.
     stale : frozenset of str
         Stages whose result was made before the last change.
     """
@@ -63,8 +62,17 @@ class RunContents:
     diagnosis: Diagnosis | None = None
     geometry: Geometry | None = None
     reference: FrfSet | None = None
-    is_lumped: bool = False
     stale: frozenset[str] = frozenset()
+
+    @property
+    def parts(self) -> pd.DataFrame:
+        """Change of the stiffness of every part of the FE model by the update; empty where that is not known."""
+        return pd.DataFrame() if self.updated is None else self.updated.parts
+
+    @property
+    def is_lumped(self) -> bool:
+        """The model is made of springs: its geometry is a row of masses, not positions."""
+        return bool(len(self.parts)) and bool((self.parts["kind"] == "spring").all())
 
     @property
     def frfs(self) -> FrfSet | None:
@@ -161,7 +169,7 @@ def read_contents(folder: RunFolder) -> RunContents:
     """
     stages = folder.record.get("stages", {})
     has_model = "reduce" in stages
-    model = folder.load("model")
+    model = folder.load("model") if has_model else None
     return RunContents(
         record=folder.record,
         recordings=folder.load("ingest"),
@@ -173,7 +181,6 @@ def read_contents(folder: RunFolder) -> RunContents:
         state_space=folder.load("export") if has_model else None,
         diagnosis=folder.load("diagnose"),
         geometry=model.geometry if isinstance(model, StructuralModel) else model,
-        is_lumped=isinstance(model, StructuralModel) and model.kind == "lumped",
         reference=folder.load("reference"),
         stale=frozenset(name for name in stages if folder.is_stale(name)),
     )

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import eigh
 
-from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.targets import Target
+from frf_ipz.report.along_structure import LEAST_EIGENVALUE, picture_of_parts, pictures_of_flexibility
 from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
 from frf_ipz.report.section import Section
 from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, number, percent
+from frf_ipz.updating.along_structure import notable_changes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import FloatArray, IntArray
+    import pandas as pd
+
     from frf_ipz.report.contents import RunContents
-    from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
-PART = re.compile(r"stiffness of (?:element|spring|group) (\S+)(?: to (\S+))?")
 MOST_MODES = 30
-BLUE_TO_ORANGE = [[0.0, "#0072b2"], [0.5, "#f2f2f2"], [1.0, "#d55e00"]]
+MOST_STRETCHES = 5  # named one by one
 FEW_STEPS = 20  # iterations that are each named on the axis
 MOST_NAMES = 30  # of targets written under the axis
-MOST_PLACES = 400  # drawn along the structure
-STIFF = 0.01  # of the largest flexibility: at places below, a ratio says nothing
-LEAST_EIGENVALUE = 1e-9  # of the largest one: a rigid-body mode has no stiffness to change
 
 
 def build(run: RunContents) -> Section | None:
@@ -52,7 +48,9 @@ def build(run: RunContents) -> Section | None:
     rows = run.targets()
     pictures = [_targets(rows)] if rows else []
     pictures += [_convergence(updated)] if len(updated.history) > 1 else []
-    pictures += [*_of_parts(updated, run.geometry), *_of_flexibility(run, updated), _of_modes(updated)]
+    parts = run.parts
+    pictures += [picture_of_parts(parts)] if len(parts) else pictures_of_flexibility(run, updated)
+    pictures.append(_of_modes(updated))
     lead = f"Method {updated.method}: {updated.status.value}. {counted(len(updated.history), 'iteration')}."
     reduced = run.reduced
     return Section(
@@ -60,9 +58,15 @@ def build(run: RunContents) -> Section | None:
         title="Updating",
         lead=lead,
         blocks=tuple(pictures),
-        notes=(*[f"Cannot be met: {text}" for text in updated.unmet], *updated.warnings),
+        notes=(*[f"Cannot be met: {text}" for text in updated.unmet], *_notable(parts), *updated.warnings),
         choices=() if reduced is None else reduced.choices,
     )
+
+
+def _notable(parts: pd.DataFrame) -> list[str]:
+    stretches = notable_changes(parts) if len(parts) else ()
+    more = [f"{len(stretches) - MOST_STRETCHES} more stretches differ"] if len(stretches) > MOST_STRETCHES else []
+    return [*stretches[:MOST_STRETCHES], *more]
 
 
 def _targets(rows: Sequence[Target]) -> Picture:
@@ -147,110 +151,6 @@ def _convergence(updated: UpdatedModel) -> Picture:
         ),
         height_px=320,
     )
-
-
-def _of_parts(updated: UpdatedModel, geometry: Geometry | None) -> list[Picture]:
-    """Draw the factors on the stiffness of named parts, where the method has such parameters."""
-    columns = [(name, match) for name in updated.history.columns if (match := PART.fullmatch(str(name)))]
-    values = updated.history[[name for name, _ in columns]].to_numpy(float) if columns else np.zeros((0, 0))
-    known = values[np.isfinite(values).all(axis=1)] if values.size else values
-    if not len(known):
-        return []
-    change = 100 * np.expm1(known[-1])
-    names = [str(name).removeprefix("stiffness of ") for name, _ in columns]
-    x, title = _positions([match for _, match in columns], geometry)
-    rows = [[name, f"{value:+.3g} %"] for name, value in zip(names, change, strict=True)]
-    picture = Picture(
-        name="change",
-        title="Change of stiffness along the structure",
-        alt=f"Change of the stiffness of {counted(len(change), 'part')}: from {number(float(change.min()), 3)} % to "
-        f"{number(float(change.max()), 3)} %.",
-        traces=(
-            {
-                **line(x, change, "change", "@updated", hover="%{text}: %{y:+.3g} %", text=names),
-                "mode": "lines+markers",
-            },
-        ),
-        layout=panels({"title": {"text": title}}, Axis(title="Change of stiffness, %", options={"zeroline": True})),
-        note="The smallest change that meets the targets, spread as the prior allows: a hint where the model is off, "
-        "no diagnosis of what is wrong there.",
-        table=Table(caption="Change of stiffness", columns=("part", "change"), rows=rows, file="parameters.parquet"),
-        height_px=320,
-    )
-    return [picture]
-
-
-def _positions(matches: Sequence[re.Match[str]], geometry: Geometry | None) -> tuple[FloatArray, str]:
-    """Middle of each part along the longest extent where parts are the elements of a line, else their number."""
-    count = np.arange(1.0, len(matches) + 1)
-    if geometry is None or not all(match[1].isdigit() for match in matches):
-        return count, "Part"
-    place = {int(node): row for row, node in enumerate(geometry.nodes)}
-    ends = np.array([(int(match[1]), int(match[2] or match[1]) + 1) for match in matches])
-    axis = int(np.argmax(np.ptp(geometry.coordinates_m, axis=0)))
-    if not {int(node) for node in ends.ravel()} <= set(place):
-        return count, "Part"
-    rows = np.vectorize(place.__getitem__)(ends)
-    return geometry.coordinates_m[rows, axis].mean(axis=1), "Position, m"
-
-
-def _of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Picture]:
-    """Draw how much further every place gives way to a force at rest than the nominal model says."""
-    frfs, geometry = run.frfs, run.geometry
-    if geometry is None or frfs is None:
-        return []
-    directions = {dof.direction for dof in (*frfs.output_dofs, *frfs.input_dofs)}
-    place = {int(node): row for row, node in enumerate(geometry.nodes)}
-    dofs = enumerate(updated.nominal.expanded_dofs)
-    rows = np.array([row for row, dof in dofs if dof.direction in directions and dof.node in place], int)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_PLACES).astype(int))] if len(rows) else rows
-    before, after = (_flexibility(model, rows) for model in (updated.nominal, updated.model))
-    moving = before > STIFF * before.max(initial=0.0)
-    rows, change = rows[moving], 100 * (after[moving] / before[moving] - 1)
-    if len(rows) < 2:
-        return []
-    names = [updated.nominal.expanded_dofs[row].name for row in rows]
-    positions = project(geometry.coordinates_m)[[place[updated.nominal.expanded_dofs[row].node] for row in rows]]
-    extremes = f"from {number(float(change.min()), 3)} to {number(float(change.max()), 3)} %"
-    is_line = not np.ptp(positions[:, 1])
-    traces, layout = _along(positions, change, names) if is_line else _over(positions, change, names)
-    return [
-        Picture(
-            name="flexibility",
-            title="Change along the structure: how much further each place gives way to a force on it",
-            alt=f"Change of the static flexibility at {counted(len(rows), 'place')}: {extremes}.",
-            traces=(traces,),
-            layout=layout,
-            note="Updated over nominal model, without motions as a rigid body. The smallest change that meets the "
-            "targets: a hint where the model is off, no diagnosis of what is wrong there.",
-            height_px=320 if is_line else 430,
-        )
-    ]
-
-
-def _along(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
-    """Draw a structure that is a line: change over position."""
-    points = markers(positions[:, 0], change, "change", "@updated", size=6, text=names, hover="%{text}: %{y:+.3g} %")
-    return points, panels({"title": {"text": "Position, m"}}, Axis(title="Change of flexibility, %"))
-
-
-def _over(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
-    """Draw any other structure: places coloured by the change."""
-    largest = max(float(np.abs(change).max()), np.finfo(float).tiny)
-    hover = "%{text}: %{customdata:+.3g} %"
-    points = markers(positions[:, 0], positions[:, 1], "change", "@updated", text=names, customdata=change, hover=hover)
-    scale = {"title": {"text": "change, %"}, "x": 0, "xanchor": "right", "thickness": 14}
-    points["marker"] = {"color": change, "cmin": -largest, "cmax": largest, "colorscale": BLUE_TO_ORANGE, "size": 11}
-    points["marker"] |= {"colorbar": scale, "line": {"width": 0.8, "color": "@muted"}}
-    bare = {"showgrid": False, "zeroline": False, "showline": False, "ticks": "", "showticklabels": False}
-    return points, {"xaxis": bare, "yaxis": {**bare, "scaleanchor": "x"}}
-
-
-def _flexibility(model: ReducedModel, rows: IntArray) -> FloatArray:
-    """Give the static deflection under a unit force on the same place, (n_rows,), m/N."""
-    values, shapes = eigh((model.stiffness + model.stiffness.T) / 2, model.mass)
-    flexible = values > LEAST_EIGENVALUE * values[-1]
-    return np.asarray(((model.expansion[rows] @ shapes[:, flexible]) ** 2 / values[flexible]).sum(axis=1))
 
 
 def _of_modes(updated: UpdatedModel) -> Picture:
