@@ -83,7 +83,7 @@ def synthetic_results():
         default_damping_ratio=0.003,
     )
     pairs = pair(fit, reduced)
-    updated = update_model(reduced, fit, pairs)
+    updated = replace(update_model(reduced, fit, pairs), parts=parts_of(nominal))
     lines = recordings.frfs.frequency_hz[fit.used_lines]
     return {
         "ingest": recordings,
@@ -96,6 +96,25 @@ def synthetic_results():
         "model": nominal,
         "reference": reference_of(truth, points, blows, lines),
     }
+
+
+def parts_of(model):
+    """Changes of the parts with bands, as an update of the parts gives them: softer to the right."""
+    count = len(model.parts)
+    ratio = np.linspace(1.0, 0.95, count)
+    return pd.DataFrame(
+        {
+            "kind": "element",
+            "name": [f"element {part.name}" for part in model.parts],
+            "nodes": [" ".join(map(str, part.nodes)) for part in model.parts],
+            "x_m": np.linspace(0, 1, count),
+            "y_m": 0.0,
+            "z_m": 0.0,
+            "stiffness_ratio": ratio,
+            "stiffness_ratio_low": ratio - 0.02,
+            "stiffness_ratio_high": ratio + 0.01,
+        }
+    )
 
 
 def recordings_of(truth, labels, band, rng):

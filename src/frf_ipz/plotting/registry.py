@@ -14,7 +14,7 @@ from frf_ipz.plotting.poles import plot_pairs, plot_pole_zero_map, plot_stabiliz
 from frf_ipz.plotting.recordings import plot_blows, plot_structure
 from frf_ipz.plotting.style import WIDTH_IN
 from frf_ipz.plotting.targets import target_rows
-from frf_ipz.plotting.updating import plot_convergence, plot_prediction, plot_targets
+from frf_ipz.plotting.updating import plot_convergence, plot_prediction, plot_stiffness_change, plot_targets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.updating.updated_model import UpdatedModel
 
 Draw: TypeAlias = "Callable[..., Axes]"
 HEIGHT_OF_ONE_IN = 2.6  # of each predicted FRF, where there are several
@@ -50,6 +51,7 @@ PICTURES: dict[str, _Entry] = {
         ("update", "pair", "fit"), lambda updated, pairs, fit: plot_targets(target_rows(updated, pairs, fit.labels))
     ),
     "convergence": _Entry(("update",), plot_convergence),
+    "change": _Entry(("update",), lambda updated: _change(updated)),
     "prediction": _Entry(("predict",), lambda prediction: _predictions(prediction)),
     "structure": _Entry(("model", "ingest"), lambda model, recordings: _structure(model, recordings)),
     "mismatch": _Entry(("diagnose",), plot_mismatch),
@@ -108,6 +110,14 @@ def _predictions(prediction: Prediction) -> Axes:
     for place, ax in enumerate(figure.subplots(count, 1, squeeze=False)[:, 0]):
         plot_prediction(prediction, frf=place, ax=ax)
     return figure.axes[0]
+
+
+def _change(updated: UpdatedModel) -> Axes:
+    if not len(updated.parts):
+        raise InputError(
+            "the update of this run has not changed named parts of the FE model, so there is no such picture"
+        )
+    return plot_stiffness_change(updated.parts)
 
 
 def _structure(model: Any, recordings: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them

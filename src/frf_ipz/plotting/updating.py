@@ -12,6 +12,7 @@ from frf_ipz.plotting.style import MEASURED, NOMINAL, UPDATED, axes_or_new, colo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from frf_ipz.arrays import ComplexArray
@@ -74,6 +75,34 @@ def plot_convergence(updated: UpdatedModel, *, ax: Axes | None = None) -> Axes:
         here = phases == phase
         ax.semilogy(iteration[here], misfit[here], "o-", color=colour(rank), markersize=3, linewidth=1, label=phase)
     return label_axes(ax, "Iteration", "Misfit of the targets")
+
+
+def plot_stiffness_change(parts: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """Draw how much stiffer or softer every part of the FE model has become, with its 90 % band.
+
+    Parameters
+    ----------
+    parts : DataFrame
+        ``UpdatedModel.parts``.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Over the position along the longest extent of the structure.
+    """
+    ax = axes_or_new(ax)
+    places = parts[["x_m", "y_m", "z_m"]].to_numpy(float)
+    axis = int(np.argmax(np.ptp(places, axis=0)))
+    rows = np.argsort(places[:, axis], kind="stable")
+    columns = ("stiffness_ratio", "stiffness_ratio_low", "stiffness_ratio_high")
+    change, low, high = (100 * (parts[name].to_numpy(float)[rows] - 1) for name in columns)
+    x = places[rows, axis]
+    if np.isfinite(low).all():
+        ax.fill_between(x, low, high, color=UPDATED, alpha=0.25, linewidth=0, label="90 % band")
+    ax.plot(x, change, ".-", color=UPDATED, linewidth=1, label="change")
+    return label_axes(ax, f"Position {'xyz'[axis]}, m", "Change of stiffness, %")
 
 
 def plot_prediction(
