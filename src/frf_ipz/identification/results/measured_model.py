@@ -105,9 +105,6 @@ def residue_covariance(errors: FitErrors, powers: IntArray, modes: IntArray) -> 
     """
     system = errors.system
     count = system.n_poles
-    residues = system.residues()
-    real, imag = np.split(errors.pole_root, 2)
-    pole_errors = (real + 1j * imag)[modes]
     poles = system.poles[modes]
     rows = np.zeros((len(modes), system.n_linear), complex)
     own_columns = system.n_smooth + modes
@@ -119,8 +116,7 @@ def residue_covariance(errors: FitErrors, powers: IntArray, modes: IntArray) -> 
     for frf, power in enumerate(powers):
         own, common = errors.linear(rows, slopes, frf)
         factor = poles**power
-        moved = (power * poles ** (power - 1) * residues[modes, frf])[:, None] * pole_errors if power else 0.0
-        parts = np.concatenate([own * factor[:, None], common * factor[:, None] + moved], axis=1)
+        parts = np.concatenate([own, common], axis=1) * factor[:, None]  # the error of the factor itself is far smaller
         stacked = np.stack([parts.real, parts.imag], axis=1)
         covariance[:, frf] = stacked @ stacked.transpose(0, 2, 1)
     return covariance
