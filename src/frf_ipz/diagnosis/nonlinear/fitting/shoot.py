@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
 FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
 SETTLED = 3e-3  # relative drop of the cost
+ROUNDING = 1e-10  # added to normal equations of unit diagonal: they stay positive
 TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
 LONGEST = 0.5  # relative change of a law's number in one step
 WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
@@ -135,7 +136,7 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
         for blow in freedom.moving:
             rows[first : first + n_free, blow] += seen[(3 + which) * n_free : (4 + which) * n_free, blow]
             first += n_free
-    return as_real(np.concatenate([rows, seen[len(changes) :]]))
+    return np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
 
 
 def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -147,11 +148,20 @@ def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rows @ rows.T + np.diag(prior), right
 
 
+def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve normal equations, however different the sizes of their unknowns are."""
+    scale = 1 / np.sqrt(np.diag(normal))
+    even = normal * scale * scale[:, None] + ROUNDING * np.eye(len(normal))
+    scaled = right * scale if right.ndim == 1 else right * scale[:, None]
+    found = linalg.cho_solve(linalg.cho_factor(even, lower=True), scaled)
+    return np.asarray(found * scale if right.ndim == 1 else found * scale[:, None])
+
+
 def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
     start, n = shot.start, len(shot.start.unknowns)
     normal, right = _normal(shot, rows)
     damped = normal + damping * np.diag(np.diag(normal))
-    step = linalg.cho_solve(linalg.cho_factor(damped, lower=True), right)
+    step = _solve(damped, right)
     step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
     shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
     return replace(
@@ -162,7 +172,7 @@ def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
 def _finish(shot: _Shot, rows: FloatArray) -> LawFit:
     start, n = shot.start, len(shot.start.unknowns)
     normal, _ = _normal(shot, rows)
-    inverse = linalg.cho_solve(linalg.cho_factor(normal, lower=True), np.eye(len(rows))[:, n:])[n:]
+    inverse = _solve(normal, np.eye(len(rows))[:, n:])[n:]
     sizes = np.array([start.strength, start.shape])[: len(rows) - n]
     covariance = np.zeros((2, 2))
     covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
