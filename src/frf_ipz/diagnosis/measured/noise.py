@@ -94,6 +94,10 @@ def fit_force_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArr
 
 
 def _fit(shape: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray:
+    largest = float(energy.max(initial=0.0))
+    if largest <= 0:
+        return np.zeros(shape.shape[1])
+    energy, known = energy / largest, known / largest
     left = np.maximum(energy - known, 0.0)
     model = np.full(len(energy), max(float(np.median(left)), SMALLEST * float(energy.max(initial=1e-300))))
     found = np.zeros(shape.shape[1])
@@ -106,5 +110,5 @@ def _fit(shape: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray
         weight = 1 / total[use]
         scale = shape[use].max(0)
         found = nnls(shape[use] / scale * weight[:, None], (energy - known)[use] * weight)[0] / scale
-        model = np.maximum(shape @ found, SMALLEST * energy.max())
-    return found
+        model = np.maximum(shape @ found, SMALLEST)
+    return found * largest

@@ -1,0 +1,107 @@
+"""A small beam and its FRFs with noise, for tests of the diagnosis: made by the FE stage, not by the diagnosis."""
+
+from pathlib import Path
+
+import numpy as np
+
+from frf_ipz.diagnosis.observations import Observations
+from frf_ipz.dofs import parse_dof
+from frf_ipz.fe.model_file import read_model
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.quantities import FrfQuantity
+
+BAND_HZ = (10.0, 700.0)
+NOISE = 1e-3  # of each FRF's median modulus
+BEAM = """
+[model]
+kind = "beam"
+name = "beam"
+[damping]
+modal_ratio = 0.01
+[beam]
+length_m = 0.5
+elements = 16
+formulation = "{formulation}"
+youngs_modulus_Pa = 69e9
+density_kg_m3 = 2690.0
+poisson_ratio = 0.33
+width_m = 0.025
+thickness_m = {thickness_m}
+left = "{left}"
+right = "{right}"
+"""
+LUMPED = """
+[model]
+kind = "lumped"
+name = "frame"
+[damping]
+modal_ratio = 0.01
+[lumped]
+direction = "x"
+[[lumped.mass]]
+node = 1
+mass_kg = 2.0
+[[lumped.mass]]
+node = 2
+mass_kg = 3.0
+[[lumped.mass]]
+node = 3
+mass_kg = 1.0
+[[lumped.spring]]
+id = "k1"
+nodes = [0, 1]
+stiffness_N_m = 4e5
+[[lumped.spring]]
+id = "k2"
+nodes = [1, 2]
+stiffness_N_m = 1e5
+[[lumped.spring]]
+id = "k3"
+nodes = [2, 3]
+stiffness_N_m = 2e5
+"""
+
+
+def beam(folder: Path, *, formulation="euler-bernoulli", thickness_m=0.005, left="clamped", right="free"):
+    text = BEAM.format(formulation=formulation, thickness_m=thickness_m, left=left, right=right)
+    return _read(folder, text)
+
+
+def lumped(folder: Path):
+    return _read(folder, LUMPED)
+
+
+def _read(folder, text):
+    path = folder / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_model(path)
+
+
+def labels(outputs=("17:+z", "9:-z"), inputs=("6:+z",), quantity=FrfQuantity.ACCELERANCE):
+    return tuple(
+        FrfLabel(parse_dof(out), parse_dof(struck), quantity, f"acc_{index}", "force")
+        for struck in inputs
+        for index, out in enumerate(outputs, start=1)
+    )
+
+
+def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=BAND_HZ):
+    """FRFs of a model with noise; factors multiply them, as a measuring chain does."""
+    names = names or labels()
+    frequency = np.linspace(*band_hz, n_lines)
+    exact = model_frfs(model, names, 2j * np.pi * frequency) * (1.0 if factors is None else factors(frequency))
+    scale = NOISE * np.median(np.abs(exact), axis=0)
+    drawn = np.random.default_rng(seed).standard_normal((2, *exact.shape))
+    return FrfSet(
+        frequency_hz=frequency,
+        values=exact + scale * (drawn[0] + 1j * drawn[1]) / np.sqrt(2),
+        labels=names,
+        variance=np.broadcast_to(scale**2, exact.shape),
+        coherence=np.full(exact.shape, np.nan),
+        averages=np.zeros(len(names), int),
+    )
+
+
+def observed(frfs, band_hz=BAND_HZ):
+    return Observations(kind="frf", blows=(), band_hz=band_hz, frfs=frfs)

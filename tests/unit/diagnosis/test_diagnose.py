@@ -1,0 +1,161 @@
+"""The whole diagnosis on FRFs that were made with and without something missing."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosed import beam, labels, measured, observed
+from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
+from frf_ipz.fe.changes import with_point_masses, with_springs
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.frf import FrfLabel
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.runs.codec import load_result, save_result
+
+MASS_KG = 0.02
+FEW = DiagnoseOptions(effects=("added_mass", "local_stiffness", "grounded_spring", "sensor_gain", "damping_level"))
+SEEN = 0.02  # relative: the noise is 0.1 % of the FRFs, tolerances 0.1 % of the stiffness
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+@pytest.fixture(scope="module")
+def with_mass(nominal):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    return diagnose(nominal, observed(frfs), FEW)
+
+
+def test_nothing_missing_is_consistent(nominal):
+    found = diagnose(nominal, observed(measured(nominal)), FEW)
+    assert found.verdict == "consistent"
+    assert found.findings == ()
+    assert found.before.held_out < SEEN
+
+
+def test_a_mass_is_found_at_its_node_with_its_size(with_mass):
+    assert with_mass.verdict == "explained"
+    (finding,) = with_mass.findings
+    assert (finding.effect, dict(finding.location)) == ("added_mass", {"nodes": [12]})
+    size = finding.parameters["mass_kg"]
+    assert size.value == pytest.approx(MASS_KG, rel=SEEN)
+    assert size.low < MASS_KG < size.high
+    assert finding.log_evidence_gain > 100
+    assert {"nodes": [12]} in [dict(place) for place in finding.location_set]
+
+
+def test_the_finding_improves_what_was_not_fitted(with_mass):
+    assert with_mass.after.held_out < 0.05 * with_mass.before.held_out
+    assert with_mass.after.held_out_noise < 1.3
+
+
+def test_the_json_is_as_in_the_contract(with_mass):
+    content = json.loads(json.dumps(with_mass.to_json(), allow_nan=False))
+    assert {"verdict", "findings", "alternatives", "mismatch", "fit"} <= set(content)
+    (finding,) = content["findings"]
+    assert {"effect", "location", "parameters", "probability", "log_evidence_gain", "statement"} <= set(finding)
+    assert finding["location"] == {"nodes": [12]}
+    assert {"value", "std"} <= set(finding["parameters"]["mass_kg"])
+    assert "mass of" in finding["statement"]
+    assert {"frequency_hz", "where"} <= set(content["mismatch"])
+    for when in ("before", "after"):
+        assert {"training", "held_out"} <= set(content["fit"][when])
+
+
+def test_a_diagnosis_survives_being_stored(with_mass, tmp_path):
+    save_result(with_mass, tmp_path / "diagnosis.npz")
+    assert load_result(tmp_path / "diagnosis.npz").to_json() == with_mass.to_json()
+
+
+def test_the_corrected_model_has_the_mass(nominal, with_mass):
+    corrected = apply_to_model(nominal, with_mass)
+    unmeasured = (FrfLabel(Dof(4, "z"), Dof(6, "z"), FrfQuantity.ACCELERANCE),)
+    s = 2j * np.pi * np.linspace(10.0, 700.0, 300)
+    truth = model_frfs(with_point_masses(nominal, {12: MASS_KG}), unmeasured, s)
+    wrong = [np.linalg.norm(model_frfs(one, unmeasured, s) - truth) for one in (corrected, nominal)]
+    assert wrong[0] < 0.05 * wrong[1]
+
+
+def test_what_no_effect_explains_is_unexplained(nominal):
+    changed = with_springs(with_point_masses(nominal, {5: 0.03, 14: 0.04}), {Dof(9, "z"): 3e4})
+    found = diagnose(
+        nominal, observed(measured(changed)), DiagnoseOptions(effects=("damping_level", "global_stiffness"))
+    )
+    assert found.verdict == "unexplained"
+    assert found.mismatch_hz.size
+    assert "Something is missing" in found.statement
+
+
+def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):
+    frfs = measured(nominal, factors=lambda f: np.array([1.0, -1.2]) + 0 * f[:, None])
+    found = diagnose(nominal, observed(frfs), FEW)
+    (finding,) = found.findings
+    assert (finding.effect, dict(finding.location)) == ("sensor_gain", {"channels": ["acc_2"]})
+    assert finding.parameters["gain_ratio"].value == pytest.approx(-1.2, rel=SEEN)
+    assert apply_to_model(nominal, found) is nominal
+    right = apply_to_frfs(frfs, found)
+    assert np.allclose(right.values[:, 0], frfs.values[:, 0], rtol=0, atol=0)
+    assert np.allclose(right.values[:, 1] * -1.2, frfs.values[:, 1], rtol=SEEN, atol=0)
+    assert np.allclose(right.variance[:, 1] * 1.44, frfs.variance[:, 1], rtol=2 * SEEN, atol=0)
+
+
+def test_gains_that_nobody_knows_are_not_diagnosed(nominal):
+    frfs = measured(nominal, factors=lambda f: np.array([3.0, 0.2]) + 0 * f[:, None])
+    free = replace(frfs, unknown_scale="per_channel")
+    assert diagnose(nominal, observed(free), FEW).verdict == "consistent"
+
+
+def test_an_effect_that_is_not_known_is_refused(nominal):
+    with pytest.raises(InputError, match="added_mass"):
+        diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=("aded_mass",)))
+
+
+def test_a_sensor_that_the_model_lacks_is_refused(nominal):
+    frfs = measured(nominal)
+    elsewhere = tuple(FrfLabel(Dof(99, "z"), label.input_dof, label.quantity) for label in frfs.labels[:1])
+    bad = replace(frfs.frfs([0]), labels=elsewhere)
+    with pytest.raises(InputError, match="99"):
+        diagnose(nominal, observed(bad), FEW)
+
+
+def test_too_few_lines_are_refused(nominal):
+    with pytest.raises(InputError, match="lines"):
+        diagnose(nominal, observed(measured(nominal, n_lines=10)), FEW)
+
+
+def test_a_users_own_effect_is_found(nominal, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN, encoding="utf-8")
+    frfs = measured(with_springs(nominal, {Dof(14, "z"): 2e4}), labels())
+    options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:Cord",))
+    found = diagnose(nominal, observed(frfs), options, folder=tmp_path)
+    assert (found.verdict, found.findings[0].effect) == ("explained", "cord")
+    assert found.findings[0].parameters["pull_N_m"].value == pytest.approx(2e4, rel=SEEN)
+
+
+OWN = """
+import numpy as np
+from scipy import sparse
+from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Place
+from frf_ipz.diagnosis.physics.change import Change
+
+class Cord(Effect):
+    name = "cord"
+    def places(self, specimen):
+        return [Place(key=(14,), location={"nodes": [14]})]
+    def parameters(self, specimen, place):
+        return (Parameter(name="pull_N_m", low=10.0, high=1e6),)
+    def build(self, specimen, place):
+        dof = next(dof for dof in specimen.moving_dofs if dof.node == 14)
+        unit = sparse.csr_array(sparse.diags_array(specimen.unit(dof)))
+        return lambda values: Change(stiffness=values[0] * unit)
+    def statement(self, specimen, place, values):
+        return "A cord."
+"""

@@ -1,0 +1,250 @@
+"""What each effect changes, against formulas and models that were changed by other means."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosed import beam, labels, lumped
+from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.physics.basis import make_basis
+from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.diagnosis.physics.nuisance import make_nuisance
+from frf_ipz.diagnosis.physics.response import nuisance_jacobian
+from frf_ipz.diagnosis.search.hypothesis import Cause, suppose
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.fe.beams.variants import with_axial_force, with_formulation
+from frf_ipz.fe.changes import released, scaled_parts, with_point_masses, with_springs
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.frf import FrfLabel
+from frf_ipz.quantities import FrfQuantity
+
+BAND_HZ = (10.0, 700.0)
+S = 3.0 + 2j * np.pi * np.geomspace(*BAND_HZ, 60)
+REDUCED = 2e-4  # of the largest FRF: the basis has modes and static shapes, not all DOFs
+EXACT = 1e-9  # of the same numbers along two ways
+LOSSES = 0.03  # modal damping acts on what is attached as well, once it is in the matrices
+STEP = 1e-6  # standard deviations, of a finite difference
+DIFFERENCE = 0.03  # relative: that damping follows frequency is left out of the derivatives, and the ratio is 0.01
+
+
+def specimen_of(model, names):
+    layout = lay_out(names)
+    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    options = DiagnoseOptions()
+    return Specimen(
+        basis=make_basis(model, 2 * np.pi * BAND_HZ[1], places),
+        layout=layout,
+        band_hz=BAND_HZ,
+        contour=S,
+        options=options,
+    )
+
+
+def changed_frfs(model, name, key, values, names=None):
+    """FRFs with an effect as the diagnosis evaluates them."""
+    specimen = specimen_of(model, names or labels())
+    effect = shipped_effects()[name]
+    places = [place for place in effect.places(specimen) if place.key == key]
+    place = places[0] if places else Place(key=key)
+    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
+    hypothesis = suppose(specimen, nuisance, (Cause(effect=effect, place=place, n_places=1),))
+    return hypothesis.respond(np.array(values, float), np.zeros(nuisance.size), S).values
+
+
+def assert_same(found, expected, tolerance):
+    assert np.abs(found - expected).max() < tolerance * np.abs(expected).max()
+    assert_allclose(np.abs(found - expected) / np.abs(expected).mean(0), 0, atol=30 * tolerance, rtol=0)
+
+
+def test_the_nominal_model_is_that_of_the_fe_stage(tmp_path):
+    model = beam(tmp_path)
+    assert_same(changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0]), model_frfs(model, labels(), S), REDUCED)
+
+
+def test_added_mass(tmp_path):
+    model = beam(tmp_path)
+    expected = model_frfs(with_point_masses(model, {12: 0.03}), labels(), S)
+    assert_same(changed_frfs(model, "added_mass", (12, "z"), [0.03]), expected, REDUCED)
+
+
+def test_grounded_spring(tmp_path):
+    model = beam(tmp_path)
+    expected = model_frfs(with_springs(model, {Dof(12, "z"): 5e3}), labels(), S)
+    assert_same(changed_frfs(model, "grounded_spring", (12, "z"), [5e3]), expected, REDUCED)
+
+
+def test_coupling_spring_on_a_frame(tmp_path):
+    model = lumped(tmp_path)
+    names = labels(("3:+x", "1:-x"), ("2:+x",))
+    stiffness = 3e5
+    wide = model.stiffness_all.toarray()
+    ends = [model.place(Dof(node, "x")) for node in (1, 3)]
+    wide[np.ix_(ends, ends)] += stiffness * np.array([[1, -1], [-1, 1]])
+    expected = damped_frfs(model, wide, model.mass_all.toarray(), names)
+    assert_same(changed_frfs(model, "coupling_spring", (1, 3, "x"), [stiffness], names), expected, REDUCED)
+
+
+def damped_frfs(model, stiffness, mass, names, ratio=0.01):
+    """Accelerances by the modes of full matrices: no reduction, no inversion lemma."""
+    free = np.flatnonzero(~model.fixed)
+    k, m = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)]
+    root = np.diag(1 / np.sqrt(np.diag(m))) if np.count_nonzero(m - np.diag(np.diag(m))) == 0 else None
+    values, vectors = np.linalg.eigh(root @ k @ root)
+    shapes = root @ vectors
+    rows = {dof.unsigned: index for index, dof in enumerate(np.array(model.all_dofs, object)[free])}
+    columns = []
+    for label in names:
+        out, struck = shapes[rows[label.output_dof.unsigned]], shapes[rows[label.input_dof.unsigned]]
+        modal = S[:, None] ** 2 + 2 * ratio * np.sqrt(values) * S[:, None] + values
+        columns.append(label.sign * S**2 * ((out * struck) / modal).sum(1))
+    return np.stack(columns, 1)
+
+
+def test_local_stiffness_of_a_stretch_and_of_a_spring(tmp_path):
+    model = beam(tmp_path)
+    expected = model_frfs(scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
+    assert_same(changed_frfs(model, "local_stiffness", ("element", 5, 6), [0.6]), expected, REDUCED)
+    frame = lumped(tmp_path)
+    names = labels(("3:+x", "1:-x"), ("2:+x",))
+    expected = model_frfs(scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
+    assert_same(changed_frfs(frame, "local_stiffness", ("spring", "k2"), [1.4], names), expected, REDUCED)
+
+
+def test_global_stiffness_moves_all_frequencies_alike(tmp_path):
+    frame = lumped(tmp_path)
+    names = labels(("3:+x", "1:-x"), ("2:+x",))
+    expected = damped_frfs(frame, 1.21 * frame.stiffness_all.toarray(), frame.mass_all.toarray(), names)
+    assert_same(changed_frfs(frame, "global_stiffness", (), [1.21], names), expected, REDUCED)
+
+
+def test_boundary_compliance(tmp_path):
+    model = beam(tmp_path)
+    expected = model_frfs(released(model, {Dof(1, "ry"): 200.0}), labels(), S)
+    assert_same(changed_frfs(model, "boundary_compliance", ("left", ("ry",)), [200.0]), expected, REDUCED)
+
+
+def test_axial_load(tmp_path):
+    model = beam(tmp_path, right="pinned")
+    names = labels(("9:+z",), ("6:+z",))
+    expected = model_frfs(with_axial_force(model, 300.0), names, S)
+    assert_same(changed_frfs(model, "axial_load", (), [300.0], names), expected, REDUCED)
+
+
+def test_shear_and_rotary_inertia(tmp_path):
+    model = beam(tmp_path, thickness_m=0.03)
+    expected = model_frfs(with_formulation(model, "timoshenko"), labels(), S)
+    assert_same(changed_frfs(model, "shear_rotary_inertia", (), []), expected, REDUCED)
+
+
+def test_damping_level(tmp_path):
+    frame = lumped(tmp_path)
+    names = labels(("3:+x",), ("2:+x",))
+    expected = damped_frfs(frame, frame.stiffness_all.toarray(), frame.mass_all.toarray(), names, ratio=0.03)
+    assert_same(changed_frfs(frame, "damping_level", (), [0.03], names), expected, REDUCED)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "values", "dynamic"),
+    [
+        ("local_damper", (1, "x"), [40.0], lambda s: 40.0 * s),
+        (
+            "attached_resonator",
+            (1, "x"),
+            [0.2, 60.0, 0.05],
+            lambda s: 0.2 * s**2 * resonator(s) / (0.2 * s**2 + resonator(s)),
+        ),
+        ("viscoelastic_joint", ("node", 3, "x"), [4e4, 2e-3], lambda s: 4e4 * s * 2e-3 / (1 + s * 2e-3)),
+    ],
+)
+def test_what_is_attached(tmp_path, name, key, values, dynamic):
+    frame = lumped(tmp_path)
+    node = next(part for part in key if isinstance(part, int))
+    names = labels(("3:+x", "1:+x"), ("2:+x",), FrfQuantity.RECEPTANCE)
+    around = tuple(FrfLabel(parse_dof(f"{a}:+x"), parse_dof(f"{b}:+x"), FrfQuantity.RECEPTANCE) for a, b in (
+        (3, node), (1, node), (node, 2), (node, node)))  # fmt: skip
+    bare, cross = model_frfs(frame, names, S), model_frfs(frame, around, S)
+    stiff = dynamic(S)
+    effective = stiff / (1 + stiff * cross[:, 3])
+    expected = bare - np.stack([cross[:, 0], cross[:, 1]], 1) * (effective * cross[:, 2])[:, None]
+    assert_same(changed_frfs(frame, name, key, values, names), expected, REDUCED)
+
+
+def resonator(s):
+    omega = 2 * np.pi * 60.0
+    return 0.2 * (omega**2 + 2 * 0.05 * omega * s)
+
+
+def test_structural_damping(tmp_path):
+    frame = lumped(tmp_path)
+    names = labels(("3:+x",), ("2:+x",), FrfQuantity.RECEPTANCE)
+    free = ~frame.fixed
+    k, m = frame.stiffness_all.toarray()[np.ix_(free, free)], frame.mass_all.toarray()[np.ix_(free, free)]
+    squares, vectors = np.linalg.eigh(k / np.sqrt(np.outer(np.diag(m), np.diag(m))))
+    shapes = vectors / np.sqrt(np.diag(m))[:, None]
+    modal = S[:, None] ** 2 + 0.02 * np.sqrt(squares) * S[:, None] + squares * (1 + 0.04j)
+    expected = ((shapes[2] * shapes[1]) / modal).sum(1)[:, None]
+    assert_same(changed_frfs(frame, "structural_damping", (), [0.04], names), expected, REDUCED)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "values", "factor"),
+    [
+        ("sensor_gain", ("acc_2", -1), [1.3], lambda s: -1.3 + 0 * s),
+        ("time_delay", ("acc_2",), [1e-4], lambda s: np.exp(-1e-4 * s)),
+        ("sensor_dynamics", ("acc_2", "highpass"), [20.0], lambda s: s / (s + 40 * np.pi)),
+        ("sensor_dynamics", ("acc_2", "lowpass"), [900.0], lambda s: 1 / (1 + s / (1800 * np.pi))),
+    ],
+)
+def test_channels(tmp_path, name, key, values, factor):
+    model = beam(tmp_path)
+    plain = changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0])
+    found = changed_frfs(model, name, key, values)
+    assert_allclose(found[:, 0], plain[:, 0], rtol=EXACT)
+    assert_allclose(found[:, 1], plain[:, 1] * factor(S), rtol=EXACT)
+    force = changed_frfs(model, name, ("force", *key[1:]), values)
+    assert_allclose(force * np.broadcast_to(factor(S), S.shape)[:, None], plain, rtol=EXACT)
+
+
+def test_a_misplaced_sensor_shows_the_other_node(tmp_path):
+    model = beam(tmp_path)
+    expected = model_frfs(model, labels(("17:+z", "13:-z")), S)
+    assert_same(changed_frfs(model, "sensor_misplaced", ("acc_2", 13), []), expected, REDUCED)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "values"),
+    [
+        ("local_damper", (12, "z"), [3.0]),
+        ("attached_resonator", (12, "z"), [0.02, 120.0, 0.05]),
+        ("viscoelastic_joint", ("node", 12, "z"), [2e3, 2e-3]),
+        ("boundary_compliance", ("left", ("ry",)), [200.0]),
+    ],
+)
+def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
+    model = beam(tmp_path)
+    specimen = specimen_of(model, labels())
+    change = shipped_effects()[name].build(specimen, Place(key=key))(np.array(values))
+    s = 1j * S.imag
+    found = model_frfs(with_change(model, change), labels(), S)
+    assert_same(found, changed_frfs(model, name, key, values), LOSSES)
+    assert np.isfinite(model_frfs(with_change(model, change), labels(), s)).all()
+
+
+def test_derivatives_by_what_cannot_be_known(tmp_path):
+    model = beam(tmp_path, right="pinned")
+    specimen = specimen_of(model, labels(("9:+z",)))
+    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
+    hypothesis = suppose(specimen, nuisance, ())
+    start = 0.3 * np.random.default_rng(1).standard_normal(nuisance.size)
+    here = hypothesis.respond(np.zeros(0), start, S)
+    found = nuisance_jacobian(here, nuisance, specimen.layout)
+    for index in range(0, nuisance.size, 3):
+        moved = start.copy()
+        moved[index] += STEP
+        difference = (hypothesis.respond(np.zeros(0), moved, S).values - here.values) / STEP
+        scale = np.abs(found[:, :, index]).max() + 1e-6 * np.abs(here.values).max()  # rounding of the difference
+        assert np.abs(difference - found[:, :, index]).max() < DIFFERENCE * scale
