@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from frf_ipz.errors import IllConditionedError
 from frf_ipz.numerics.partial_fractions import pair_columns, pair_values, stacked, unstacked
 from frf_ipz.numerics.polyreference import denominator, denominator_roots, participation, reduced_normal_matrix
 
@@ -61,8 +60,3 @@ def test_poles_of_exact_frfs_are_found(real):
     for shape, vector in zip(shapes, vectors, strict=True):
         along = vector[0] / np.linalg.norm(vector[0])
         assert abs(shape @ along.conj()) ** 2 == pytest.approx(1.0, abs=1e-6)
-
-
-def test_too_high_an_order_is_said():
-    with pytest.raises(IllConditionedError, match="max_order"):
-        reduced_normal_matrix(np.zeros(1), np.ones((1, 1, 1), complex), 3, real=True)
