@@ -59,6 +59,6 @@ def test_nothing_is_found_in_a_linear_chain(chain, strike):
 
 
 def test_a_law_outside_the_catalogue_is_not_explained(chain, strike):
-    found = search_laws(chain.model, strike(lambda w, _: 1.2e7 * w**2, (0, 0, 1, 0)), DiagnoseOptions())
+    found = search_laws(chain.model, strike(lambda w, _: 3e7 * w * abs(w), (0, 0, 1, 0)), DiagnoseOptions())
     assert found.verdict == "unexplained"
     assert "disagree" in found.statement
