@@ -1,13 +1,9 @@
 """Fixtures shared by all tests."""
 
-import sys
 from pathlib import Path
 
 import pytest
 
-PIPELINES = str(Path(__file__).parents[1] / "pipelines")
-if PIPELINES not in sys.path:  # its scripts and benches are no part of the package
-    sys.path.insert(0, PIPELINES)
 SHARED = Path(__file__).parents[2] / "shared"
 
 

@@ -19,9 +19,9 @@ from frf_ipz.fe.response import model_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.quantities import FrfQuantity
+from printed_digits import cut
 
 DATA = Path(__file__).parent / "data"
-PRINTED_DIGITS = 3
 # The first pole is printed as 16.6 and comes out as 16.7 Hz, the third as 292 and 293.05: the paper's own beam is up to
 # 0.2 % off the properties of its table 4. The blow is one node closer to the clamp than its text says.
 SECTION_5 = 0.008
@@ -41,11 +41,6 @@ def properties(number):
         "length_m": float(values["length"]),
         "modal_ratio": 0.001,
     }
-
-
-def cut(values, digits=PRINTED_DIGITS):
-    unit = 10.0 ** (np.floor(np.log10(values)) - digits + 1)
-    return np.floor(values / unit) * unit
 
 
 def reduced(model, dofs, residual, actuator, sensor, point, band_hz):
