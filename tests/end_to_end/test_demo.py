@@ -47,6 +47,13 @@ def test_the_point_of_interest_is_predicted(demo, run):
     assert (after["median dB"].to_numpy() < before["median dB"].to_numpy()).all()
 
 
+def test_the_bands_hold_the_truth_on_most_lines(demo, run):
+    prediction = run.load("predict")
+    truth = np.abs(demo.true_frfs(prediction.labels, prediction.frequency_hz))
+    inside = (truth >= prediction.magnitude_low) & (truth <= prediction.magnitude_high)
+    assert inside.mean() > 0.7  # 90 % bands; neighbouring lines err together
+
+
 @pytest.mark.parametrize("name", CONTRACT)
 def test_tables_have_the_columns_of_the_contract_with_unit_and_meaning(run, name):
     schema = pq.read_schema(run.path / name)
