@@ -14,13 +14,14 @@ from frf_ipz.diagnosis.measured.transfer import ROUGH_PART, SMOOTH_PART
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.polish import Data, Fit
 
 BANDS = 6  # pieces of the band, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations
+MOST_NOISE = 0.3  # of an FRF: where noise is more, a norm would be one of noise
 NAMED = 3  # FRFs and bands in the text
 
 
@@ -109,9 +110,11 @@ def _misfit(fit: Fit, unknown: FloatArray, training: Data, held_out: Data) -> Mi
     figures = []
     for data in (training, held_out):
         response = fit.hypothesis.respond(fit.values, unknown, data.measured.s)
-        wrong = data.measured.values - data.gains(response) * response.values
         white = data.misfit(response)
-        figures.append((_relative(wrong, data.measured.values), float(np.sqrt(white @ white / len(white)))))
+        seen = _stands_out(data)
+        measured = np.where(seen, data.measured.values, 0.0)
+        wrong = measured - np.where(seen, data.gains(response) * response.values, 0.0)
+        figures.append((_relative(wrong, measured), float(np.sqrt(white @ white / len(white)))))
     return Misfit(
         training=figures[0][0],
         held_out=figures[1][0],
@@ -120,9 +123,16 @@ def _misfit(fit: Fit, unknown: FloatArray, training: Data, held_out: Data) -> Mi
     )
 
 
+def _stands_out(data: Data) -> BoolArray:
+    """Where the FRFs are more than noise; everywhere, if they are nowhere."""
+    noise = np.array([np.diag(covariance).real for covariance in data.measured.covariance]).T
+    seen = noise < (MOST_NOISE * data.measured.size) ** 2
+    return np.asarray(seen | ~seen.any(0))
+
+
 def _relative(wrong: ComplexArray, measured: ComplexArray) -> float:
     """Norm over norm; each FRF counts by its own size, for sensors of several kinds have several units."""
-    scale = np.sqrt(np.mean(np.abs(measured) ** 2, 0))
+    scale = np.maximum(np.sqrt(np.mean(np.abs(measured) ** 2, 0)), np.finfo(float).tiny)
     return float(np.linalg.norm(wrong / scale) / np.linalg.norm(measured / scale))
 
 
