@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 FOUND_NATS = 40.0  # evidence over the nominal model's: what a finding needs
 SECOND_NATS = 50.0  # evidence of a second finding over the first one's alone
-MOST_PULL = 45.0  # sum of squares of what cannot be known
+MOST_PULL = 45.0  # sum of squares of what cannot be known, where the data determine little of it
+PULL_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
 PIECES = 6  # of the band, by points
 
 
@@ -57,12 +58,15 @@ class Goodness:
         Largest mean square of an FRF over a piece of the band.
     limits : Limits
         What they may be.
+    most_pull : float
+        What the pull may be.
     """
 
     misfit: float
     pull: float
     worst_piece: float
     limits: Limits
+    most_pull: float
 
     @property
     def is_good(self) -> bool:
@@ -72,7 +76,7 @@ class Goodness:
     @property
     def score(self) -> float:
         """Largest of the figures over their limits."""
-        return max(self.misfit / self.limits.misfit, self.pull / MOST_PULL, self.worst_piece / self.limits.piece)
+        return max(self.misfit / self.limits.misfit, self.pull / self.most_pull, self.worst_piece / self.limits.piece)
 
 
 def goodness(bench: Bench, fit: Fit) -> Goodness:
@@ -93,7 +97,14 @@ def goodness(bench: Bench, fit: Fit) -> Goodness:
     white = _white(bench.data, fit)
     pieces = [piece for piece in np.array_split(white, PIECES, axis=2) if piece.size]
     worst = max(float(np.mean(piece**2, axis=(1, 2)).max()) for piece in pieces)
-    return Goodness(misfit=float(np.mean(white**2)), pull=fit.pull, worst_piece=worst, limits=LIMITS[bench.kind])
+    most_pull = max(MOST_PULL, fit.freedom + PULL_DEVIATIONS * np.sqrt(2 * fit.freedom))
+    return Goodness(
+        misfit=float(np.mean(white**2)),
+        pull=fit.pull,
+        worst_piece=worst,
+        limits=LIMITS[bench.kind],
+        most_pull=float(most_pull),
+    )
 
 
 def _white(data: Data, fit: Fit) -> np.ndarray:

@@ -57,6 +57,8 @@ class Fit:
         Of the parameters as searched (logarithms, parts of ranges).
     converged : bool
         The last step was small.
+    freedom : float
+        How many of what cannot be known the data determine: what `pull` is expected to be at most.
     """
 
     hypothesis: Hypothesis
@@ -67,6 +69,7 @@ class Fit:
     log_evidence: float
     covariance: FloatArray
     converged: bool
+    freedom: float
 
     @property
     def cost(self) -> float:
@@ -325,6 +328,7 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
     log_prior = -sum(np.log(cause.n_places) for cause in hypothesis.causes)
     log_prior -= float(np.sum(np.log(hypothesis.high - hypothesis.low)))
     misfit, pull = float(point.misfit @ point.misfit), float(point.unknown @ point.unknown)
+    rows = linalg.solve_triangular(lower, np.eye(len(curvature)), lower=True, check_finite=False)
     inverse = linalg.cho_solve((lower, True), np.eye(len(curvature))[:, :n_parameters])
     return Fit(
         hypothesis=hypothesis,
@@ -335,4 +339,5 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
         log_evidence=-0.5 * (misfit + pull) - log_volume + 0.5 * n_parameters * np.log(2 * np.pi) + log_prior,
         covariance=np.asarray(inverse[:n_parameters]),
         converged=converged,
+        freedom=float(np.sum(1 - (rows[:, n_parameters:] ** 2).sum(0))),
     )
