@@ -113,7 +113,7 @@ def enough_slack(
     return factor
 
 
-def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float) -> int:
+def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float, *, least: float = 0.0) -> int:
     """Find the datum that all others and the prior contradict most.
 
     Parameters
@@ -126,6 +126,8 @@ def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit
         R.
     limit : float
         Standard deviations from what the others predict beyond which a datum is contradicted.
+    least : float
+        Data of a smaller modulus are not looked at.
 
     Returns
     -------
@@ -134,7 +136,7 @@ def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit
     """
     inverse = np.linalg.inv(sensitivity @ sensitivity.T + noise)
     distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
-    worst = int(np.argmax(distance))
+    worst = int(np.argmax(np.where(np.abs(data) >= least, distance, 0.0)))
     return worst if distance[worst] > limit else -1
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.tracking import TrackedRoots
 
 CONTRADICTED = 6.0  # standard deviations from what all other targets and the prior say
+LEAST_ERROR = 0.02  # relative: a pair of two different modes is farther apart; what is nearer is small and true
 CURVATURE = 0.5  # of the squared error: what a linear step cannot see
 MOST = 0.25  # part of the targets that may be left out
 LEFT_OUT = 1.0  # relative standard deviation of a target while it is left out
@@ -48,7 +49,7 @@ def contradicted(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
     while len(found) <= MOST * len(error):
         scales = likely_scales(parts, phase.terms, error, noise, scales)
         sensitivity = np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)])
-        worst = unlikely(sensitivity, error, noise, CONTRADICTED)
+        worst = unlikely(sensitivity, error, noise, CONTRADICTED, least=LEAST_ERROR)
         if worst < 0:
             return np.array(found, int)
         found.append(worst)
