@@ -135,8 +135,8 @@ def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit
         Its place; -1 where none is beyond the limit.
     """
     inverse = np.linalg.inv(sensitivity @ sensitivity.T + noise)
-    distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
-    worst = int(np.argmax(np.where(np.abs(data) >= least, distance, 0.0)))
+    distance = np.where(np.abs(data) >= least, np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse)), 0.0)
+    worst = int(np.argmax(distance))
     return worst if distance[worst] > limit else -1
 
 
