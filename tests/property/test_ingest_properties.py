@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -151,7 +151,9 @@ def test_a_top_that_is_cut_is_clipped_and_a_whole_one_is_not(force, share):
 def test_the_digital_step_is_found(step, counts):
     levels = np.unique(counts)
     smallest = np.diff(levels).min() if levels.size > 1 else 0
-    multiple = levels.size > 1 and not np.any((levels - levels[0]) % smallest)
+    off = np.abs((levels - levels[0]) / smallest - np.round((levels - levels[0]) / smallest)).max() if smallest else 0
+    assume(off < 1e-9 or off > 0.06)  # nearer than 5 % of the step counts as a multiple
+    multiple = levels.size > 1 and off < 1e-9
     found = digital_step(np.array(counts) * step)
     np.testing.assert_allclose(found, smallest * step if multiple else 0.0, rtol=ROUNDING)
 
