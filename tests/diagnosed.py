@@ -86,12 +86,12 @@ def labels(outputs=("17:+z", "9:-z"), inputs=("6:+z",), quantity=FrfQuantity.ACC
     )
 
 
-def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=BAND_HZ):
+def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=BAND_HZ, noise=NOISE):
     """FRFs of a model with noise; factors multiply them, as a measuring chain does."""
     names = names or labels()
     frequency = np.linspace(*band_hz, n_lines)
     exact = model_frfs(model, names, 2j * np.pi * frequency) * (1.0 if factors is None else factors(frequency))
-    scale = NOISE * np.median(np.abs(exact), axis=0)
+    scale = noise * np.median(np.abs(exact), axis=0)
     drawn = np.random.default_rng(seed).standard_normal((2, *exact.shape))
     return FrfSet(
         frequency_hz=frequency,

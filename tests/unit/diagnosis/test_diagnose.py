@@ -6,10 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosed import beam, labels, measured, observed
+from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses, with_springs
@@ -20,6 +24,8 @@ from frf_ipz.runs.codec import load_result, save_result
 
 MASS_KG = 0.02
 FEW = DiagnoseOptions(effects=("added_mass", "local_stiffness", "grounded_spring", "sensor_gain", "damping_level"))
+MUCH_NOISE = 0.05  # of each FRF's median: errors in proportion to such FRFs would make all of them too small
+GAIN = 0.006  # twice the prior's standard deviation of a gain: that of the force cannot be told from what is fitted
 SEEN = 0.02  # relative: the noise is 0.1 % of the FRFs, tolerances 0.1 % of the stiffness
 
 
@@ -111,6 +117,18 @@ def test_gains_that_nobody_knows_are_not_diagnosed(nominal):
     frfs = measured(nominal, factors=lambda f: np.array([3.0, 0.2]) + 0 * f[:, None])
     free = replace(frfs, unknown_scale="per_channel")
     assert diagnose(nominal, observed(free), FEW).verdict == "consistent"
+
+
+def test_noise_is_not_taken_for_a_gain(nominal):
+    names = labels(("17:+z", "14:+z", "11:+z", "9:-z", "7:+z", "4:+z"), ("6:+z", "15:+z"))
+    source = divide(observed(measured(nominal, names, noise=MUCH_NOISE)))
+    bench = set_up(nominal, source, BAND_HZ, FEW, shipped_effects())
+    effect = bench.effects["sensor_gain"]
+    places = effect.places(bench.specimen)
+    force = Cause(effect=effect, place=places[[place.key for place in places].index(("force", 1))], n_places=1)
+    fit = bench.fit((force,), np.array([1.01]))
+    assert fit.values[0] == pytest.approx(1.0, abs=GAIN)
+    assert fit.log_evidence < bench.fit((), np.zeros(0)).log_evidence
 
 
 def test_an_effect_that_is_not_known_is_refused(nominal):

@@ -96,9 +96,7 @@ def expected(data: Data, options: DiagnoseOptions) -> FloatArray:
     noise = np.array([np.diag(covariance).real for covariance in measured.covariance]).T
     shared = np.stack([np.sum(np.abs(measured.common[place]) ** 2, 1) for place in measured.input_of], 1)
     model = (np.hypot(SMOOTH_PART, ROUGH_PART) * options.stiffness_tolerance) ** 2
-    gains = 2 * options.gain_tolerance**2 / 3
-    size = measured.size**2
-    return np.asarray(np.sqrt(noise + shared * np.abs(measured.values) ** 2 + (model + gains) * size))
+    return np.asarray(np.sqrt(noise + shared * np.abs(measured.values) ** 2 + model * measured.size**2))
 
 
 def _shown(fit: Fit, unknown: FloatArray, data: Data) -> ComplexArray:

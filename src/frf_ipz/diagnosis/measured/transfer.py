@@ -131,9 +131,7 @@ def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     return np.concatenate([white.real, white.imag], axis=1)
 
 
-def whiten(
-    measured: Measured, *, tolerance: float, gain_std: float, floor: float = 1.0, free_gains: str = "none"
-) -> Whitening:
+def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0, free_gains: str = "none") -> Whitening:
     """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
 
     Parameters
@@ -142,8 +140,6 @@ def whiten(
         The data.
     tolerance : float
         Relative tolerance of the model: its FRFs are off by a part of it that no parameter stands for.
-    gain_std : float
-        Standard deviation of the gains of all channels.
     floor : float
         Factor of the model's errors: large ones let a search see past narrow peaks.
     free_gains : str
@@ -165,25 +161,23 @@ def whiten(
         inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True, check_finite=False)
         factors.append(np.asarray(inverse, np.complex128))
     found = np.array(factors, np.complex128)
-    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, gain_std, free_gains)))
+    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, free_gains)))
 
 
 def _blocks(
-    measured: Measured, factors: ComplexArray, gain_std: float, free_gains: str
+    measured: Measured, factors: ComplexArray, free_gains: str
 ) -> list[tuple[IntArray, FloatArray, FloatArray]]:
-    """Noise of the force for each blow's place; then gains of all channels."""
+    """Noise of the force for each blow's place; then gains that nobody knows."""
     blocks = []
     for place, shared in enumerate(measured.common):
         frfs = np.flatnonzero(measured.input_of == place)
         if shared.shape[1]:
             blocks.append(_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
+    if free_gains == "none":
+        return blocks
     every = np.arange(len(measured.labels))
-    gains = _gain_columns(measured) * gain_std
-    if free_gains == "per_channel":
-        gains = np.eye(len(every))[None] * FREE
-    elif free_gains == "common":
-        gains = np.concatenate([gains, np.full((1, len(every), 1), FREE)], axis=2)
-    errors = measured.certain[:, :, None] * gains
+    gains = np.eye(len(every))[None] if free_gains == "per_channel" else np.ones((1, len(every), 1))
+    errors = measured.certain[:, :, None] * gains * FREE
     found = _separately(factors, errors).reshape(-1, gains.shape[2])
     for frfs, directions, shrink in blocks:
         rows = (frfs[:, None] * 2 * len(measured.s) + np.arange(2 * len(measured.s))).ravel()
@@ -204,13 +198,3 @@ def _directions(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Directions of shared errors, and the part of them that is more than variance 1 allows."""
     directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     return directions, 1 - 1 / np.sqrt(1 + sizes**2)
-
-
-def _gain_columns(measured: Measured) -> FloatArray:
-    """Each channel's own FRFs, (1, n_frfs, n_channels): the force divides, outputs multiply."""
-    labels = measured.labels
-    channels = dict.fromkeys(label.output_channel or str(label.output_dof) for label in labels)
-    outputs = [
-        [float((label.output_channel or str(label.output_dof)) == name) for name in channels] for label in labels
-    ]
-    return np.hstack([np.ones((len(labels), 1)), np.array(outputs)])[None]

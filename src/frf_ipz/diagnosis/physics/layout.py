@@ -53,6 +53,16 @@ class Layout:
         """All channels, the force first."""
         return tuple(dict.fromkeys((*self.input_channels, *(channel for channel, _ in self.outputs))))
 
+    @property
+    def gain_signs(self) -> FloatArray:
+        """How FRFs follow the gains of `channels`, (n_frfs, n_channels): outputs multiply (1), forces divide (-1)."""
+        number = {channel: index for index, channel in enumerate(self.channels)}
+        signs = np.zeros((len(self.output_of), len(number)))
+        frf = np.arange(len(self.output_of))
+        signs[frf, np.array([number[channel] for channel, _ in self.outputs])[self.output_of]] = 1.0
+        signs[frf, np.array([number[channel] for channel in self.input_channels])[self.input_of]] = -1.0
+        return signs
+
 
 def lay_out(labels: Sequence[FrfLabel]) -> Layout:
     """Sort what FRFs connect.

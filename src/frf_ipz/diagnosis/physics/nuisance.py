@@ -2,8 +2,15 @@
 
 Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
-the shapes, and with it of the zeros. Damping ratios of modes, and places of sensors and blows, come beside. A tolerance
-is the half width of what can be, so that the standard deviation is the tolerance over the square root of three.
+the shapes, and with it of the zeros. Damping ratios of modes, places of sensors and blows, and gains of channels come
+beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over the square
+root of three.
+
+Gains multiply the model's FRFs. As errors in proportion to the measured FRFs they would follow their noise, and pull
+every fit to smaller FRFs by the product of their variance and the number of points.
+
+[dAgostini1994] G. D'Agostini, On the use of the covariance matrix to fit correlated data, Nuclear Instruments and
+Methods in Physics Research A 346 (1994) 306-311.
 """
 
 from __future__ import annotations
@@ -46,6 +53,8 @@ class Unknowns:
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
         How far sensors and blows are from their places, m.
+    gains : (n_channels,) array
+        Relative errors of the channels' gains, as logarithms.
     """
 
     kappa: FloatArray
@@ -54,6 +63,7 @@ class Unknowns:
     cords: FloatArray
     output_shift: FloatArray
     input_shift: FloatArray
+    gains: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,6 +86,10 @@ class Nuisance:
         m.
     n_outputs, n_inputs : int
         Sensor positions and blows.
+    n_channels : int
+        Channels with gains.
+    gain_std : float
+        Of gains, relative.
     """
 
     n_modes: int
@@ -88,6 +102,8 @@ class Nuisance:
     shift_std: FloatArray
     n_outputs: int
     n_inputs: int
+    n_channels: int
+    gain_std: float
 
     @property
     def pairs(self) -> tuple[IntArray, IntArray]:
@@ -97,10 +113,13 @@ class Nuisance:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of parameters: kappa, mu, damping, cords, sensor shifts, blow shifts."""
+        """Numbers of parameters: kappa, mu, damping, cords, sensor shifts, blow shifts, gains."""
         n_pairs = self.n_modes * (self.n_modes + 1) // 2
         shifts = len(self.axes)
-        return (n_pairs, n_pairs, self.n_modes, self.n_rigid, shifts * self.n_outputs, shifts * self.n_inputs)
+        return (
+            *(n_pairs, n_pairs, self.n_modes, self.n_rigid),
+            *(shifts * self.n_outputs, shifts * self.n_inputs, self.n_channels),
+        )
 
     @property
     def size(self) -> int:
@@ -117,6 +136,11 @@ class Nuisance:
     def damping_places(self) -> IntArray:
         """Where the relative errors of the damping ratios stand among the parameters."""
         return np.arange(self.n_modes) + 2 * self.sizes[0]
+
+    @property
+    def gain_places(self) -> IntArray:
+        """Where the gains stand among the parameters."""
+        return np.arange(self.size - self.n_channels, self.size)
 
     def unpack(self, values: FloatArray) -> Unknowns:
         """Give physical values.
@@ -139,6 +163,7 @@ class Nuisance:
             cords=parts[3] * self.cords_std,
             output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
             input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
+            gains=parts[6] * self.gain_std,
         )
 
     def _symmetric(self, triangle: FloatArray) -> FloatArray:
@@ -190,6 +215,8 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         shift_std=np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes]),
         n_outputs=len(layout.outputs),
         n_inputs=len(layout.inputs),
+        n_channels=len(layout.channels),
+        gain_std=options.gain_tolerance * UNIFORM,
     )
 
 

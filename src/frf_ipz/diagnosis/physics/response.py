@@ -239,7 +239,7 @@ def respond(
     layout : Layout
         Sensors and blows.
     unknowns : Unknowns
-        Shifts of sensors and blows.
+        Shifts of sensors and blows, and gains.
     s : (n_points,) complex array
         rad/s.
     basis : Basis
@@ -262,7 +262,7 @@ def respond(
     motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
     output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
     receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of]
-    chain = s[:, None] ** layout.power * _channels(change, layout, s)
+    chain = s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ unknowns.gains)
     return Response(
         values=receptance * chain,
         modes=modes,
@@ -351,7 +351,8 @@ def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) ->
     parts = [kappa, mu, damping, cords]
     parts += _shift_jacobians(response, nuisance, layout)
     stacked = np.concatenate(parts, axis=1) * response.chain[:, None, :]
-    return np.asarray(np.moveaxis(stacked, 1, 2))
+    gains = response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std)
+    return np.concatenate([np.moveaxis(stacked, 1, 2), gains], axis=2)
 
 
 def _shift_jacobians(response: Response, nuisance: Nuisance, layout: Layout) -> list[ComplexArray]:

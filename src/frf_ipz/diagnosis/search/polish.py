@@ -306,7 +306,7 @@ def same_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArr
     Returns
     -------
     (n_nuisance,) array
-        What cannot be known, in standard deviations: zero but for frequencies and damping.
+        What cannot be known, in standard deviations: zero but for frequencies, damping and gains.
     """
     nuisance = hypothesis.nuisance
     m, unknown, spread = nuisance.n_modes, np.zeros(nuisance.size), np.diag(nuisance.kappa_std)
@@ -317,6 +317,7 @@ def same_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArr
     damped = here.stated_ratio[:m] > 0
     change = there.ratio[:m] / np.where(damped, here.stated_ratio[:m], 1.0) - 1
     unknown[nuisance.damping_places] = np.where(damped, change / nuisance.damping_std, 0.0)
+    unknown[nuisance.gain_places] = fit.unknown[nuisance.gain_places]
     return unknown
 
 

@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
 from frf_ipz.diagnosis.physics.layout import lay_out
-from frf_ipz.diagnosis.physics.nuisance import UNIFORM, make_nuisance
+from frf_ipz.diagnosis.physics.nuisance import make_nuisance
 from frf_ipz.diagnosis.physics.response import modify, respond, rows_of
 from frf_ipz.diagnosis.search.bench import Bench
 from frf_ipz.diagnosis.search.polish import Data
@@ -113,7 +113,6 @@ def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str
     whitening = whiten(
         measured,
         tolerance=options.stiffness_tolerance,
-        gain_std=options.gain_tolerance * UNIFORM,
         floor=floor,
         free_gains=free_gains,
     )
