@@ -53,7 +53,7 @@ class Plant(NamedTuple):
 
 
 def main(out: Path) -> None:
-    run = frf_ipz.run_pipeline(HERE / "cantilever.toml", out, until="pair")
+    run = frf_ipz.run_pipeline(HERE / "poi_controller.toml", out, until="pair")
     fit, updated = run.load("fit"), update(run)
     real, members = true_plant(), plants_of_ensemble(updated, fit.labels)
     nominal = replace(updated, model=updated.nominal)
@@ -227,4 +227,4 @@ def vibration(plant: Plant, controller: control.StateSpace | None) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "results/cantilever"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "results/poi_controller"))
