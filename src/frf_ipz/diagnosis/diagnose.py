@@ -13,7 +13,15 @@ import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
-from frf_ipz.diagnosis.judging.decision import CONSISTENT, EXPLAINED, UNEXPLAINED, decide, gain_over, only_null
+from frf_ipz.diagnosis.judging.decision import (
+    CONSISTENT,
+    EXPLAINED,
+    UNEXPLAINED,
+    decide,
+    gain_over,
+    only_null,
+    without_last,
+)
 from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
@@ -29,11 +37,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.judging.decision import Decision
+    from frf_ipz.diagnosis.judging.figures import Proof
     from frf_ipz.diagnosis.judging.findings import Weighed
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.polish import Data
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
@@ -89,7 +99,7 @@ def diagnose(
     nonlinear &= certain or found.verdict == UNEXPLAINED
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
-    proof = prove(bench, held_out, found.null, found.final)
+    found, proof = _proven(bench, held_out, found)
     where = disagreement(bench, found.null, proof.curves)
     weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
     linear = Diagnosis(
@@ -115,6 +125,18 @@ def diagnose(
     return replace(linear, statement=_statement(found, linear.findings))
 
 
+def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
+    """Prove, and leave out what explains a part only and makes worse what was not fitted."""
+    proof = prove(bench, held_out, found.null, found.final)
+    while found.verdict == UNEXPLAINED and proof.after.held_out > proof.before.held_out:
+        if found.final is found.null:  # the model goes on as it is
+            as_it_is = replace(proof.curves, explained=proof.curves.nominal)
+            return found, replace(proof, after=proof.before, curves=as_it_is)
+        found = without_last(bench, found)
+        proof = prove(bench, held_out, found.null, found.final)
+    return found, proof
+
+
 def _laws(
     model: StructuralModel, observations: Observations, options: DiagnoseOptions, progress: Progress
 ) -> LawSearch | None:
@@ -128,13 +150,17 @@ def _laws(
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
     found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > FOUND_NATS)
+    before, after = laws.before or linear.before, laws.after or linear.updated
+    is_needed = bool(found) and found[0].log_evidence_gain > np.fmax(FOUND_NATS, laws.linear_limit)
+    is_worse = laws.verdict == UNEXPLAINED and after.held_out > before.held_out
+    n_findings = 1 if is_needed and not is_worse else 0
     return replace(
         linear,
         verdict=laws.verdict,
-        findings=found[:1],
-        alternatives=found[1:],
-        before=laws.before or linear.before,
-        after=laws.after or linear.updated,
+        findings=found[:n_findings],
+        alternatives=found[n_findings:],
+        before=before,
+        after=after if n_findings else before,
         ambiguity=(),
         statement=laws.statement,
     )

@@ -103,12 +103,15 @@ class Observations:
         Band that is looked at, Hz.
     frfs : FrfSet, optional
         FRFs on lines: what is looked at where there are no blows, or some did not start at rest.
+    exclude_hz : tuple of pairs of float
+        Stretches of the band that are not looked at, Hz.
     """
 
     kind: str
     blows: tuple[Blow, ...]
     band_hz: tuple[float, float]
     frfs: FrfSet | None = None
+    exclude_hz: tuple[tuple[float, float], ...] = ()
 
     @property
     def input_dofs(self) -> tuple[Dof, ...]:

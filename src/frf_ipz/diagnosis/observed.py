@@ -28,7 +28,8 @@ def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions
     frfs : FrfSet
         The FRFs that were estimated from it, or elsewhere.
     fit : FitOptions, optional
-        Says which band to look at; where it does not, the band that carries signal is taken.
+        Says which band to look at, and which stretches of it not; without a band, the one that carries signal is
+        taken.
 
     Returns
     -------
@@ -40,11 +41,13 @@ def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions
     InputError
         If a recording cannot be used, or too few lines are left in the band.
     """
-    band = measured_lines(frfs, fit or FitOptions()).band_hz
+    chosen = fit or FitOptions()
+    band = measured_lines(frfs, chosen).band_hz
     blows: tuple[Blow, ...] = ()
     if test.kind != "frf" and frfs.unknown_scale == "none":
         blows = tuple(_blow(blow, test.input_channel.column) for blow in read_blows(test, options))
-    return Observations(kind=test.kind if blows else "frf", blows=blows, band_hz=band, frfs=frfs)
+    kind = test.kind if blows else "frf"
+    return Observations(kind=kind, blows=blows, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
 
 
 def _blow(blow: recorded.Blow, input_channel: str) -> Blow:

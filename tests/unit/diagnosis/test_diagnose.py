@@ -10,6 +10,7 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging.figures import prove
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.hypothesis import Cause
@@ -98,6 +99,36 @@ def test_what_no_effect_explains_is_unexplained(nominal):
     assert found.verdict == "unexplained"
     assert found.mismatch_hz.size
     assert "Something is missing" in found.statement
+    assert found.after.held_out <= found.before.held_out
+
+
+@pytest.mark.parametrize("updating_helps", [True, False])
+def test_a_part_that_makes_worse_what_was_not_fitted_is_left_out(nominal, monkeypatch, updating_helps):
+    def with_worse_parts(bench, held_out, null, final):
+        proof = prove(bench, held_out, null, final)
+        worse = replace(proof.after, held_out=2 * proof.before.held_out)
+        return proof if final is null and updating_helps else replace(proof, after=worse)
+
+    monkeypatch.setattr("frf_ipz.diagnosis.diagnose.prove", with_worse_parts)
+    changed = with_springs(nominal, {Dof(9, "z"): 3e5})
+    found = diagnose(nominal, observed(measured(changed)), DiagnoseOptions(effects=("sensor_misplaced", "time_delay")))
+    assert found.verdict == "unexplained"
+    assert found.findings == ()
+    assert found.alternatives
+    assert found.after == (found.updated if updating_helps else found.before)
+
+
+def test_excluded_stretches_are_not_looked_at(nominal):
+    def hum(frequency_hz):
+        return 1 + 3.0 * (np.abs(frequency_hz - 100.0) < 2.0)[:, None]
+
+    seen = observed(measured(nominal, factors=hum))
+    assert diagnose(nominal, seen, FEW).verdict != "consistent"
+    found = diagnose(nominal, replace(seen, exclude_hz=((97.0, 103.0),)), FEW)
+    assert found.verdict == "consistent"
+    assert not ((found.mismatch_hz > 97.0) & (found.mismatch_hz < 103.0)).any()
+    with pytest.raises(InputError, match="exclude_hz"):
+        diagnose(nominal, replace(seen, exclude_hz=((1.0, 1000.0),)), FEW)
 
 
 def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):

@@ -102,6 +102,25 @@ def only_null(bench: Bench) -> Decision:
     return Decision(verdict=UNEXPLAINED, null=null, final=null, ranking=nothing, second=None, good=good, null_good=good)
 
 
+def without_last(bench: Bench, found: Decision) -> Decision:
+    """Leave out the second cause, or the only one.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and model.
+    found : Decision
+        With one or two causes.
+
+    Returns
+    -------
+    Decision
+        Unexplained, with one cause less.
+    """
+    fit = found.null if found.second is None else found.ranking.best
+    return replace(found, verdict=UNEXPLAINED, final=fit, second=None, good=goodness(bench, fit))
+
+
 def gain_over(fit: Fit, base: Fit) -> float:
     """Give the evidence of a fit over that of another, nats."""
     return fit.log_evidence - base.log_evidence

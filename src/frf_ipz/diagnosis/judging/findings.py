@@ -161,6 +161,7 @@ def _estimates(fit: Fit, which: int, scale: float) -> dict[str, Estimate]:
     hypothesis = fit.hypothesis
     cause, start = hypothesis.causes[which], sum(hypothesis.counts[:which])
     spread = WIDER * np.sqrt(np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0))
+    spread = np.minimum(spread, hypothesis.high - hypothesis.low)  # where data say nothing, the range still does
     found = {}
     for index in range(start, start + hypothesis.counts[which]):
         parameter, value = hypothesis.parameters[index], float(fit.values[index])

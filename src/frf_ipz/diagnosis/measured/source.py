@@ -64,7 +64,7 @@ def divide(observations: Observations) -> Source:
     Raises
     ------
     InputError
-        If there is nothing to look at.
+        If there is nothing to look at, or nothing of it is left.
     """
     if not observations.blows or not all(blow.rested for blow in observations.blows):
         return _of_frfs(observations)
@@ -72,12 +72,12 @@ def divide(observations: Observations) -> Source:
     names = {blow.name for blow in kept}
     fitted = tuple(blow for blow in observations.blows if blow.name not in names)
     found = survey(replace(observations, blows=fitted))
-    coarse = measure(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
+    coarse = _looked_at(measure(found, coarse_contour(observations.band_hz, found.least_decay_1_s)), observations)
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
-    near = measure(found, s)
+    near = _looked_at(measure(found, s), observations)
     if not kept:
         return _by_points(coarse, near, found, observations.kind)
-    held = measure(like(found, replace(observations, blows=kept)), s)
+    held = measure(like(found, replace(observations, blows=kept)), near.s)
     return Source(
         coarse=coarse,
         training=near,
@@ -106,7 +106,7 @@ def _of_frfs(observations: Observations) -> Source:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
     found = survey_frfs(observations.frfs, observations.band_hz)
     coarse = measure_frfs(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
-    near = _near(found, observations)
+    coarse, near = _looked_at(coarse, observations), _looked_at(_near(found, observations), observations)
     return _by_points(coarse, near, found, "frf")
 
 
@@ -116,6 +116,17 @@ def _near(found: FrfSurvey, observations: Observations) -> Measured:
         return measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
     spacing = float(np.median(np.diff(found.frfs.s.imag)))
     return lines_along(found, fine_contour(found.resonances, observations.band_hz, spacing))
+
+
+def _looked_at(measured: Measured, observations: Observations) -> Measured:
+    """Leave out stretches of the band, and what is nearer to them than a point's own width."""
+    frequency, width = measured.frequency_hz, measured.s.real / (2 * np.pi)
+    kept = np.ones(len(frequency), bool)
+    for low, high in observations.exclude_hz:
+        kept &= (frequency < low - width) | (frequency > high + width)
+    if not kept.any():
+        raise InputError("[fit] exclude_hz leaves nothing of the band to diagnose; exclude narrower stretches")
+    return points_of(measured, np.flatnonzero(kept))
 
 
 def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:

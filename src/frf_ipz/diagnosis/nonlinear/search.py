@@ -177,17 +177,23 @@ def _judge(
     gains = np.array([_gain(fit, linear_cost, len(plant.places), scale) for fit in fits])
     weights = np.exp(gains - gains.max())
     findings = _findings(plant, fits, gains, weights / weights.sum(), scale)
-    explained = best.cost <= MOST_MISFIT * best.n_rows and findings[0].log_evidence_gain > FOUND_NATS
+    limit = _linear_limit(stretches, linear_cost) / scale
+    needed = findings[0].log_evidence_gain > np.fmax(FOUND_NATS, limit)
+    explained = bool(best.cost <= MOST_MISFIT * best.n_rows and needed)
     left = float(np.sqrt(best.cost / best.n_rows))
+    why = (
+        f"{left:.3g} times the expected misfit is left by the best one ({findings[0].effect})"
+        if needed
+        else f"the best one ({findings[0].effect}) gains no more than a linear system could"
+    )
     return LawSearch(
         verdict=EXPLAINED if explained else UNEXPLAINED,
         linearity=linearity,
         findings=findings,
-        linear_limit=_linear_limit(stretches, linear_cost) / scale,
+        linear_limit=limit,
         statement=f"{findings[0].statement} {working_range(best, plant)}"
         if explained
-        else f"Weak and strong blows disagree, and no law of the catalogue explains how: {left:.3g} times the expected "
-        f"misfit is left by the best one ({findings[0].effect}).",
+        else f"Weak and strong blows disagree, and no law of the catalogue explains how: {why}.",
         plant=plant,
         fit=best,
     )

@@ -1,5 +1,6 @@
 import pytest
 
+from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -50,6 +51,16 @@ def test_whole_records_of_all_levels_are_simulated(solved):
     simulation = simulate(observations, found.freedom, found.fit)
     assert simulation.simulated.shape == simulation.measured.shape
     assert (simulation.misfit < 2 * HELD_OUT).all()
+
+
+def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, strike, monkeypatch):
+    law, where, *_ = CASES["cubic_stiffness"]
+    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search._linear_limit", lambda *_: 1e12)
+    found = diagnose(chain.model, strike(law, where), DiagnoseOptions())
+    assert found.verdict == "unexplained"
+    assert found.findings == ()
+    assert found.alternatives[0].effect == "cubic_stiffness"
+    assert "no more than a linear system" in found.statement
 
 
 def test_nothing_is_found_in_a_linear_chain(chain, strike):
