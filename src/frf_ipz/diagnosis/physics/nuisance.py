@@ -36,6 +36,7 @@ CORDS = 0.02  # frequency of a free structure in its cords, over its first elast
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
 MOST_MODES = 16
 LESS_CONVERGED = 20.0  # growth of a mode's error with its frequency over the top of the band: meshes suit the band
+MOST_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 SUSPENSION_SPREAD = 0.5  # relative standard deviation of the damping of rigid-body modes in their cords
 
 
@@ -163,7 +164,7 @@ class Nuisance:
             cords=parts[3] * self.cords_std,
             output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
             input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
-            gains=parts[6] * self.gain_std,
+            gains=np.clip(parts[6] * self.gain_std, -MOST_GAIN, MOST_GAIN),
         )
 
     def _symmetric(self, triangle: FloatArray) -> FloatArray:
