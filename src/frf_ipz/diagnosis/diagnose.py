@@ -220,8 +220,8 @@ def _statement(found: Decision, findings: tuple[Finding, ...]) -> str:
         return f"{said} With that, the model explains the measurement."
     partly = f" A part of it is explained: {said}" if said else ""
     return (
-        "Something is missing that nothing in the catalogue explains: the best explanation leaves "
-        f"{np.sqrt(found.good.misfit):.3g} times the expected misfit.{partly}"
+        "Something is missing that nothing in the catalogue explains: the best explanation "
+        f"{found.good.complaint}.{partly}"
     )
 
 

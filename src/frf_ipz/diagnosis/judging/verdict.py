@@ -76,7 +76,21 @@ class Goodness:
     @property
     def score(self) -> float:
         """Largest of the figures over their limits."""
-        return max(self.misfit / self.limits.misfit, self.pull / self.most_pull, self.worst_piece / self.limits.piece)
+        return max(self._over_limits)
+
+    @property
+    def complaint(self) -> str:
+        """What is worst about it, in words that follow "the best explanation"."""
+        return (
+            f"leaves {np.sqrt(self.misfit):.3g} times the expected misfit",
+            "needs more than the tolerances of the nominal model allow "
+            f"({self.pull:.0f} squared deviations, {self.most_pull:.0f} are likely)",
+            f"leaves {np.sqrt(self.worst_piece):.3g} times the expected misfit in one FRF over a part of the band",
+        )[int(np.argmax(self._over_limits))]
+
+    @property
+    def _over_limits(self) -> tuple[float, float, float]:
+        return self.misfit / self.limits.misfit, self.pull / self.most_pull, self.worst_piece / self.limits.piece
 
 
 def goodness(bench: Bench, fit: Fit) -> Goodness:
