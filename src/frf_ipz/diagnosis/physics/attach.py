@@ -64,7 +64,7 @@ def _attached(model: StructuralModel, attachment: Attachment) -> StructuralModel
         _grown(matrix, own) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
     )
     for motion in attachment.motions.T:
-        padded = sparse.csr_array(np.concatenate([motion, np.zeros(own)])[None])
+        padded = sparse.csr_array(np.concatenate([motion, np.zeros(len(model.all_dofs) - len(motion) + own)])[None])
         extra = sparse.csr_array(
             (np.ones(own), (np.arange(own), len(model.all_dofs) + np.arange(own))), shape=(own, padded.shape[1])
         )
