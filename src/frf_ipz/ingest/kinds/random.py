@@ -6,13 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.blows import read_blows, survey_blows
-from frf_ipz.ingest.kinds.averages import RunAverage, about_variance, assemble_frfs
-from frf_ipz.ingest.kinds.table import blow_table
-from frf_ipz.ingest.kinds.traces import blow_traces
-from frf_ipz.ingest.recording_files import RecordingFiles
-from frf_ipz.ingest.recordings import Recordings, Trace
-from frf_ipz.ingest.spectra import empty_sums
+from frf_ipz.ingest.kinds.recorded import average_recordings
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 
 if TYPE_CHECKING:
@@ -20,12 +14,12 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.blows import Blow
+    from frf_ipz.ingest.kinds.averages import RunAverage
     from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recordings import Recordings
     from frf_ipz.ingest.survey.facts import Survey
     from frf_ipz.ingest.test_file import Test
     from frf_ipz.progress import Progress
-
-SURVEYED = 0.6  # share of the work that the first look takes
 
 
 def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> Recordings:
@@ -50,24 +44,7 @@ def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> R
     InputError
         If a recording cannot be used.
     """
-    files = RecordingFiles(test=test)
-    survey = survey_blows(files, options, lambda fraction, text: progress(SURVEYED * fraction, text))
-    n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
-    averages = {run: RunAverage(empty_sums(n_lines, n_outputs)) for run in test.runs}
-    energies: list[float] = []
-    traces: tuple[Trace, ...] = ()
-    records = read_blows(test, options, survey=survey, files=files, used_only=False)
-    for done, (facts, record) in enumerate(zip(survey.blows, records, strict=True)):
-        progress(SURVEYED + (1.0 - SURVEYED) * done / len(survey.blows), f"averaging {record.name}")
-        traces = blow_traces(facts, record, traces)
-        energies.append(_add(averages[facts.run], record, survey) if record.used else 0.0)
-    return Recordings(
-        frfs=assemble_frfs(test, survey, averages, options),
-        blows=blow_table(survey, energies),
-        traces=traces,
-        choices=survey.choices,
-        warnings=(*survey.warnings, *about_variance(averages)),
-    )
+    return average_recordings(test, options, progress, _add)
 
 
 def _add(average: RunAverage, record: Blow, survey: Survey) -> float:
