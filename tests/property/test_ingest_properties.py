@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -140,6 +140,7 @@ def test_a_pulse_is_found_whatever_its_scale_and_sign(force, scale, seed):
 
 
 @given(force=pulses, share=st.floats(0.3, 0.9))
+@example(force=np.exp(-0.5 * ((np.arange(4000) - 300.0) / 9.5) ** 2), share=0.453125)  # a sample just past the corner
 @settings(max_examples=60, deadline=None)
 def test_a_top_that_is_cut_is_clipped_and_a_whole_one_is_not(force, share):
     cut = np.minimum(force, share * force.max())

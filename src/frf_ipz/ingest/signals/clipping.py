@@ -97,7 +97,8 @@ def _is_cut(upward: FloatArray, step: float, height: float) -> bool:
         return False
     at_top = upward >= top - EQUAL * height
     edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
-    plateaus = [_Plateau(upward, start, stop, top) for start, stop in edges.reshape(-1, 2)]
+    reach = 1 if step else 2  # the sample beside a plateau may lie just past the corner: fine signals show the next
+    plateaus = [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
     floor = max(STEEP * top, CORNER * step)
     steep = [plateau for plateau in plateaus if plateau.drop > floor]
     longest = max((plateau.length for plateau in steep), default=0)
@@ -110,10 +111,11 @@ def _is_cut(upward: FloatArray, step: float, height: float) -> bool:
 class _Plateau:
     """Equal samples at the top: how many, how far the signal falls beside them, and how unequally."""
 
-    def __init__(self, upward: FloatArray, start: int, stop: int, top: float) -> None:
+    def __init__(self, upward: FloatArray, start: int, stop: int, top: float, reach: int) -> None:
         beside = [float(upward[place]) for place in (start - 1, stop) if 0 <= place < len(upward)]
+        around = upward[max(start - reach, 0) : stop + reach]
         self.length = stop - start
-        self.drop = top - min(beside) if beside else 0.0
+        self.drop = top - float(around.min())
         self.lopsided = max(beside) - min(beside) if beside else 0.0
 
 
