@@ -45,21 +45,24 @@ def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions
     band = measured_lines(frfs, chosen).band_hz
     blows: tuple[Blow, ...] = ()
     if test.kind != "frf" and frfs.unknown_scale == "none":
-        blows = tuple(_blow(blow, test.input_channel.column) for blow in read_blows(test, options))
+        blows = tuple(_blow(blow, test) for blow in read_blows(test, options) if set(blow.labels) & set(test.labels))
     kind = test.kind if blows else "frf"
     return Observations(kind=kind, blows=blows, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
 
 
-def _blow(blow: recorded.Blow, input_channel: str) -> Blow:
+def _blow(blow: recorded.Blow, test: Test) -> Blow:
+    """Take of a blow what the FRFs of the test were estimated from: the user may have hidden a sensor."""
+    rows = [row for row, label in enumerate(blow.labels) if label in test.labels]
+    labels = [blow.labels[row] for row in rows]
     return Blow(
         name=blow.name,
-        input_channel=input_channel,
-        input_dof=blow.labels[0].input_dof,
+        input_channel=test.input_channel.column,
+        input_dof=labels[0].input_dof,
         sensors=tuple(
-            Sensor(channel=label.output_channel, dof=label.output_dof, quantity=label.quantity) for label in blow.labels
+            Sensor(channel=label.output_channel, dof=label.output_dof, quantity=label.quantity) for label in labels
         ),
         step_s=blow.step_s,
         force=blow.force,
-        responses=blow.responses,
+        responses=blow.responses[rows],
         rested=blow.rested,
     )

@@ -25,6 +25,8 @@ class IngestOptions:
         Length of the segments of long records (kind ``random``), s.
     keep, drop : tuple of str
         Files, or ``file#2`` for the second blow in a file, that are used or left out whatever the checks say.
+    hide : tuple of str
+        DOFs of sensors whose FRFs are left out, of whatever sign. A known mass of the sensor stays in the model.
     """
 
     __pydantic_config__ = STRICT
@@ -35,3 +37,4 @@ class IngestOptions:
     segment_s: float | None = None
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
+    hide: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.test_file import Test, read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
 from frf_ipz.pipeline.reference import read_reference
+from frf_ipz.pipeline.sensors import without_sensors
 from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def read_job(path: Path) -> Job:
         On the first thing that is wrong: which file, which place, what was expected.
     """
     pipeline = read_pipeline(path)
-    test = read_test(pipeline.test_path)
+    test = _test(pipeline)
     points = _points(pipeline)
     model = None if pipeline.model_path is None else _model(pipeline.model_path, test, points)
     if model is None and points:
@@ -100,6 +101,14 @@ def read_job(path: Path) -> Job:
         model_files=of_model,
         reference=reference,
     )
+
+
+def _test(pipeline: Pipeline) -> Test:
+    test = read_test(pipeline.test_path)
+    try:
+        return without_sensors(test, pipeline.file.ingest.hide)
+    except InputError as error:
+        raise FileFormatError(pipeline.path, str(error), where="key 'ingest.hide'") from None
 
 
 def _points(pipeline: Pipeline) -> tuple[Dof, ...]:

@@ -1,9 +1,12 @@
-"""Which sensors may weigh something that nobody has stated."""
+"""Which sensors are left out, and which may weigh something that nobody has stated."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from frf_ipz.dofs import parse_dof
+from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
@@ -36,3 +39,34 @@ def unweighed_sensors(test: Test, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]
         return ()
     weighed = {node for node, mass in test.sensor_masses.items() if mass > 0}
     return tuple({dof.node: dof.unsigned for dof in outputs if dof.node not in weighed}.values())
+
+
+def without_sensors(test: Test, hidden: Sequence[str]) -> Test:
+    """Leave the FRFs of some sensors out of a test; their recordings and known masses stay.
+
+    Parameters
+    ----------
+    test : Test
+        The test.
+    hidden : sequence of str
+        DOFs of the sensors, of whatever sign.
+
+    Returns
+    -------
+    Test
+        With the labels that are left.
+
+    Raises
+    ------
+    InputError
+        If no sensor sits at such a DOF, or none is left.
+    """
+    left_out = {parse_dof(text).unsigned: text for text in hidden}
+    names = {dof.unsigned: str(dof) for dof in test.output_dofs}
+    for dof, text in left_out.items():
+        if dof not in names:
+            raise InputError(f"there is no sensor at '{text}'; {did_you_mean(text, names.values())}")
+    labels = tuple(label for label in test.labels if label.output_dof.unsigned not in left_out)
+    if not labels:
+        raise InputError("this leaves no sensor; take one out of the list")
+    return replace(test, labels=labels)

@@ -55,8 +55,8 @@ def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -
     frfs: list[MeasuredFrf] = []
     for done, source in enumerate(test.frf_sources):
         progress(done / len(test.frf_sources), f"reading {source.path.name}")
-        frfs += [_to_si(frf) for frf in read_frfs(source)]
-    labels = tuple(frf_label(frf.output_dof, frf.input_dof, frf.source.quantity) for frf in frfs)
+        frfs += [_to_si(frf) for frf in read_frfs(source) if _label_of(frf) in test.labels]
+    labels = tuple(_label_of(frf) for frf in frfs)
     _check(frfs, labels)
     lines, warnings = _common_lines(frfs)
     places = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
@@ -75,6 +75,10 @@ def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -
         blows=empty_blow_table(),
         warnings=warnings,
     )
+
+
+def _label_of(frf: MeasuredFrf) -> FrfLabel:
+    return frf_label(frf.output_dof, frf.input_dof, frf.source.quantity)
 
 
 def _known(values: FloatArray | None, nothing: FloatArray) -> FloatArray:

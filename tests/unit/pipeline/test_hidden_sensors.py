@@ -1,0 +1,73 @@
+"""A sensor that is hidden is left out of FRFs, diagnosis and model alike, on the command line as on the page."""
+
+import pytest
+
+from frf_ipz.diagnosis.observed import observe
+from frf_ipz.errors import FileFormatError
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+from frf_ipz.pipeline.job import read_job
+from frf_ipz.pipeline.sensors import without_sensors
+from synthetic_campaign import hammer_campaign, write_test
+
+OPTIONS = IngestOptions()
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    hammer_campaign(tmp_path)
+    return tmp_path
+
+
+def hiding(folder, *dofs):
+    text = f'[pipeline]\ntest = "test.toml"\n[ingest]\nhide = {list(dofs)}\n'
+    (folder / "pipeline.toml").write_text(text.replace("'", '"'), encoding="utf-8")
+    return folder / "pipeline.toml"
+
+
+def sensors(frfs):
+    return [str(label.output_dof) for label in frfs.labels]
+
+
+def test_the_frfs_of_the_others_stay_as_they_were(campaign):
+    test = read_test(campaign / "test.toml")
+    both = estimate_frfs(test, OPTIONS).frfs
+    left = estimate_frfs(read_job(hiding(campaign, "1:z")).test, OPTIONS).frfs
+    assert (sensors(both), sensors(left)) == (["1:+z", "2:+z"], ["2:+z"])
+    assert (left.values[:, 0] == both.values[:, 1]).all()
+
+
+def test_a_diagnosis_sees_blows_without_it(campaign):
+    test = without_sensors(read_test(campaign / "test.toml"), ["1:+z"])
+    seen = observe(test, OPTIONS, estimate_frfs(test, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    whole = read_test(campaign / "test.toml")
+    both = observe(whole, OPTIONS, estimate_frfs(whole, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    assert [[sensor.channel for sensor in blow.sensors] for blow in seen.blows] == [["acc_2"]] * 3
+    assert (seen.blows[0].responses[0] == both.blows[0].responses[1]).all()
+
+
+def test_a_known_mass_stays_where_it_is(campaign):
+    path = campaign / "test.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace('dof = "1:+z"', 'dof = "1:+z"\nmass_kg = 0.004'))
+    assert read_job(hiding(campaign, "1:+z")).test.sensor_masses == {1: 0.004}
+
+
+def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
+    rows = [f"{hz},{node}:+z,7:+z,{node},0.0" for node in (1, 2) for hz in (10.0, 20.0, 30.0)]
+    head = "frequency_hz,output_dof,input_dof,real,imag"
+    (tmp_path / "frf.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
+    frfs = estimate_frfs(read_job(hiding(tmp_path, "1:-z")).test, OPTIONS).frfs
+    assert sensors(frfs) == ["2:+z"]
+    assert frfs.values[0, 0] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("dofs", "said"),
+    [(["3:+z"], "there is no sensor at '3:[+]z'"), (["1:z", "2:z"], "leaves no sensor"), (["tip"], "no DOF label")],
+)
+def test_what_makes_no_sense_is_refused(campaign, dofs, said):
+    with pytest.raises(FileFormatError, match=f"ingest.hide.*{said}"):
+        read_job(hiding(campaign, *dofs))
