@@ -1,11 +1,13 @@
 """Chains of masses as reduced models: small, and every number can be checked by hand."""
 
 import numpy as np
+import pandas as pd
 
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.structure import ReducedModel
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 
 def chain(order=5, *, stiffness=None, damping=0.01, free=False, seed=0, between=False):
@@ -53,3 +55,18 @@ def random_matrices(rng, order, *, symmetric=True):
     if symmetric:
         return matrices
     return tuple(matrix + 0.02 * np.linalg.norm(matrix) * rng.standard_normal((order, order)) for matrix in matrices)
+
+
+def updated(model, ensemble=()):
+    """The model as if an update had left it as it is, with members of a posterior."""
+    order = len(model.dofs)
+    return UpdatedModel(
+        model=model,
+        nominal=model,
+        method="test",
+        status=UpdateStatus.CONVERGED,
+        history=pd.DataFrame(),
+        before=np.zeros(0, complex),
+        after=np.zeros(0, complex),
+        ensemble=np.array(ensemble).reshape(-1, 3, order, order),
+    )

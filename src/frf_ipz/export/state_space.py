@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.io import loadmat, savemat
+from scipy.io.matlab import MatReadError
 
 from frf_ipz.arrays import FloatArray, require_shape
 from frf_ipz.errors import FileFormatError, InputError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 SUFFIXES = (".json", ".mat")
+UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
 ARRAYS = ("A", "B", "C", "D")
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
@@ -62,9 +64,25 @@ class StateSpaceModel:
     output_units: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        states, inputs, outputs = len(self.state_names), len(self.input_names), len(self.output_names)
-        for name, shape in _shapes(states, inputs, outputs).items():
+        for name, shape in shapes({name: getattr(self, name) for name in NAMES}).items():
             require_shape(name, getattr(self, name), shape)
+
+
+def shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
+    """Say how large the arrays of a state space are.
+
+    Parameters
+    ----------
+    names : mapping of str to sequence of str
+        Its ``state_names``, ``input_names`` and ``output_names``.
+
+    Returns
+    -------
+    dict of str to (int, int)
+        Of ``A``, ``B``, ``C`` and ``D``.
+    """
+    states, inputs, outputs = (len(names[f"{end}_names"]) for end in ("state", "input", "output"))
+    return {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
 
 
 def to_state_space(
@@ -217,11 +235,10 @@ def read_state_space(path: Path) -> StateSpaceModel:
     """
     try:
         values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
-        names = {name: tuple(str(_text(text)) for text in np.ravel(values[name])) for name in NAMES}
-        sizes = [len(names[name]) for name in ("state_names", "input_names", "output_names")]
-        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in _shapes(*sizes).items()}
+        names = {name: tuple(str(text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
+        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
-    except (KeyError, TypeError, ValueError) as error:
+    except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -270,10 +287,6 @@ def save_reduced_model(model: ReducedModel, path: Path) -> None:
         np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
 
 
-def _shapes(states: int, inputs: int, outputs: int) -> dict[str, tuple[int, int]]:
-    return {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
-
-
 def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
@@ -306,6 +319,6 @@ def _suffix(path: Path) -> str:
     return path.suffix
 
 
-def _text(text: object) -> object:
+def text_in(text: object) -> object:
     """Take a text out of the cell that MATLAB files keep it in."""
     return text.item() if isinstance(text, np.ndarray) and text.size else ("" if isinstance(text, np.ndarray) else text)

@@ -63,7 +63,7 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
         yield "update"
         stages.predict(desk, updated, fit, frfs)
         yield "predict"
-        stages.export(desk, updated, fit)
+        stages.export(desk, updated, fit, corrected_by=diagnosis)
         yield "export"
     stages.report(desk)
     yield "report"

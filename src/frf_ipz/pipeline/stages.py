@@ -15,14 +15,17 @@ from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.export import run_tables as tables
+from frf_ipz.export.design_files import save_ensemble, save_weights
 from frf_ipz.export.mode_table import mode_table
-from frf_ipz.export.state_space import save_reduced_model, save_state_space, to_state_space
+from frf_ipz.export.state_space import save_reduced_model, save_state_space, to_ensemble, to_state_space
 from frf_ipz.export.tables import write_table
+from frf_ipz.export.uncertainty import uncertainty_weights
 from frf_ipz.fe.reduction import reduce_model
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.pairing.assignment import pair as pair_roots
+from frf_ipz.pipeline.delays import known_delays
 from frf_ipz.pipeline.sensors import unweighed_sensors
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.rational import without_window
@@ -31,13 +34,14 @@ from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     import pyarrow as pa
 
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.dofs import Dof
+    from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.recordings import Recordings
@@ -45,8 +49,12 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.desk import Desk
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.progress import Progress
+    from frf_ipz.runs.folder import Writers
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
+
+
+WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
 
 
 def ingest(desk: Desk) -> Recordings:
@@ -307,8 +315,10 @@ def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet
     )
 
 
-def export(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit) -> StateSpaceModel:
-    """Turn the updated model into a state space.
+def export(
+    desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+) -> StateSpaceModel:
+    """Turn the updated model into a state space; and, for robust design, into members of its posterior.
 
     Parameters
     ----------
@@ -318,6 +328,8 @@ def export(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit) -> StateSpace
         The updated model.
     modal_fit : ModalFit
         Names the sensors and actuators.
+    corrected_by : Diagnosis, optional
+        What the FRFs were corrected by, if they were: a delay belongs to the plant.
 
     Returns
     -------
@@ -326,11 +338,15 @@ def export(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit) -> StateSpace
     """
     job = desk.job
     options = job.pipeline.file.export
+    delays = known_delays(modal_fit, corrected_by)
     return desk.stage(
         "export",
-        {"options": asdict(options), "points": repr(job.points), "after": desk.after("update")},
-        lambda _: to_state_space(updated, modal_fit.labels, job.points, options),
-        lambda model: {name: partial(save_state_space, model) for name in ("statespace.json", "statespace.mat")},
+        {"options": asdict(options), "points": repr(job.points), "after": desk.after("update"), "delays": delays},
+        lambda _: to_state_space(updated, modal_fit.labels, job.points, options, delays_s=delays),
+        lambda model: {
+            **{name: partial(save_state_space, model) for name in ("statespace.json", "statespace.mat")},
+            **(_design_files(updated, modal_fit, job.points, options, delays) if options.ensemble else {}),
+        },
     )
 
 
@@ -345,6 +361,18 @@ def report(desk: Desk) -> None:
     key = desk.sign("report", {"after": sorted(desk.keys.values())})
     tell = desk.listener("report")
     desk.folder.page("report", key, {"report.html": lambda path: write_report(desk.folder, path, progress=tell)})
+
+
+def _design_files(
+    updated: UpdatedModel, modal_fit: ModalFit, points: Sequence[Dof], options: ExportOptions, delays: dict[str, float]
+) -> Writers:
+    """Members of the posterior, and the bound of what they do to each output."""
+    members = to_ensemble(updated, modal_fit.labels, points, options, delays_s=delays)
+    weights = uncertainty_weights(updated, modal_fit.labels, points, np.geomspace(*modal_fit.band_hz, WEIGHT_LINES))
+    return {
+        "statespace_ensemble.mat": partial(save_ensemble, members),
+        "uncertainty.json": partial(save_weights, weights),
+    }
 
 
 def _once(dofs: Iterable[Dof]) -> tuple[Dof, ...]:

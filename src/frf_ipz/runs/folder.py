@@ -42,12 +42,17 @@ class RunFolder:
         Where files are written until the command has succeeded.
     record : dict
         What `run.json` says.
+    computed : list of str
+        Stages that the command has computed.
+    abandoned : set of str
+        Files that these stages had written before.
     """
 
     path: Path
     staging: Path
     record: dict[str, Any]
     computed: list[str] = field(default_factory=list)
+    abandoned: set[str] = field(default_factory=set)
 
     def stage(self, name: str, key: str, compute: Callable[[], Result], files: Callable[[Result], Writers]) -> Result:
         """Give the result of a stage: the one in the folder where the key agrees, else a new one.
@@ -79,8 +84,9 @@ class RunFolder:
                 return result
         started = time.perf_counter()
         result = compute()
-        self._write({f"{STAGES}/{name}.npz": lambda path: save_result(result, path), **files(result)})
-        self._note(name, key, started)
+        named = files(result)
+        self._write({f"{STAGES}/{name}.npz": lambda path: save_result(result, path), **named})
+        self._note(name, key, started, named)
         return result
 
     def page(self, name: str, key: str, files: Writers) -> None:
@@ -99,7 +105,7 @@ class RunFolder:
             return
         started = time.perf_counter()
         self._write(files)
-        self._note(name, key, started)
+        self._note(name, key, started, files)
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
@@ -195,17 +201,23 @@ class RunFolder:
         return load_result(place) if place.is_file() else None
 
     def _is_current(self, name: str, key: str) -> bool:
-        return bool(self.record.get("stages", {}).get(name, {}).get("key") == key)
+        stage = self.record.get("stages", {}).get(name, {})
+        return bool(stage.get("key") == key and all(self._has(file) for file in stage.get("files", [])))
+
+    def _has(self, file: str) -> bool:
+        return any((folder / file).is_file() for folder in (self.staging, self.path))
 
     def _write(self, files: Writers) -> None:
         for file, write in files.items():
             with self.writing(file) as target:
                 write(target)
 
-    def _note(self, name: str, key: str, started: float) -> None:
+    def _note(self, name: str, key: str, started: float, files: Iterable[str]) -> None:
         self.computed.append(name)
         seconds = round(time.perf_counter() - started, 3)
-        self.record.setdefault("stages", {})[name] = {"key": key, "seconds": seconds}
+        stages = self.record.setdefault("stages", {})
+        self.abandoned.update(stages.get(name, {}).get("files", []))
+        stages[name] = {"key": key, "seconds": seconds, "files": sorted(files)}
 
     def commit(self) -> None:
         """Move everything that was written into place, `run.json` last.
@@ -228,6 +240,9 @@ class RunFolder:
                 file.replace(target)
             except OSError as error:
                 raise _cannot_write(target, error) from None
+        written = {file for stage in self.record.get("stages", {}).values() for file in stage.get("files", [])}
+        for name in self.abandoned - written:  # a file that its stage no longer writes would tell of an older result
+            (self.path / Path(name).name).unlink(missing_ok=True)
 
 
 @contextmanager

@@ -234,6 +234,25 @@ def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
     assert np.isfinite(model_frfs(with_change(model, change), labels(), s)).all()
 
 
+def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_path):
+    model = beam(tmp_path)
+    specimen = specimen_of(model, labels())
+    effects = shipped_effects()
+    resonator_, joint = (
+        effects[name].build(specimen, Place(key=key))(np.array(values))
+        for name, key, values in (
+            ("attached_resonator", (12, "z"), [0.02, 120.0, 0.05]),
+            ("viscoelastic_joint", ("node", 16, "z"), [2e3, 2e-3]),
+        )
+    )
+    one_by_one = with_change(with_change(model, resonator_), joint)
+    together = with_change(model, resonator_ + joint)
+    assert len(together.all_dofs) == len(model.all_dofs) + 2 == len(set(together.all_dofs))
+    found, expected = model_frfs(together, labels(), S), model_frfs(one_by_one, labels(), S)
+    assert_allclose(found, expected, rtol=EXACT)
+    assert not np.allclose(found, model_frfs(with_change(model, resonator_), labels(), S), rtol=LOSSES)
+
+
 def test_derivatives_by_what_cannot_be_known(tmp_path):
     model = beam(tmp_path, right="pinned")
     specimen = specimen_of(model, labels(("9:+z",)))

@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import control
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from scipy.io import loadmat
 
-from chains import chain, label
+from chains import chain, label, updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.options import ExportOptions
@@ -26,7 +25,6 @@ from frf_ipz.export.state_space import (
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of
-from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 SAME = 1e-10  # of the largest value: both sides solve the same equations
 S = 2j * np.pi * np.linspace(1.0, 120.0, 60)
@@ -36,20 +34,6 @@ LABELS = (
     label(2, -3, FrfQuantity.ACCELERANCE, output_channel="acc", input_channel="hammer"),
 )
 POINT = Dof(99, "x")
-
-
-def updated(model, ensemble=()):
-    order = len(model.dofs)
-    return UpdatedModel(
-        model=model,
-        nominal=model,
-        method="test",
-        status=UpdateStatus.CONVERGED,
-        history=pd.DataFrame(),
-        before=np.zeros(0, complex),
-        after=np.zeros(0, complex),
-        ensemble=np.array(ensemble).reshape(-1, 3, order, order),
-    )
 
 
 def wanted(model, space, quantities):
@@ -241,8 +225,10 @@ def test_other_endings_and_other_files_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.json or \.mat"):
         save_state_space(space, tmp_path / "statespace.csv")
     (tmp_path / "other.json").write_text('{"A": [[1.0]]}', encoding="utf-8")
-    with pytest.raises(FileFormatError, match="no state space written by frf_ipz"):
-        read_state_space(tmp_path / "other.json")
+    (tmp_path / "other.mat").write_text("{}", encoding="utf-8")
+    for name in ("other.json", "other.mat"):
+        with pytest.raises(FileFormatError, match="no state space written by frf_ipz"):
+            read_state_space(tmp_path / name)
 
 
 def test_the_reduced_model_is_written_with_its_dofs(tmp_path):

@@ -1,37 +1,25 @@
 """The uncertainty weight lies above the posterior, is stable and stays close."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from chains import chain, label
+from chains import chain, label, updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.export.uncertainty import uncertainty_weights
-from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 LINES = np.linspace(2.0, 120.0, 300)
 LABELS = (label(2, 1), label(2, 3))
 
 
-def updated(factors):
+def spread(factors):
     model = chain(damping=0.05, between=True)
-    members = np.array([(model.mass, model.damping, factor * model.stiffness) for factor in factors])
-    return UpdatedModel(
-        model=model,
-        nominal=model,
-        method="test",
-        status=UpdateStatus.CONVERGED,
-        history=pd.DataFrame(),
-        before=np.zeros(0, complex),
-        after=np.zeros(0, complex),
-        ensemble=members.reshape(-1, 3, 5, 5),
-    )
+    return updated(model, [(model.mass, model.damping, factor * model.stiffness) for factor in factors])
 
 
 @pytest.fixture(scope="module")
 def weights():
-    return uncertainty_weights(updated(np.linspace(0.97, 1.03, 30)), LABELS, (Dof(99, "x"),), LINES)
+    return uncertainty_weights(spread(np.linspace(0.97, 1.03, 30)), LABELS, (Dof(99, "x"),), LINES)
 
 
 def test_the_weight_bounds_the_members_and_stays_close(weights):
@@ -51,10 +39,10 @@ def test_it_is_stable_and_so_is_its_inverse(weights):
 
 def test_the_error_is_that_of_the_row_over_all_inputs():
     """Static: every member is softer or stiffer by its factor, so the error is |1 / factor - 1|."""
-    found = uncertainty_weights(updated([0.8] * 10), LABELS, (), np.array([1e-3, 2e-3, 3e-3]))
+    found = uncertainty_weights(spread([0.8] * 10), LABELS, (), np.array([1e-3, 2e-3, 3e-3]))
     np.testing.assert_allclose(found.relative_error, 0.25, rtol=1e-3)
 
 
 def test_without_an_ensemble_nothing_is_known():
     with pytest.raises(InputError, match="minimal-change"):
-        uncertainty_weights(updated([]), LABELS, (), LINES)
+        uncertainty_weights(spread([]), LABELS, (), LINES)

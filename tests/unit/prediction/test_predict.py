@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chains import chain, label
+from chains import updated as as_updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.prediction.advice import WIDE_DB, wide_stretches
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 from updating_study import set_up, study
 
 LINES = np.linspace(3.0, 110.0, 400)
@@ -23,17 +23,7 @@ POINTS = (Dof(5, "x", -1), Dof(99, "x"))
 
 
 def updated(model, members=()):
-    order = len(model.dofs)
-    return UpdatedModel(
-        model=model,
-        nominal=replace(model, stiffness=0.9 * model.stiffness),
-        method="test",
-        status=UpdateStatus.CONVERGED,
-        history=pd.DataFrame(),
-        before=np.zeros(0, complex),
-        after=np.zeros(0, complex),
-        ensemble=np.array(members).reshape(-1, 3, order, order),
-    )
+    return replace(as_updated(model, members), nominal=replace(model, stiffness=0.9 * model.stiffness))
 
 
 def spread(model, size, count=100, *, seed=0):

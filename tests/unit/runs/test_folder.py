@@ -41,6 +41,29 @@ def test_a_damaged_result_is_computed_again(tmp_path):
         assert stage(folder, "a", 2) == 2
 
 
+def test_a_file_that_was_deleted_is_written_again(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    (tmp_path / "fit.txt").unlink()
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    assert (tmp_path / "fit.txt").read_text() == "1"
+
+
+def test_a_file_that_its_stage_no_longer_writes_goes_and_one_of_another_stage_stays(tmp_path):
+    both = {"fit.txt": write_text("1"), "more.txt": write_text("2"), "shared.txt": write_text("3")}
+    with open_run(tmp_path) as folder:
+        folder.stage("fit", "a", lambda: 1, lambda _: both)
+        folder.stage("pair", "a", lambda: 1, lambda _: {"shared.txt": write_text("4")})
+    (tmp_path / "own.txt").write_text("the user's")
+    with open_run(tmp_path) as folder:
+        stage(folder, "b", 2)
+        assert (tmp_path / "more.txt").exists()
+    assert not (tmp_path / "more.txt").exists()
+    assert (tmp_path / "shared.txt").read_text() == "4"
+    assert (tmp_path / "own.txt").exists()
+
+
 def test_a_run_that_fails_leaves_what_was_there(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)

@@ -1,0 +1,88 @@
+"""Each stage alone on what a run left: it computes what is missing, re-uses the rest, and leaves its files."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from frf_ipz.cli import main as command
+from frf_ipz.export.design_files import load_ensemble, read_weights
+from frf_ipz.export.state_space import load_state_space
+from small_campaign import write_campaign
+
+FILES = {
+    "ingest": {"frf.parquet", "blows.parquet"},
+    "fit": {"poles.parquet", "zeros.parquet", "fit.parquet", "modes.parquet"},
+    "pair": {"pairs.parquet"},
+    "update": {"parameters.parquet", "updated_model.npz"},
+    "predict": {"poi_frf.parquet"},
+    "export": {"statespace.json", "statespace.mat"},
+    "report": {"report.html"},
+}
+DELAY = 2e-4  # s
+LATE = 5e-5  # s: of the delay that is found, half a sample of the recordings
+
+
+@pytest.fixture(scope="module")
+def pipeline(tmp_path_factory):
+    return write_campaign(tmp_path_factory.mktemp("campaign"))
+
+
+def stage(monkeypatch, name, pipeline, out):
+    monkeypatch.setattr(sys, "argv", ["frf-ipz", name, str(pipeline), "--out", str(out)])
+    with pytest.raises(SystemExit) as stop:
+        command.main()
+    assert not stop.value.code
+
+
+def keys(out):
+    return {name: stage["key"] for name, stage in json.loads((out / "run.json").read_text())["stages"].items()}
+
+
+def test_each_stage_leaves_its_files_and_keeps_those_before_it(pipeline, tmp_path, monkeypatch):
+    out, there, seconds = tmp_path / "out", set(), {}
+    for name, files in FILES.items():
+        stage(monkeypatch, name, pipeline, out)
+        there |= files
+        assert there <= {path.name for path in out.iterdir()}
+        assert not {path.name for path in out.iterdir()} & {file for later in FILES.values() for file in later} - there
+        record = json.loads((out / "run.json").read_text())["stages"]
+        assert all(record[kept]["seconds"] == taken for kept, taken in seconds.items())  # not computed again
+        seconds = {kept: entry["seconds"] for kept, entry in record.items()}
+
+
+def test_the_ensemble_is_written_when_it_is_asked_for_and_goes_with_its_option(pipeline, tmp_path, monkeypatch):
+    out, text = tmp_path / "out", pipeline.read_text()
+    try:
+        pipeline.write_text(text + "[export]\nensemble = 4\n")
+        stage(monkeypatch, "export", pipeline, out)
+        members, weights = load_ensemble(out / "statespace_ensemble.mat"), read_weights(out / "uncertainty.json")
+        model = load_state_space(out / "statespace.mat")
+        assert len(members) == 4
+        s = 2j * np.pi * weights.frequency_hz
+        spread = np.abs(np.array([member(s)[0, 0] for member in members]) / model(s)[0, 0] - 1)
+        assert 0 < np.median(spread.max(0)) < 10 * np.median(weights.relative_error[:, 0])
+        before = keys(out)
+        pipeline.write_text(text)
+        stage(monkeypatch, "export", pipeline, out)
+        assert not (out / "statespace_ensemble.mat").exists()
+        assert not (out / "uncertainty.json").exists()
+        assert {name for name, key in keys(out).items() if before[name] != key} == {"export"}
+    finally:
+        pipeline.write_text(text)
+
+
+def test_a_delay_that_was_fitted_is_in_the_state_space_when_asked_for(tmp_path, monkeypatch):
+    pipeline = write_campaign(tmp_path)
+    for path in (tmp_path / "hits").glob("*.csv"):
+        time, force, acc = np.loadtxt(path, delimiter=",", skiprows=1).T
+        omega = 2j * np.pi * np.fft.rfftfreq(len(acc), time[1])
+        acc = np.fft.irfft(np.fft.rfft(acc) * np.exp(-omega * DELAY), len(acc))
+        np.savetxt(path, np.column_stack([time, force, acc]), delimiter=",", header="time,force,acc", comments="")
+    text = pipeline.read_text().replace("[fit]", "[fit]\ndelay = true")
+    pipeline.write_text(text + "[export]\npade_order = 1\n")
+    stage(monkeypatch, "export", pipeline, tmp_path / "out")
+    model = load_state_space(tmp_path / "out" / "statespace.json")
+    row = model.state_labels.index("delay of 21:+z 1")
+    assert abs(-2 / model.A[row, row] - DELAY) < LATE
