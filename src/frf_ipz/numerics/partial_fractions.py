@@ -11,6 +11,8 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
+LINES_AT_ONCE = 512  # whose intermediate results stay in the cache
+
 
 def stacked(values: ComplexArray) -> FloatArray:
     """Stack real parts above imaginary parts.
@@ -62,16 +64,11 @@ def pair_columns(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray
     (2 n_lines, 2 n_poles) array
         First all columns of real parts, then all of imaginary parts.
     """
-    upper, lower = 1.0 / (s[:, None] - p), 1.0 / (s[:, None] - p.conj())
-    if power > 1:
-        upper, lower = upper**power, lower**power
-    n_lines, n_poles = upper.shape
-    columns = np.empty((2, n_lines, 2, n_poles))
-    np.add(upper.real, lower.real, out=columns[0, :, 0])
-    np.add(upper.imag, lower.imag, out=columns[1, :, 0])
-    np.subtract(lower.imag, upper.imag, out=columns[0, :, 1])
-    np.subtract(upper.real, lower.real, out=columns[1, :, 1])
-    return columns.reshape(2 * n_lines, 2 * n_poles)
+    rows = np.empty((2, len(p), 2, len(s)))
+    for first in range(0, len(s), LINES_AT_ONCE):
+        part = slice(first, first + LINES_AT_ONCE)
+        _fill_rows(rows[..., part], s[part], p, power)
+    return rows.reshape(2 * len(p), 2 * len(s)).T
 
 
 def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> ComplexArray:
@@ -92,3 +89,18 @@ def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> Com
         The responses.
     """
     return np.asarray((1.0 / (s[:, None] - p)) @ residues + (1.0 / (s[:, None] - p.conj())) @ residues.conj())
+
+
+def _fill_rows(rows: FloatArray, s: ComplexArray, p: ComplexArray, power: int) -> None:
+    # 1 / (s - p) is (a - i d) / (a^2 + d^2): real numbers, line after line in memory, take a fraction of the time
+    a, d, e = s.real - p.real[:, None], s.imag - p.imag[:, None], s.imag + p.imag[:, None]
+    upper, lower = 1.0 / (a * a + d * d), 1.0 / (a * a + e * e)
+    if power == 1:
+        upper_real, upper_imag, lower_real, lower_imag = a * upper, d * upper, a * lower, e * lower
+    else:
+        upper_real, lower_real = (a - d) * (a + d) * upper * upper, (a - e) * (a + e) * lower * lower
+        upper_imag, lower_imag = 2 * a * d * upper * upper, 2 * a * e * lower * lower
+    np.add(upper_real, lower_real, out=rows[0, :, 0])
+    np.negative(upper_imag + lower_imag, out=rows[0, :, 1])
+    np.subtract(upper_imag, lower_imag, out=rows[1, :, 0])
+    np.subtract(upper_real, lower_real, out=rows[1, :, 1])

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.identification.likelihood.compression import Compressed, model_columns
 from frf_ipz.identification.likelihood.refinement import Refined
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
+from frf_ipz.numerics.partial_fractions import pair_columns, unstacked
 
 LINES_AT_ONCE = 64
 NEAR_POLES = 6  # poles whose errors a stretch of lines shows: those far away add nothing that could be seen
@@ -36,12 +36,15 @@ class FitErrors:
         A root of the covariance of the poles: all real parts, then all imaginary parts, rad/s.
     level : float
         Factor on the standard deviation of the coefficients, where neighbouring lines err alike.
+    residues : (n_frfs, n_poles) complex array
+        Of receptances, times the system's `scale`.
     """
 
     system: Compressed
     terms: SmoothTerms
     pole_root: FloatArray
     level: float
+    residues: ComplexArray
 
     def linear(self, rows: ComplexArray, slopes: ComplexArray, frf: int) -> tuple[ComplexArray, ComplexArray]:
         """Errors of numbers that are linear in coefficients and slopes of an FRF.
@@ -81,7 +84,7 @@ class FitErrors:
         (2 n_poles, 2 n_poles) array
             Response to the white errors behind the poles.
         """
-        residues = self.system.scaled_residues()[frf]
+        residues = self.residues[frf]
         real, imag = np.split(self.pole_root, 2)
         a, b = residues.real[:, None], residues.imag[:, None]
         return np.concatenate([a * real - b * imag, b * real + a * imag])
@@ -110,6 +113,7 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
         terms=terms,
         pole_root=root * np.sqrt(np.tile(level, 2))[:, None],
         level=float(np.sqrt(np.median(level))),
+        residues=fit.system.scaled_residues(),
     )
 
 
@@ -157,23 +161,30 @@ def value_std(errors: FitErrors, s: ComplexArray) -> FloatArray:
     n, n_frfs = system.n_linear, len(system.z)
     roots = np.stack([errors.slope_errors(frf) for frf in range(n_frfs)])
     of_slopes = roots @ roots.transpose(0, 2, 1)
+    columns = model_columns(s, system.poles, errors.terms, real_modes=system.real_modes, with_slopes=True)
     squares = np.empty((len(s), n_frfs))
-    for first in range(0, len(s), LINES_AT_ONCE):
-        part = slice(first, first + LINES_AT_ONCE)
-        rows, slopes = model_rows(system, errors.terms, s[part])
-        near = _near(system.poles, s[part])
-        for number, U in enumerate(system.U):
-            frfs = np.arange(n_frfs) if len(system.U) == 1 else np.array([number])
-            own = linalg.solve_triangular(U[:n, :n], rows.T, trans="T", check_finite=False).T
-            common = (slopes - own @ U[:n, n:])[:, near]
-            parts = stacked(common)
-            moved = np.einsum("flk,lk->lf", parts @ of_slopes[np.ix_(frfs, near, near)], parts)
-            squares[part, frfs] = errors.level**2 * np.sum(np.abs(own) ** 2, axis=1)[:, None]
-            squares[part, frfs] += unstacked(moved).real + unstacked(moved).imag
+    for number, U in enumerate(system.U):
+        frfs = np.arange(n_frfs) if len(system.U) == 1 else np.array([number])
+        own = linalg.solve_triangular(U[:n, :n], columns[:, :n].T, trans="T", check_finite=False)
+        slopes = (columns[:, n:] - own.T @ U[:n, n:]).reshape(2, len(s), -1)
+        squares[:, frfs] = _moved(slopes, of_slopes[frfs], system.poles, s)
+        squares[:, frfs] += errors.level**2 * np.einsum("nkl,nkl->l", *2 * [own.reshape(n, 2, -1)])[:, None]
     return np.asarray(np.sqrt(squares) / system.scale)
 
 
-def _near(poles: ComplexArray, s: ComplexArray) -> FloatArray:
+def _moved(slopes: FloatArray, of_slopes: FloatArray, poles: ComplexArray, s: ComplexArray) -> FloatArray:
+    """Variance of responses by the errors of the poles near them, (n_lines, n_frfs)."""
+    squares = np.empty((len(s), len(of_slopes)))
+    for first in range(0, len(s), LINES_AT_ONCE):
+        part = slice(first, first + LINES_AT_ONCE)
+        near = _near(poles, s[part])
+        rows = slopes[:, part, near]
+        moved = rows @ of_slopes[:, near[:, None], near][:, None]
+        squares[part] = np.einsum("fpln,pln->lf", moved, rows)
+    return squares
+
+
+def _near(poles: ComplexArray, s: ComplexArray) -> IntArray:
     middle = s[len(s) // 2]
     closest = np.sort(np.argsort(np.abs(poles - middle))[:NEAR_POLES])
     return np.concatenate([closest, closest + len(poles)])

@@ -20,8 +20,8 @@ BESIDE = (0.9, 1.1)  # of the band's edges: zeros beyond are not listed
 POLISHING = 2  # Newton steps
 MIRRORED = 0.5  # of a zero's distance from the axis: its mirror image must lie that close to make a quadruple
 ON_AXIS = 1e-9  # of the modulus: a zero with a smaller imaginary part is real
-ROUGH = 0.05  # relative standard deviation above which a zero is no number
-APART = 3.0  # standard deviations that must lie between a zero and the next root of its FRF
+ROUGH = 0.03  # relative standard deviation above which a zero is no number: it lies far from all lines
+APART = 5.0  # standard deviations that must lie between a zero and the next root of its FRF, for errors to be linear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,16 +60,25 @@ def find_zeros(errors: FitErrors, s: ComplexArray) -> FoundZeros:
     """
     system, terms = errors.system, errors.terms
     band = float(s.imag[0]), float(s.imag[-1])
-    candidates = _eigenvalues(system, terms)
     coefficients = system.coefficients()
-    parts = [_of_one(errors, candidates[frf], coefficients[frf], frf, s, band) for frf in range(len(coefficients))]
-    frfs = [np.full(len(part.values), frf) for frf, part in enumerate(parts)]
+    candidates, frf = _near_band(_eigenvalues(system, terms), coefficients, band)
+    candidates = _polished(errors, candidates, coefficients[frf])
+    named = [_kinds(np.unique(np.round(candidates[frf == number], 9))) for number in range(len(coefficients))]
+    values = np.concatenate([one for one, _ in named])
+    frf = np.repeat(np.arange(len(named)), [len(one) for one, _ in named])
+    rows, slopes = model_rows(system, terms, values)
+    change = -1 / _slope(errors, values, slopes, coefficients[frf])[:, None]
+    rows, slopes = rows * change, slopes * change
+    parts = []
+    for number, (mine, kinds) in enumerate(named):
+        own, common = errors.linear(rows[frf == number], slopes[frf == number], number)
+        parts.append(_of_one(errors, mine, kinds, own, common, s, band))
     reasons = tuple(reason for part in parts for reason in part.reasons)
     return FoundZeros(
         zeros=ZeroSet(
-            values=np.concatenate([part.values for part in parts]),
-            frf=np.concatenate(frfs).astype(np.int64),
-            kind=tuple(kind for part in parts for kind in part.kinds),
+            values=values,
+            frf=frf.astype(np.int64),
+            kind=tuple(kind for _, kinds in named for kind in kinds),
             identifiable=np.array([not reason for reason in reasons], bool),
             reason=reasons,
         ),
@@ -80,8 +89,6 @@ def find_zeros(errors: FitErrors, s: ComplexArray) -> FoundZeros:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _OfOne:
-    values: ComplexArray
-    kinds: tuple[str, ...]
     reasons: tuple[str, ...]
     own: FloatArray
     common: FloatArray
@@ -90,26 +97,28 @@ class _OfOne:
 def _of_one(
     errors: FitErrors,
     values: ComplexArray,
-    coefficients: FloatArray,
-    frf: int,
+    kinds: tuple[str, ...],
+    own: ComplexArray,
+    common: ComplexArray,
     s: ComplexArray,
     band: tuple[float, float],
 ) -> _OfOne:
-    if not coefficients.any():  # a channel without any signal has no zeros
-        values = values[:0]
-    near = (values.imag > -ON_AXIS * abs(s[-1])) & (np.abs(values) > BESIDE[0] * band[0])
-    values = _polished(errors, values[near & (np.abs(values) < BESIDE[1] * band[1])], coefficients)
-    values = np.unique(np.round(values, 9))
-    values, kinds = _kinds(values[np.argsort(np.abs(values))])
-    rows, slopes = model_rows(errors.system, errors.terms, values)
-    change = -1 / _slope(errors, values, slopes, coefficients)[:, None]
-    own, common = errors.linear(rows * change, slopes * change, frf)
     own_parts, common_parts = _in_turn(own), _in_turn(common)
     is_real = np.repeat(np.array(kinds, object) == "real", 2) & (np.arange(2 * len(values)) % 2 == 1)
     own_parts[is_real], common_parts[is_real] = 0.0, 0.0
     std = np.sqrt(np.sum(np.abs(own) ** 2, axis=1) + np.sum(np.abs(common) ** 2, axis=1))
     reasons = _reasons(values, std, errors.system.poles, s, band)
-    return _OfOne(values=values, kinds=kinds, reasons=reasons, own=own_parts, common=common_parts)
+    return _OfOne(reasons=reasons, own=own_parts, common=common_parts)
+
+
+def _near_band(
+    eigenvalues: ComplexArray, coefficients: FloatArray, band: tuple[float, float]
+) -> tuple[ComplexArray, IntArray]:
+    """Choose the eigenvalues in the band and beside it, and say which FRF each belongs to."""
+    modulus = np.abs(eigenvalues)
+    near = (eigenvalues.imag > -ON_AXIS * band[1]) & (modulus > BESIDE[0] * band[0]) & (modulus < BESIDE[1] * band[1])
+    near &= coefficients.any(axis=1)[:, None]  # a channel without any signal has no zeros
+    return eigenvalues[near], np.nonzero(near)[0]
 
 
 def _eigenvalues(system: Compressed, terms: SmoothTerms) -> ComplexArray:
@@ -141,7 +150,7 @@ def _fixed_residues(coefficients: FloatArray, terms: SmoothTerms) -> ComplexArra
 def _polished(errors: FitErrors, values: ComplexArray, coefficients: FloatArray) -> ComplexArray:
     for _ in range(POLISHING):
         rows, slopes = model_rows(errors.system, errors.terms, values)
-        step = rows @ coefficients / _slope(errors, values, slopes, coefficients)
+        step = np.einsum("ij,ij->i", rows, coefficients) / _slope(errors, values, slopes, coefficients)
         values = values - np.where(np.abs(step) < 0.01 * np.abs(values), step, 0.0)
     real = np.abs(values.imag) < ON_AXIS * np.abs(values)
     return np.asarray(np.where(real, values.real, values.real + 1j * np.abs(values.imag)))
@@ -154,23 +163,19 @@ def _slope(errors: FitErrors, values: ComplexArray, slopes: ComplexArray, coeffi
     powers = [power * scaled ** (power - 1) / terms.scale_rad_s for power in terms.powers]
     fixed = [-unstacked(pair_columns(values, pole[None], power=2)) for pole in terms.poles]
     pairs = -slopes[:, system.n_poles :] if system.real_modes else -slopes
-    return np.asarray(np.concatenate([np.stack(powers, axis=1), *fixed, pairs], axis=1) @ coefficients)
+    rows = np.concatenate([np.stack(powers, axis=1), *fixed, pairs], axis=1)
+    return np.asarray(np.einsum("ij,ij->i", rows, coefficients))
 
 
 def _kinds(values: ComplexArray) -> tuple[ComplexArray, tuple[str, ...]]:
-    """Name the zeros; of a quadruple one stands for all, of a real zero each for itself."""
-    kinds, kept = [], []
-    for value in values:
-        mirrored = np.abs(values + np.conj(value)).min() < MIRRORED * abs(value.real)
-        if value.imag == 0:
-            kind = "real"
-        elif mirrored and value.real > 0:
-            continue
-        else:
-            kind = "quadruple" if mirrored else "complex"
-        kinds.append(kind)
-        kept.append(value)
-    return np.array(kept, complex), tuple(kinds)
+    """Name the zeros, by modulus; of a quadruple one stands for all, of a real zero each for itself."""
+    values = values[np.argsort(np.abs(values))]
+    image = np.abs(values[:, None] + values.conj()).min(axis=1, initial=np.inf)
+    mirrored = image < MIRRORED * np.abs(values.real)
+    real = values.imag == 0
+    kept = real | ~mirrored | (values.real <= 0)
+    kinds = np.where(real, "real", np.where(mirrored, "quadruple", "complex"))
+    return values[kept], tuple(kinds[kept].tolist())
 
 
 def _in_turn(parts: ComplexArray) -> FloatArray:
