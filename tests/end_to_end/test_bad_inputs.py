@@ -77,6 +77,13 @@ def without_force(folder):
         write_csv(path, np.arange(samples) / 4096, *(1e-3 * rng.standard_normal((2, samples))))
 
 
+def cut_off(folder):
+    """Cut the top of every pulse: no blow is left that can be used."""
+    for path in (folder / "hits").glob("*.csv"):
+        time, force, acc = np.loadtxt(path, delimiter=",", skiprows=1).T
+        write_csv(path, time, np.minimum(force, 0.6 * force.max()), acc)
+
+
 def matrices(folder, mass=None, stiffness=None, dofs="node,direction,x_m,y_m,z_m\n15,z,0.35,0,0\n21,z,0.5,0,0\n"):
     edit(folder, "pipeline.toml", 'points = ["11:+z"]', "points = []")
     (folder / "model.toml").write_text(MATRICES)
@@ -121,6 +128,19 @@ CASES = {
     "time goes back": (lambda f: edit_blow(f, with_field(50, 0, "0.0")), ["blow_1.csv"]),
     "unequal lengths": (lambda f: edit_blow(f, lambda lines: lines[: len(lines) // 2]), ["blow_1.csv", "samples"]),
     "no blow found": (without_force, ["blow"]),
+    "all blows dropped": (
+        lambda f: edit(
+            f,
+            "pipeline.toml",
+            "[fit]",
+            '[ingest]\ndrop = ["hits/blow_1.csv", "hits/blow_2.csv", "hits/blow_3.csv"]\n[fit]',
+        ),
+        ["[ingest] drop", "15:+z", "keep one"],
+    ),
+    "no mode in the band": (
+        lambda f: edit(f, "pipeline.toml", "[10.0, 600.0]", "[130.0, 250.0]"),
+        ["no mode", "248 Hz", "band_hz"],
+    ),
     "mass singular": (lambda f: matrices(f, mass=np.array([[1.0, 1.0], [1.0, 1.0]])), ["M.mtx", "definite"]),
     "mass indefinite": (lambda f: matrices(f, mass=np.diag([1.0, -1.0])), ["M.mtx", "21:z", "mass -1"]),
     "stiffness indefinite": (lambda f: matrices(f, stiffness=np.diag([1e6, -1e6])), ["K.mtx", "definite"]),
@@ -155,6 +175,18 @@ def test_what_is_wrong_is_said_in_one_line(case, campaign, monkeypatch, capsys):
     assert lines[0].startswith("frf-ipz: ")
     assert all(word in said for word in words), said
     assert not (campaign / "out").exists()
+
+
+def test_where_all_blows_are_bad_the_least_bad_is_used_and_it_is_said(campaign, monkeypatch, capsys):
+    cut_off(campaign)
+    monkeypatch.setattr(
+        sys, "argv", ["frf-ipz", "ingest", str(campaign / "pipeline.toml"), "--out", str(campaign / "out")]
+    )
+    with pytest.raises(SystemExit) as stop:
+        command.main()
+    said = capsys.readouterr().out
+    assert not stop.value.code
+    assert "used although it is bad (clipping of force): no better blow at 15:+z" in " ".join(said.split())
 
 
 def test_out_that_is_a_file(campaign, monkeypatch, capsys):

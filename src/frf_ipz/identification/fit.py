@@ -150,7 +150,7 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
 def _selected(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
     selected = select_modes(data, poles, terms, options, noise_is_known=bool(lines.known.all()))
-    if not len(selected.fit.poles):
+    if not mode_order(selected.fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
         raise NumericalError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
             "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
