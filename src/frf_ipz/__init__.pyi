@@ -1,11 +1,21 @@
+from .diagnosis.apply import apply_to_frfs as apply_to_frfs
+from .diagnosis.apply import apply_to_model as apply_to_model
+from .diagnosis.diagnose import diagnose as diagnose
+from .diagnosis.observed import observe as observe
+from .diagnosis.options import DiagnoseOptions as DiagnoseOptions
 from .dofs import Dof as Dof
 from .dofs import parse_dof as parse_dof
 from .errors import FrfIpzError as FrfIpzError
 from .errors import InputError as InputError
+from .export.design_files import load_ensemble as load_ensemble
+from .export.design_files import read_weights as read_weights
+from .export.measured_frd import measured_frd as measured_frd
 from .export.options import ExportOptions as ExportOptions
 from .export.state_space import load_state_space as load_state_space
 from .export.state_space import save_state_space as save_state_space
+from .export.state_space import to_ensemble as to_ensemble
 from .export.state_space import to_state_space as to_state_space
+from .export.uncertainty import uncertainty_weights as uncertainty_weights
 from .fe.eigen import solve_modes as solve_modes
 from .fe.model_file import read_model as read_model
 from .fe.options import ReduceOptions as ReduceOptions
@@ -14,6 +24,7 @@ from .fe.response import model_frfs as model_frfs
 from .frf import FrfLabel as FrfLabel
 from .frf import FrfSet as FrfSet
 from .identification.fit import fit_modes as fit_modes
+from .identification.fit import fit_residues as fit_residues
 from .identification.options import FitOptions as FitOptions
 from .ingest.estimate import estimate_frfs as estimate_frfs
 from .ingest.options import IngestOptions as IngestOptions
@@ -28,6 +39,7 @@ from .quantities import FrfQuantity as FrfQuantity
 from .runs.folder import RunFolder as RunFolder
 from .runs.folder import read_run as read_run
 from .updating.options import UpdateOptions as UpdateOptions
+from .updating.parameters import structural_basis as structural_basis
 from .updating.update import update_model as update_model
 
 __version__: str
