@@ -1,12 +1,11 @@
 """A real browser, and the demo served to it."""
 
 import shutil
-import subprocess
-import sys
 
 import pytest
 
 from demo_case import make_demo
+from served_page import served
 
 HOW = "(Debian: apt-get install chromium chromium-driver; pip install selenium)"
 
@@ -42,7 +41,5 @@ def demo(tmp_path_factory):
 @pytest.fixture(scope="module")
 def address(demo):
     """Address of the page of the demo, served by the command."""
-    command = [sys.executable, "-m", "frf_ipz.cli.main", "show", str(demo / "out"), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        yield server.stdout.readline().strip()
-        server.kill()
+    with served(demo / "out") as found:
+        yield found

@@ -5,9 +5,9 @@ import pytest
 
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.pipeline.run import run_pipeline
+from served_page import PLACE_OF_NODE, Page
 
 pytestmark = pytest.mark.browser
-SOON_S = 120.0  # a run on a busy machine; a page that hangs ends the test
 STRUCK_HZ = 284.95  # the third mode of the demo
 NEAR = 0.02  # relative: a pole within this of a struck one is the struck one
 
@@ -15,13 +15,6 @@ PLACE_OF_POLE = """
 const plot = document.querySelector('#stabilisation .plot');
 const trace = plot.data.find((one) => one.mode === 'markers' && one.name.includes(arguments[1]));
 const k = [...trace.x].findIndex((x) => Math.abs(x / arguments[0] - 1) < 0.01);
-const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
-return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offset + yaxis.d2p(trace.y[k])];
-"""
-PLACE_OF_NODE = """
-const plot = document.querySelector('#structure .plot');
-const trace = plot.data.find((one) => one.name === arguments[0]);
-const k = [...trace.text].indexOf(arguments[1]);
 const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
 return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offset + yaxis.d2p(trace.y[k])];
 """
@@ -34,72 +27,6 @@ return [...x, box.top + yaxis._offset + yaxis._length / 2];
 
 ASKED = "return performance.getEntriesByType('resource').filter((one) => one.name.includes('/zoom?')).length"
 THEME = "return document.documentElement.dataset.theme"
-
-
-class Page:
-    """The page, as somebody with a mouse has it."""
-
-    def __init__(self, browser, address):
-        self.browser = browser
-        browser.get_log("browser")
-        browser.get(address)
-        self.wait_until(self.is_drawn)
-
-    def wait_until(self, condition):
-        common = pytest.importorskip("selenium.common.exceptions")
-        support = pytest.importorskip("selenium.webdriver.support.ui")
-        ignored = [common.WebDriverException]
-        return support.WebDriverWait(self.browser, SOON_S, ignored_exceptions=ignored).until(lambda _: condition())
-
-    def run(self, script, *arguments):
-        return self.browser.execute_script(script, *arguments)
-
-    def is_drawn(self):
-        return self.run("return document.documentElement.dataset.drawn === 'all' && !!document.body.dataset.stamp")
-
-    def stamp(self):
-        return self.run("return document.body.dataset.stamp")
-
-    def wait_for_results(self, before):
-        self.wait_until(lambda: self.stamp() not in {None, before} and self.is_drawn())
-
-    def show(self, selector):
-        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
-
-    def find(self, selector):
-        return self.browser.find_element("css selector", selector)
-
-    def click(self, selector):
-        self.show(selector)
-        self.find(selector).click()
-
-    def click_at(self, place):
-        self.pointer().move_to_location(*map(int, place)).pointer_down().pointer_up()
-        self.actions.perform()
-
-    def drag(self, places):
-        pointer = self.pointer()
-        pointer.move_to_location(*map(int, places[0])).pointer_down()
-        for place in places[1:]:
-            pointer.move_to_location(*map(int, place))
-        pointer.pointer_up()
-        self.actions.perform()
-
-    def pointer(self):
-        self.actions = pytest.importorskip("selenium.webdriver").ActionChains(self.browser, duration=50)
-        return self.actions.w3c_actions.pointer_action
-
-    def value(self, form, name):
-        return self.run(f"return document.querySelector('{form}').elements.{name}.value")
-
-    def write(self, form, **fields):
-        for name, text in fields.items():
-            field = self.find(f"{form} [name={name}]")
-            field.clear()
-            field.send_keys(text)
-
-    def errors(self):
-        return [entry for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
 @pytest.fixture
@@ -219,14 +146,23 @@ def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
     assert "33:+z" in pq.read_table(demo / "out" / "poi_frf.parquet")["output_dof"].to_pylist()
 
 
-def test_a_sensor_picked_on_the_drawing_can_be_hidden(page):
+def test_nodes_picked_on_the_drawing_are_what_the_model_is_reduced_to(page, demo):
+    before = page.value("#reduce-form", "dofs").split()
     page.show("#structure")
-    page.click_at(page.run(PLACE_OF_NODE, "sensor", "101:+z"))
-    page.wait_until(lambda: page.value("#point-form", "dof") == "101:+z")
-    page.click("#hide-sensor")
-    assert page.find("#shown").text == "0 of 2"
-    page.click("#hide-sensor")
-    assert page.find("#shown").text == "2 of 2"
+    page.click_at(page.run(PLACE_OF_NODE, "kept in the reduction", before[-1]))
+    page.wait_until(lambda: page.value("#point-form", "dof").replace("+", "") == before[-1])
+    page.click("#toggle-dof")
+    page.write("#point-form", dof="25:+z")
+    page.click("#toggle-dof")
+    wanted = [*before[:-1], "25:z"]
+    assert page.value("#reduce-form", "dofs").split() == wanted
+    stamp = page.stamp()
+    page.click("#reduce-form [value=retain]")
+    page.wait_for_results(stamp)
+    assert read_pipeline(demo / "pipeline.toml").file.reduce.dofs == tuple(wanted)
+    run = run_pipeline(demo / "pipeline.toml", demo / "out")
+    assert [dof.name for dof in run.load("reduce").dofs] == wanted
+    assert "reduced to" in page.find("#choices").text
 
 
 def test_what_the_run_refuses_is_said_and_taken_back(page, demo):

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
-    """Serve the page of a run until the user stops it.
+    """Serve the page of a run or a campaign until the user stops it.
 
     Parameters
     ----------
     folder : Path
-        The run's folder.
+        The run's folder, or the campaign's.
     port : int
         Where to listen; 0 for any free port.
     browser : bool, optional
@@ -31,7 +31,7 @@ def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
     Raises
     ------
     InputError
-        If there is no run in the folder, or the port is taken.
+        If there is no run and no pipeline in the folder, or the port is taken.
     """
 
     def announce(address: str) -> None:

@@ -122,13 +122,15 @@ def plot(
 
 @app.command()
 def show(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with the results of a run.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a run, or of a campaign with its pipelines and runs.")
+    ],
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Where to listen; 0 for any free port.")] = 0,
     browser: Annotated[
         bool | None, typer.Option("--browser/--no-browser", help="Open the page; by default on a desktop only.")
     ] = None,
 ) -> None:
-    """Open a local page on a run: look at it, strike and pin poles, drop blows; every change goes to pipeline.toml."""
+    """Open a local page on a run or a campaign: look, run, strike and pin poles; changes go to pipeline.toml."""
     from frf_ipz.cli.local_page import serve_page
 
     serve_page(folder, port=port, browser=browser)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.show.guard import Guard
+from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import render_choices, render_page
 from frf_ipz.show.pictures.shape_drawing import draw_shape
 from frf_ipz.show.pictures.shapes import mode_shape, operating_shape
@@ -23,7 +25,7 @@ from frf_ipz.show.pictures.zoom import zoomed_traces
 from frf_ipz.show.workbench import Workbench
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Sequence
 
     from starlette.requests import Request
     from starlette.types import ASGIApp
@@ -32,13 +34,13 @@ SCRIPT, STYLE = "text/javascript", "text/css"
 REPORT_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
 
-def build_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
-    """Make the web application of a run.
+def build_app(benches: Sequence[Workbench], *, port: int, token: str) -> ASGIApp:
+    """Make the web application of a run, or of a campaign: then its first page lists the runs.
 
     Parameters
     ----------
-    bench : Workbench
-        The run.
+    benches : sequence of Workbench
+        The runs.
     port : int
         Where it will listen: requests that name another one are refused.
     token : str
@@ -49,8 +51,20 @@ def build_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     ASGI application
         For uvicorn.
     """
-    routes = [
-        Route("/", _answering(bench, _page)),
+    if len(benches) == 1:
+        mounts = [Mount(f"/{token}", routes=_routes(benches[0]))]
+    else:
+        mounts = [
+            Mount(f"/{token}/{number}", routes=_routes(bench, home="../"))
+            for number, bench in enumerate(benches, start=1)
+        ]
+        mounts.append(Mount(f"/{token}", routes=_routes_of_list(benches)))
+    return Guard(Starlette(routes=mounts), port=port, token=token)
+
+
+def _routes(bench: Workbench, *, home: str = "") -> list[Route]:
+    return [
+        Route("/", _answering(bench, partial(_page, home=home))),
         Route("/state", _answering(bench, _state)),
         Route("/choices", _answering(bench, _choices)),
         Route("/shape", _answering(bench, _shape)),
@@ -60,17 +74,29 @@ def build_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
         Route("/run/{path:path}", _answering(bench, _file)),
         Route("/plotly.js", _fixed(get_plotlyjs(), SCRIPT)),
         Route("/page.js", _fixed(_asset("report", "page.js"), SCRIPT)),
-        Route("/page.css", _fixed(_asset("report", "page.css"), STYLE)),
         Route("/show.js", _fixed(_asset("show", "show.js"), SCRIPT)),
+        *_styles(),
+    ]
+
+
+def _routes_of_list(benches: Sequence[Workbench]) -> list[Route]:
+    async def page(request: Request) -> Response:
+        del request
+        return HTMLResponse(await run_in_threadpool(render_list, benches))
+
+    return [Route("/", page), *_styles()]
+
+
+def _styles() -> list[Route]:
+    return [
+        Route("/page.css", _fixed(_asset("report", "page.css"), STYLE)),
         Route("/show.css", _fixed(_asset("show", "show.css"), STYLE)),
     ]
-    app = Starlette(routes=[Mount(f"/{token}", routes=routes)])
-    return Guard(app, port=port, token=token)
 
 
-def _page(bench: Workbench, request: Request) -> Response:
+def _page(bench: Workbench, request: Request, *, home: str) -> Response:
     del request
-    return HTMLResponse(render_page(bench))
+    return HTMLResponse(render_page(bench, home=home))
 
 
 def _state(bench: Workbench, request: Request) -> Response:

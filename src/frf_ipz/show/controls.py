@@ -13,8 +13,10 @@ from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.wording import number, percent
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.report.contents import RunContents
@@ -25,7 +27,9 @@ REASON = (
 )
 
 
-def choices_panel(choices: PipelineFile | None, problem: str, text: str, command: str) -> str:
+def choices_panel(
+    choices: PipelineFile | None, problem: str, text: str, command: str, *, is_first: bool = False
+) -> str:
     """List what the user has chosen, each with a button that takes it back.
 
     Parameters
@@ -38,6 +42,8 @@ def choices_panel(choices: PipelineFile | None, problem: str, text: str, command
         The pipeline file.
     command : str
         What repeats this run on the command line.
+    is_first : bool
+        Nothing has been run yet.
 
     Returns
     -------
@@ -52,7 +58,8 @@ def choices_panel(choices: PipelineFile | None, problem: str, text: str, command
     )
     listed = f"<ul>{items}</ul>" if items else "<p>None yet: click in the pictures below, or use the forms.</p>"
     return (
-        f'<h3>Your choices</h3>{listed}<p><button type="button" data-run="1">Run again</button></p>'
+        f'<h3>Your choices</h3>{listed}<p><button type="button" data-run="1">{"Run" if is_first else "Run again"}'
+        "</button></p>"
         f"<details><summary>They stand in pipeline.toml; the command line repeats them</summary>"
         f"<pre>{escape(command)}</pre><pre>{escape(text)}</pre></details>"
     )
@@ -153,13 +160,17 @@ def blow_controls(run: RunContents, choices: PipelineFile) -> str:
     )
 
 
-def point_controls(run: RunContents) -> str:
-    """Form to choose points of interest, and to hide what a sensor measured.
+def dof_controls(run: RunContents, choices: PipelineFile, retained: Sequence[Dof]) -> str:
+    """Forms to choose points of interest, to leave sensors out, and to choose what the model is reduced to.
 
     Parameters
     ----------
     run : RunContents
         What the run holds.
+    choices : PipelineFile
+        What the user has chosen.
+    retained : sequence of Dof
+        What the model is reduced to now; empty where that is not known.
 
     Returns
     -------
@@ -167,12 +178,22 @@ def point_controls(run: RunContents) -> str:
         HTML.
     """
     direction = next((label.output_dof.direction for label in run.labels), "z")
-    return (
-        f'<div class="work"><form id="point-form" data-direction="{direction}"><h3>A point of the structure</h3>'
+    leave_out = '<button name="kind" value="sensor">Leave this sensor out</button>'
+    point = (
+        f'<form id="point-form" data-direction="{direction}"><h3>A point of the structure</h3>'
         "<p>Click one in the drawing, or write its DOF, as in 18:+z.</p>"
         '<p><label>DOF <input name="dof" type="text" size="9" required></label> '
-        '<button name="kind" value="point">Predict the FRFs here</button> '
-        '<button type="button" id="hide-sensor" disabled>Hide this sensor in the pictures</button></p></form></div>'
+    )
+    if run.geometry is None:
+        return f'<div class="work">{point}{leave_out}</p></form></div>'
+    names = escape(" ".join([dof.name for dof in retained] or choices.reduce.dofs), quote=True)
+    return (
+        f'<div class="work">{point}<button name="kind" value="point">Predict the FRFs here</button> {leave_out} '
+        '<button type="button" id="toggle-dof">Keep in the reduction, or not</button></p></form>'
+        '<form id="reduce-form"><h3>DOFs that the model is reduced to</h3><p>Ringed in the drawing once the model has '
+        "been reduced. As many as modes and residual vectors: one more DOF is one more mode.</p>"
+        f'<p><label>DOFs <input name="dofs" type="text" size="44" value="{names}" required></label> '
+        '<button name="kind" value="retain">Reduce to these</button></p></form></div>'
     )
 
 
@@ -239,6 +260,9 @@ def _other_entries(choices: PipelineFile) -> list[tuple[str, dict[str, object]]]
         for word, names in (("kept", choices.ingest.keep), ("dropped", choices.ingest.drop))
         for name in names
     ]
+    entries += [(f"sensor {dof} left out", {"kind": "sensor", "dof": dof, "on": False}) for dof in choices.ingest.hide]
+    if choices.reduce.dofs:
+        entries.append((f"reduced to {' '.join(choices.reduce.dofs)}", {"kind": "retain", "on": False}))
     entries += [
         (f"point of interest {dof}", {"kind": "point", "dof": dof, "on": False}) for dof in choices.predict.points
     ]

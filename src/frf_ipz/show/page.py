@@ -14,11 +14,12 @@ from frf_ipz.show.controls import (
     blow_controls,
     choices_panel,
     command_line,
-    point_controls,
+    dof_controls,
     pole_controls,
     shape_controls,
 )
-from frf_ipz.show.pictures.marks import DIAGRAM, with_choices
+from frf_ipz.show.pictures.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
+from frf_ipz.show.setup import read_setup
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.config import PipelineFile
@@ -41,13 +42,15 @@ SCRIPTS = (
 )
 
 
-def render_page(bench: Workbench) -> str:
+def render_page(bench: Workbench, *, home: str = "") -> str:
     """Write the page.
 
     Parameters
     ----------
     bench : Workbench
         The run.
+    home : str
+        Address of the list of runs, where there are several.
 
     Returns
     -------
@@ -60,20 +63,26 @@ def render_page(bench: Workbench) -> str:
         If a result of the run is damaged.
     """
     stamp = bench.stamp
-    run = bench.contents()
     choices, _ = _choices(bench)
-    sections = page_sections(run, choices)
+    if stamp:
+        run = bench.contents()
+        sections = page_sections(run, choices)
+    else:
+        run, setup = read_setup(bench.pipeline)
+        sections = [setup if choices is None or not setup.blocks else _pickable(setup, run, choices)]
     name = escape(str(run.record.get("name", "")) or "run")
     links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
     body = "\n".join(render_section(section) for section in sections)
+    back = f'<a href="{home}">All runs</a> ' if home else ""
+    report = ' <a href="run/report.html">The report to send on</a>' if stamp else ""
     return "\n".join(
         [
             HEAD.format(name=name, stamp=escape(stamp)),
             f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div>',
             f"{STATUS}</div>",
-            f'<header class="head"><h1>{name}</h1><div id="choices">{render_choices(bench)}</div></header>',
+            f'<header class="head"><h1>{back}{name}</h1><div id="choices">{render_choices(bench)}</div></header>',
             f"<main>{body}</main><footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}, ",
-            f'{escape(str(bench.folder))}. <a href="run/report.html">The report to send on</a></footer>',
+            f"{escape(str(bench.folder))}.{report}</footer>",
             f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
             SCRIPTS,
         ]
@@ -95,7 +104,8 @@ def render_choices(bench: Workbench) -> str:
     """
     choices, problem = _choices(bench)
     text = "" if choices is None else bench.text()
-    return choices_panel(choices, problem, text, command_line(bench.pipeline, bench.folder))
+    command = command_line(bench.pipeline, bench.folder)
+    return choices_panel(choices, problem, text, command, is_first=not bench.stamp)
 
 
 def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Section]:
@@ -133,9 +143,21 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
         blocks.insert(1, Markup(html=pole_controls(run.fit)))
     if section.anchor == "recordings":
         blocks.append(Markup(html=blow_controls(run, choices)))
-    if section.anchor == "overview" and run.geometry is not None:
-        blocks.append(Markup(html=point_controls(run)))
+    if section.anchor == "overview" and (run.geometry is not None or run.labels):
+        return _pickable(section, run, choices)
     return replace(section, blocks=tuple(blocks))
+
+
+def _pickable(section: Section, run: RunContents, choices: PipelineFile) -> Section:
+    """Let the user pick DOFs on the drawing of the structure."""
+    retained = () if run.reduced is None else run.reduced.dofs
+    blocks = [
+        with_retained(block, run.geometry, retained)
+        if isinstance(block, Picture) and block.name == STRUCTURE and run.geometry is not None
+        else block
+        for block in section.blocks
+    ]
+    return replace(section, blocks=(*blocks, Markup(html=dof_controls(run, choices, retained))))
 
 
 def _shapes(run: RunContents) -> Section:

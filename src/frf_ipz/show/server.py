@@ -1,4 +1,4 @@
-"""The server: on the loopback only, for one run, until it is stopped."""
+"""The server: on the loopback only, for one run or one campaign, until it is stopped."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import uvicorn
 
 from frf_ipz.errors import InputError
 from frf_ipz.show.app import build_app
+from frf_ipz.show.campaign import find_places
 from frf_ipz.show.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -23,12 +24,12 @@ TOKEN_BYTES = 24
 
 
 def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None]) -> None:
-    """Serve the page of a run until the process is interrupted.
+    """Serve the page of a run, or of a campaign, until the process is interrupted.
 
     Parameters
     ----------
     folder : Path
-        The run's folder.
+        The run's folder, or the campaign's.
     run : Run
         Runs a pipeline.
     port : int
@@ -39,19 +40,20 @@ def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None])
     Raises
     ------
     InputError
-        If there is no run in the folder, or the port is taken.
+        If there is no run and no pipeline in the folder, or the port is taken.
     """
-    bench = Workbench(folder, run)
+    benches = [Workbench(place, run) for place in find_places(folder)]
     with listen(port) as listener:
         taken = int(listener.getsockname()[1])
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        app = build_app(bench, port=taken, token=token)
+        app = build_app(benches, port=taken, token=token)
         config = uvicorn.Config(app, log_level="warning", lifespan="off", ws="none", timeout_graceful_shutdown=2)
         announce(f"http://{ADDRESS}:{taken}/{token}/")
         try:
             uvicorn.Server(config).run(sockets=[listener])
         finally:
-            bench.close()
+            for bench in benches:
+                bench.close()
 
 
 def listen(port: int) -> socket.socket:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.contents import RunContents, read_contents
-from frf_ipz.runs.folder import RECORD, RunFolder, read_run
-from frf_ipz.show.changes import to_change
+from frf_ipz.runs.folder import RECORD, RunFolder, read_record, read_run
+from frf_ipz.show.changes.registry import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
 from frf_ipz.toml_files import read_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.progress import Progress
+    from frf_ipz.show.campaign import Place
     from frf_ipz.show.worker import Status
 
 STOP_S = 5.0  # how long a run gets to notice that the server ends
@@ -52,20 +54,15 @@ class Workbench:
 
     Parameters
     ----------
-    folder : Path
-        The run's folder.
+    place : Place
+        The run's folder and its pipeline file.
     run : Run
         Runs a pipeline.
-
-    Raises
-    ------
-    InputError
-        If there is no run in the folder.
     """
 
-    def __init__(self, folder: Path, run: Run) -> None:
-        self.folder = folder.resolve()
-        self.pipeline = Path(str(read_run(self.folder).record.get("pipeline", "")))
+    def __init__(self, place: Place, run: Run) -> None:
+        self.folder = place.folder.resolve()
+        self.pipeline = place.pipeline
         self._run = run
         self._changing = Lock()
         self._before: str | None = None
@@ -80,11 +77,16 @@ class Workbench:
 
     @property
     def stamp(self) -> str:
-        """Another one whenever the folder holds other results."""
+        """Another one whenever the folder holds other results; empty before the first run."""
         try:
             return str((self.folder / RECORD).stat().st_mtime_ns)
         except OSError:
             return ""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What ``run.json`` says; empty before the first run."""
+        return read_record(self.folder)
 
     def contents(self) -> RunContents:
         """Read what the folder holds, once until it holds something else.
@@ -97,7 +99,7 @@ class Workbench:
         Raises
         ------
         InputError
-            If a file is damaged.
+            If there is no run yet, or a file is damaged.
         """
         stamp = self.stamp
         if self._read is None or self._read[0] != stamp:

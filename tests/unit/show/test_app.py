@@ -7,6 +7,7 @@ from starlette.testclient import TestClient
 
 from frf_ipz.errors import InputError
 from frf_ipz.show.app import build_app
+from frf_ipz.show.campaign import Place
 from frf_ipz.show.workbench import Workbench
 
 PORT, TOKEN = 8765, "drawn-at-random"
@@ -22,12 +23,14 @@ def runs():
 
 @pytest.fixture
 def bench(demo, runs):
-    return Workbench(demo / "out", lambda path, _, **__: runs.append(path))
+    return Workbench(
+        Place(folder=demo / "out", pipeline=demo / "pipeline.toml"), lambda path, _, **__: runs.append(path)
+    )
 
 
 @pytest.fixture
 def client(bench):
-    app = build_app(bench, port=PORT, token=TOKEN)
+    app = build_app([bench], port=PORT, token=TOKEN)
     return TestClient(app, base_url=f"http://127.0.0.1:{PORT}", raise_server_exceptions=True)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from frf_ipz.errors import InputError
-from frf_ipz.show.changes import to_change
+from frf_ipz.show.changes.registry import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 
 PATH = Path("pipeline.toml")
@@ -105,6 +105,21 @@ def test_points_are_added_once_and_taken_back():
     assert parse(after({"kind": "point", "dof": "49:z", "on": False}, text=text), PATH).predict.points == ("24:+z",)
 
 
+def test_sensors_are_hidden_once_whatever_their_sign_and_shown_again():
+    text = after(
+        {"kind": "sensor", "dof": "24:+z"}, {"kind": "sensor", "dof": "24:-z"}, {"kind": "sensor", "dof": "7:x"}
+    )
+    assert parse(text, PATH).ingest.hide == ("24:-z", "7:+x")
+    assert parse(after({"kind": "sensor", "dof": "24:z", "on": False}, text=text), PATH).ingest.hide == ("7:+x",)
+
+
+def test_a_reduction_is_replaced_as_a_whole_and_taken_back():
+    text = after({"kind": "retain", "dofs": ["9:z", "29:-z", "9:+z"]})
+    assert parse(text, PATH).reduce.dofs == ("9:z", "29:z")
+    assert parse(after({"kind": "retain", "dofs": ["7:z"]}, text=text), PATH).reduce.dofs == ("7:z",)
+    assert parse(after({"kind": "retain", "on": False}, text=text), PATH).reduce.dofs == ()
+
+
 def test_a_section_that_is_missing_is_made():
     text = after({"kind": "pin", "hz": 5.0}, text='[pipeline]\ntest = "t.toml"\n')
     assert tomllib.loads(text) == {"pipeline": {"test": "t.toml"}, "fit": {"pin_hz": [5.0]}}
@@ -130,6 +145,9 @@ def test_text_of_others_cannot_break_out_of_its_string():
         ({"kind": "leave", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
         ({"kind": "blow", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
         ({"kind": "point", "dof": "tip"}, "is no DOF label"),
+        ({"kind": "sensor", "dof": "tip"}, "is no DOF label"),
+        ({"kind": "retain", "dofs": ["9:z", "tip"]}, "is no DOF label"),
+        ({"kind": "retain", "dofs": []}, "name the DOFs"),
     ],
 )
 def test_what_makes_no_sense_is_refused(wish, message):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from frf_ipz.fe.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions, StruckPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
@@ -11,16 +12,17 @@ from frf_ipz.report.contents import read_contents
 from frf_ipz.report.section import pictures_of, render_section
 from frf_ipz.show.controls import choices_panel
 from frf_ipz.show.page import page_sections
-from frf_ipz.show.pictures.marks import with_choices
+from frf_ipz.show.pictures.marks import with_choices, with_retained
 from synthetic_run import synthetic_folder
 
 OF_MODEL = ("model", "reduce", "pair", "update", "predict", "export", "reference")
 CHOICES = PipelineFile(
     pipeline=PipelineSection(test="test.toml"),
-    ingest=IngestOptions(keep=("hits/p_02.csv",), drop=("hits/p_04.csv",)),
+    ingest=IngestOptions(keep=("hits/p_02.csv",), drop=("hits/p_04.csv",), hide=("9:+z",)),
     fit=FitOptions(
         band_hz=(5.0, 500.0), pin_hz=(20.0,), strike=(StruckPole(hz=50.0, why="mains"),), exclude_hz=((49.0, 51.0),)
     ),
+    reduce=ReduceOptions(dofs=("3:z", "5:z")),
     predict=PredictOptions(points=("3:+z",)),
 )
 
@@ -44,14 +46,16 @@ def test_all_that_is_chosen_is_listed_with_a_button_each():
         "p_02",
         "p_04",
         "3:+z",
+        "sensor 9:+z left out",
+        "reduced to 3:z 5:z",
     ):
         assert text in panel
-    assert panel.count("data-change=") == 7
+    assert panel.count("data-change=") == 9
 
 
 def test_forms_stand_beside_the_pictures(run):
     html = html_of(run)
-    for part in ("pole-form", "band-form", "point-form", "shape-form", "blow-choices", "modes"):
+    for part in ("pole-form", "band-form", "point-form", "reduce-form", "shape-form", "blow-choices", "modes"):
         assert html.count(f'id="{part}"') == 1
     assert html.count("data-fill=") == run.fit.n_modes
 
@@ -67,15 +71,18 @@ def test_the_list_of_blows_shows_what_was_chosen_and_what_is_used(run):
 @pytest.mark.parametrize(
     ("without", "missing"),
     [
-        (OF_MODEL, {"point-form"}),
-        (("fit", *OF_MODEL), {"point-form", "pole-form", "modes"}),
-        (("ingest", "fit", *OF_MODEL), {"point-form", "pole-form", "modes", "shape-form", "blow-choices"}),
+        (OF_MODEL, {"reduce-form"}),
+        (("fit", *OF_MODEL), {"reduce-form", "pole-form", "modes"}),
+        (
+            ("ingest", "fit", *OF_MODEL),
+            {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "blow-choices"},
+        ),
     ],
     ids=["no model", "no fit", "nothing"],
 )
 def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
     html = html_of(read_contents(synthetic_folder(without=without)))
-    forms = {"point-form", "pole-form", "modes", "shape-form", "blow-choices"}
+    forms = {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "blow-choices"}
     assert {form for form in forms if f'id="{form}"' not in html} == missing
 
 
@@ -98,3 +105,15 @@ def test_without_a_pipeline_file_there_is_the_report_alone(run):
     html = html_of(run, None)
     assert "pole-form" not in html
     assert "shape-form" in html
+
+
+def test_nodes_that_the_model_is_reduced_to_are_ringed(run):
+    drawing = next(one for one in pictures_of(page_sections(run, None)) if one.name == "structure")
+    ringed = with_retained(drawing, run.geometry, run.reduced.dofs)
+    rings = ringed.traces[-1]
+    nodes = next(trace for trace in drawing.traces if trace["name"] == "nodes")
+    for dof, x in zip(run.reduced.dofs, rings["x"], strict=True):
+        assert x == nodes["x"][nodes["text"].index(f"node {dof.node}")]
+    assert list(rings["text"]) == [dof.name for dof in run.reduced.dofs]
+    names = [trace["name"] for trace in next(one for one in pictures_of(page_sections(run, CHOICES))).traces]
+    assert "kept in the reduction" in names

@@ -68,5 +68,5 @@ def test_a_port_that_is_taken_is_refused_in_a_sentence():
 
 
 def test_a_folder_without_a_run_is_refused_before_anything_listens(tmp_path):
-    with pytest.raises(InputError, match="there is no run here"):
+    with pytest.raises(InputError, match=r"there is no run here.*and no pipeline"):
         serve(tmp_path, None, port=0, announce=pytest.fail)

@@ -3,6 +3,7 @@
 (() => {
   const FIELDS = {
     pin: ["hz"], strike: ["hz", "why"], leave: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
+    sensor: ["dof"], retain: ["dofs"],
   };
   const MEMORY = "frf-ipz-show";
   const SOON_MS = 400, LATER_MS = 3000;
@@ -195,32 +196,20 @@
       const isNode = point.text.startsWith("node ");
       form.elements.dof.value = isNode ? `${point.text.slice(5)}:+${form.dataset.direction}` : point.text;
       form.classList.add("chosen");
-      offerToHide();
     });
   }
 
-  // FRFs of a sensor are hidden by the boxes that the pictures' chooser has.
-  function boxesOfSensor() {
-    const wanted = find("#point-form").elements.dof.value.trim();
-    const row = all(".chooser tbody tr").find((one) => one.querySelector("th").textContent === wanted);
-    return row ? [...row.querySelectorAll("input")] : [];
+  // Signs do not matter to a reduction: 18:-z is the motion that 18:z is.
+  function toggleRetained() {
+    const dof = find("#point-form").elements.dof.value.trim().replace(/:[+-]/, ":");
+    if (!dof) return;
+    const field = find("#reduce-form").elements.dofs;
+    const names = listOf(field.value);
+    field.value = (names.includes(dof) ? names.filter((name) => name !== dof) : [...names, dof]).join(" ");
+    find("#reduce-form").classList.add("chosen");
   }
 
-  function offerToHide() {
-    const button = find("#hide-sensor");
-    const boxes = boxesOfSensor();
-    button.disabled = !boxes.length;
-    button.textContent = boxes.length && boxes.every((box) => !box.checked)
-      ? "Show this sensor in the pictures" : "Hide this sensor in the pictures";
-  }
-
-  function hideSensor() {
-    const boxes = boxesOfSensor();
-    const show = boxes.every((box) => !box.checked);
-    boxes.forEach((box) => { box.checked = show; });
-    boxes[0].dispatchEvent(new Event("change"));
-    offerToHide();
-  }
+  const listOf = (text) => text.split(/[\s,]+/).filter(Boolean);
 
   // --- The structure in motion -------------------------------------------------------------------------------------
 
@@ -337,7 +326,10 @@
     const kind = event.submitter && event.submitter.value;
     if (!(kind in FIELDS)) return;
     const fields = event.target.elements;
-    const value = (name) => (fields[name].type === "number" ? Number(fields[name].value) : fields[name].value);
+    const value = (name) => {
+      const { type, value: text } = fields[name];
+      return type === "number" ? Number(text) : name === "dofs" ? listOf(text) : text;
+    };
     change({ kind, ...Object.fromEntries(FIELDS[kind].map((name) => [name, value(name)])) });
   }
 
@@ -353,7 +345,7 @@
       find("#shape-form").elements.mode.value = mode;
       loadShape();
       find("#shapes").scrollIntoView();
-    } else if (button.id === "hide-sensor") hideSensor();
+    } else if (button.id === "toggle-dof") toggleRetained();
     else if (button.id === "read") complain("");
   }
 
@@ -363,7 +355,6 @@
     document.addEventListener("change", (event) => {
       const { blow } = event.target.dataset;
       if (blow) change({ kind: "blow", name: blow, use: event.target.value });
-      if (event.target.name === "dof") offerToHide();
     });
     if (remembered.blows && find("#blow-choices")) find("#blow-choices").open = true;
     restoreLook();

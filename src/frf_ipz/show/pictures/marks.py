@@ -1,4 +1,4 @@
-"""What the user has chosen, drawn into the stabilisation diagram."""
+"""What the user has chosen, drawn into the stabilisation diagram and into the structure."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.projection import project
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.report.picture import Picture, Trace, line, markers, outline
 from frf_ipz.report.wording import counted
@@ -14,10 +15,12 @@ from frf_ipz.report.wording import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.identification.options import FitOptions
+    from frf_ipz.structure import Geometry
 
-DIAGRAM = "stabilisation"
+DIAGRAM, STRUCTURE = "stabilisation", "structure"
 STRIP = 0.08  # of the height, below the poles: room for the handles
 CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen stretch stay as clear as they were
 
@@ -60,6 +63,36 @@ def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Pictur
     layout = {**picture.layout, "yaxis": below, "shapes": [*picture.layout.get("shapes", []), *shapes]}
     drawn = [{**trace, **CLEAR} if trace["mode"] == "markers" else trace for trace in (*picture.traces, *traces)]
     return replace(picture, traces=tuple(drawn), layout=layout, note=note)
+
+
+def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> Picture:
+    """Ring the nodes whose DOFs the model is reduced to.
+
+    Parameters
+    ----------
+    picture : Picture
+        The drawing of the structure.
+    geometry : Geometry
+        Where the nodes are.
+    dofs : sequence of Dof
+        The DOFs.
+
+    Returns
+    -------
+    Picture
+        With the rings.
+    """
+    place = {int(node): row for row, node in enumerate(geometry.nodes)}
+    known = [dof for dof in dofs if dof.node in place]
+    if not known:
+        return picture
+    at = project(geometry.coordinates_m)[[place[dof.node] for dof in known]]
+    hover = "%{text}: the model is reduced to it"
+    names = [dof.name for dof in known]
+    rings = markers(
+        at[:, 0], at[:, 1], "kept in the reduction", "@c3", hover=hover, symbol="circle-open", size=14, text=names
+    )
+    return replace(picture, traces=(*picture.traces, rings), alt=f"{picture.alt}; reduced to {', '.join(names)}")
 
 
 def _uprights(

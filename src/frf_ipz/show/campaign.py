@@ -1,0 +1,94 @@
+"""What a folder holds to look at and to work on: one run, or a campaign with its pipelines and their runs.
+
+A campaign is a folder of test, model and pipeline files with their recordings, or a folder of such folders. A pipeline
+that has not been run yet gets a place for its results beside it: ``results/NAME`` for ``NAME.toml``.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError
+from frf_ipz.runs.folder import RECORD, read_record
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+RESULTS = "results"
+DEEPEST = 3  # folders below the one that is given: campaign, its results, a run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A run, or the place of one that has not been made yet.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder; there may be none yet.
+    pipeline : Path
+        Its pipeline file.
+    """
+
+    folder: Path
+    pipeline: Path
+
+
+def find_places(folder: Path) -> tuple[Place, ...]:
+    """Look for runs and pipelines in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        A run, or a campaign.
+
+    Returns
+    -------
+    tuple of Place
+        One where the folder is itself a run; else the runs of each pipeline, and pipelines without a run.
+
+    Raises
+    ------
+    InputError
+        If there is neither a run nor a pipeline.
+    """
+    folder = folder.resolve()
+    runs, pipelines = [], []
+    for here in _folders(folder):
+        runs += [_run_in(here)] if (here / RECORD).is_file() else []
+        pipelines += [file for file in sorted(here.glob("*.toml")) if _is_pipeline(file)]
+    ran = {run.pipeline for run in runs}
+    new = [Place(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
+    if not runs and not new:
+        raise InputError(
+            f"{folder}: there is no run here (no {RECORD}) and no pipeline; write one with 'frf-ipz init {folder}', or "
+            f"make a run with 'frf-ipz run PIPELINE --out {folder}'"
+        )
+    return tuple(sorted((*runs, *new), key=lambda place: (str(place.pipeline), str(place.folder))))
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """Give the folders that may hold a run or a pipeline, from the top; what lies inside a run is its own affair."""
+    for path, below, _ in os.walk(folder):
+        here = Path(path)
+        is_run, depth = (here / RECORD).is_file(), len(here.relative_to(folder).parts)
+        kept = [] if is_run or depth >= DEEPEST else [name for name in sorted(below) if not name.startswith(".")]
+        below[:] = kept
+        yield here
+
+
+def _run_in(folder: Path) -> Place:
+    return Place(folder=folder, pipeline=Path(str(read_record(folder).get("pipeline", ""))))
+
+
+def _is_pipeline(file: Path) -> bool:
+    try:
+        return "pipeline" in tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError):
+        return False
+    except tomllib.TOMLDecodeError:  # the page then says what is wrong with it
+        return file.name == "pipeline.toml"

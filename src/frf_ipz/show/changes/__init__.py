@@ -1,0 +1,1 @@
+"""What a user changes on the page, as changes of ``pipeline.toml``."""

@@ -1,0 +1,75 @@
+"""The first page of a campaign: its pipelines and runs, to choose from."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError
+from frf_ipz.report.findings import SENTENCES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from frf_ipz.show.workbench import Workbench
+
+HEAD = (
+    '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+    '<meta name="viewport" content="width=device-width, initial-scale=1"><title>Runs – frf_ipz</title>'
+    '<link rel="icon" href="data:,"><link rel="stylesheet" href="page.css"><link rel="stylesheet" href="show.css">'
+    '</head><body><header class="head"><h1>Runs of this campaign</h1></header><main>'
+)
+COLUMNS = ("run", "pipeline", "results", "computed", "what came out")
+
+
+def render_list(benches: Sequence[Workbench]) -> str:
+    """Write the page that lists the runs.
+
+    Parameters
+    ----------
+    benches : sequence of Workbench
+        The runs, and pipelines that have not been run yet.
+
+    Returns
+    -------
+    str
+        HTML; the k-th run is at ``k/``, from 1.
+    """
+    rows = "".join(_row(number, bench) for number, bench in enumerate(benches, start=1))
+    head = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
+    return (
+        f'{HEAD}<p class="lead">Open one to look at it and to work on it; one that is not yet computed can be started '
+        f'there.</p><table id="runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></main></body></html>'
+    )
+
+
+def _row(number: int, bench: Workbench) -> str:
+    record = bench.record
+    name = str(record.get("name", "")) or _name_in_file(bench)
+    when = str(record.get("when", ""))[:16].replace("T", " ")
+    computed = f"{when} UTC" if when else "at work" if bench.status.running else "not yet"
+    said = _verdict(bench.folder) if record else ""
+    cells = [bench.pipeline, bench.folder, computed, said]
+    return (
+        f'<tr><th scope="row"><a href="{number}/">{escape(name)}</a></th>'
+        + "".join(f"<td>{escape(str(cell))}</td>" for cell in cells)
+        + "</tr>"
+    )
+
+
+def _name_in_file(bench: Workbench) -> str:
+    try:
+        return bench.choices().pipeline.name or bench.pipeline.stem
+    except InputError:
+        return bench.pipeline.stem
+
+
+def _verdict(folder: Path) -> str:
+    """Take the sentence of a diagnosis, where one was made."""
+    try:
+        said = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+        return str(said.get("statement") or SENTENCES[said["verdict"]])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return "no diagnosis was run"

@@ -1,0 +1,68 @@
+"""What is seen of a pipeline before its first run: the structure with sensors, blows and points, and what was read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError
+from frf_ipz.pipeline.job import Job, read_job
+from frf_ipz.report.contents import RunContents
+from frf_ipz.report.section import Block, Section
+from frf_ipz.report.structure_drawing import Marks, draw_structure
+from frf_ipz.report.table import Table
+from frf_ipz.report.wording import counted, listed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.dofs import Dof
+
+
+def read_setup(pipeline: Path) -> tuple[RunContents, Section]:
+    """Read a pipeline that has not been run yet.
+
+    Parameters
+    ----------
+    pipeline : Path
+        The pipeline file.
+
+    Returns
+    -------
+    run : RunContents
+        The name, and the geometry where there is a model.
+    section : Section
+        What was read; or what is wrong with it.
+    """
+    title, anchor = "Set-up", "overview"
+    try:
+        job = read_job(pipeline)
+    except InputError as error:
+        notes = (str(error), "Correct the file, then load this page again.")
+        lead = "This pipeline cannot be run as it stands."
+        empty = RunContents(record={"name": pipeline.stem})
+        return empty, Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
+    run = RunContents(record={"name": job.pipeline.name}, geometry=None if job.model is None else job.model.geometry)
+    marks = Marks(sensors=job.test.output_dofs, blows=job.test.input_dofs, points=job.points)
+    drawing = draw_structure(run.geometry, marks)
+    lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
+    blocks: list[Block] = [_what_was_read(job)] if drawing is None else [drawing, _what_was_read(job)]
+    return run, Section(anchor=anchor, title=title, lead=lead, blocks=tuple(blocks))
+
+
+def _what_was_read(job: Job) -> Table:
+    test, model = job.test, job.model
+    found = "none: the run ends with the fit"
+    if model is not None:
+        found = f"{model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}"
+    rows = [
+        ["test", f"{test.name} ({test.kind}), {counted(len(test.files), 'file')}"],
+        ["model", found],
+        ["sensors", _names(test.output_dofs)],
+        ["blows", _names(test.input_dofs)],
+        ["points of interest", _names(job.points)],
+    ]
+    return Table(caption="What was read", columns=("", "in the files"), rows=rows)
+
+
+def _names(dofs: tuple[Dof, ...]) -> str:
+    return listed([str(dof) for dof in dofs], 24) if dofs else "none"
