@@ -29,6 +29,7 @@ from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
 from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
@@ -91,12 +92,12 @@ def diagnose(
     progress(0.0, "measuring transfer functions")
     source = divide(observations)
     bench = set_up(model, source, observations.band_hz, options, _identifiable(effects, scale), free_gains=scale)
-    laws = _laws(model, observations, options, progress)
+    laws = _laws(model, observations, options, folder, progress)
     gates = check(source, None if laws is None else laws.linearity)
-    nonlinear = laws is not None and laws.is_nonlinear
-    certain = laws is not None and laws.linearity.score > CERTAIN * laws.linearity.limit
-    found = only_null(bench) if certain else decide(bench, progress)
-    nonlinear &= certain or found.verdict == UNEXPLAINED
+    nonlinear = laws is not None and laws.is_nonlinear and bool(chosen_laws(options, folder))
+    certain = nonlinear and laws is not None and laws.linearity.score > CERTAIN * laws.linearity.limit
+    found = decide(bench, progress) if effects and not certain else only_null(bench)
+    nonlinear &= certain or not effects or found.verdict == UNEXPLAINED
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
@@ -138,13 +139,19 @@ def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Pr
 
 
 def _laws(
-    model: StructuralModel, observations: Observations, options: DiagnoseOptions, progress: Progress
+    model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
 ) -> LawSearch | None:
     """Ask blows of several levels for what is not linear; None where there are none."""
     counts = [len(observations.at(dof)) for dof in observations.input_dofs]
     if max(counts, default=0) < ENOUGH_TO_COMPARE:
         return None
-    return search_laws(model, observations, options, progress=lambda part, text: progress(0.1 + 0.1 * part, text))
+    return search_laws(
+        model,
+        observations,
+        options,
+        folder=folder,
+        progress=lambda part, text: progress(0.1 + 0.1 * part, text),
+    )
 
 
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray, read_only, require_shape
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfSet
 from frf_ipz.quantities import FrfQuantity
@@ -117,6 +117,26 @@ class Observations:
     def input_dofs(self) -> tuple[Dof, ...]:
         """Struck DOFs, each once."""
         return tuple(dict.fromkeys(blow.input_dof for blow in self.blows))
+
+    def looks_at(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
+        """Say which frequencies are in the band, and not in or next to a stretch that is left out.
+
+        Parameters
+        ----------
+        frequency_hz : (n,) array
+            Hz.
+        width_hz : float
+            How far a line sees, Hz: it is kept that far from what is left out.
+
+        Returns
+        -------
+        (n,) bool array
+            True where it is looked at.
+        """
+        kept = (frequency_hz >= self.band_hz[0]) & (frequency_hz <= self.band_hz[1])
+        for low, high in self.exclude_hz:
+            kept &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
+        return np.asarray(kept)
 
     def at(self, input_dof: Dof) -> tuple[Blow, ...]:
         """Give the blows at one DOF, the strongest first.

@@ -16,9 +16,9 @@ class DiagnoseOptions:
     apply : bool
         The finding flows on into updating and prediction.
     effects : tuple of str
-        Look for these effects only; all of the contract's table where it is empty.
+        Look for these effects only, force laws among them; all of the contract's table where it is empty.
     extra_effects : tuple of str
-        Further effects as ``file.py:ClassName``, or the name of one that is shipped and off by default.
+        Further effects and force laws as ``file.py:ClassName``.
     stiffness_tolerance, frequency_tolerance : float
         Relative standard deviation of local stiffness, and of natural frequencies.
     damping_tolerance : float

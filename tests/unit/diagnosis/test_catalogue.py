@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects, shipped_effects
+from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.errors import InputError
 
@@ -13,6 +14,18 @@ LINEAR = {
     "attached_resonator", "axial_load", "shear_rotary_inertia", "damping_level", "local_damper", "structural_damping",
     "viscoelastic_joint", "time_delay", "sensor_dynamics", "sensor_gain", "sensor_misplaced",
 }  # fmt: skip
+
+USERS_LAW = """
+from frf_ipz.diagnosis.nonlinear.laws.law import Law
+
+
+class SquareDrag(Law):
+    name = "square_drag"
+    strength_name = "drag_Ns2_m2"
+
+    def unit_force(self, w, v, shape):
+        return v * abs(v)
+"""
 
 
 def test_all_linear_effects_of_the_contract_are_shipped():
@@ -27,6 +40,29 @@ def test_imitators_are_effects():
 
 def test_only_chosen_effects_are_looked_for():
     assert set(chosen_effects(DiagnoseOptions(effects=("added_mass",)), Path())) == {"added_mass"}
+
+
+@pytest.mark.parametrize("name", ["cubic_stiffness", "gap_contact", "dry_friction"])
+def test_a_force_law_can_be_chosen_alone(name):
+    options = DiagnoseOptions(effects=(name,))
+    assert chosen_effects(options, Path()) == {}
+    assert [law.name for law in chosen_laws(options)] == [name]
+
+
+def test_force_laws_can_be_left_out():
+    assert chosen_laws(DiagnoseOptions(effects=("added_mass",))) == ()
+
+
+def test_an_unknown_effect_is_refused_with_the_nearest_one():
+    with pytest.raises(InputError, match="cubic_stiffness"):
+        chosen_effects(DiagnoseOptions(effects=("cubic_stifness",)), Path())
+
+
+def test_a_users_force_law_is_looked_for(tmp_path):
+    (tmp_path / "mine.py").write_text(USERS_LAW, encoding="utf-8")
+    options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:SquareDrag",))
+    assert set(chosen_effects(options, tmp_path)) == {"added_mass"}
+    assert [law.name for law in chosen_laws(options, tmp_path)] == ["square_drag"]
 
 
 @pytest.mark.parametrize(

@@ -94,12 +94,13 @@ def only_null(bench: Bench) -> Decision:
     Returns
     -------
     Decision
-        Unexplained, without a cause.
+        Without a cause: consistent, or unexplained.
     """
     null = fit_nothing(bench)
     good = goodness(bench, null)
     nothing = Ranking(base=null, fits=(), n_tried=0)
-    return Decision(verdict=UNEXPLAINED, null=null, final=null, ranking=nothing, second=None, good=good, null_good=good)
+    verdict = CONSISTENT if good.is_good else UNEXPLAINED
+    return Decision(verdict=verdict, null=null, final=null, ranking=nothing, second=None, good=good, null_good=good)
 
 
 def without_last(bench: Bench, found: Decision) -> Decision:

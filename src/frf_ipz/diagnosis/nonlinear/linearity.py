@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e
 BEFORE = 2  # samples before the pulse
 UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
 LEAST_RECORDS = 2
+REACH = 2.0  # lines: so far a tone is seen beside its own
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
 
 
@@ -90,11 +91,10 @@ def _at_place(observations: Observations, dof: Dof, noise: ChannelNoise) -> tupl
     blows = observations.at(dof)
     chains = {tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) for blow in blows}
     n, step = min(blow.n_samples for blow in blows), blows[0].step_s
-    low, high = observations.band_hz
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
-    used = np.flatnonzero((frequency >= low) & (frequency <= high))
-    n_groups = len(used) // WIDTH if len(blows) >= LEAST_RECORDS and len(chains) == 1 else 0
-    used = used[: n_groups * WIDTH]
+    can_compare = len(blows) >= LEAST_RECORDS and len(chains) == 1
+    looked_at = observations.looks_at(frequency, REACH / (n * step)) & can_compare
+    used, n_groups = _groups(np.flatnonzero(looked_at))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
     if not n_groups:
@@ -112,6 +112,13 @@ def _at_place(observations: Observations, dof: Dof, noise: ChannelNoise) -> tupl
             left = _apart if noise.is_hammer else _left
             misfit[group, column] = left(force, motion, energies[:, here])
     return middle, misfit
+
+
+def _groups(used: IntArray) -> tuple[IntArray, int]:
+    """Keep lines that make whole groups of neighbours, and count the groups."""
+    runs = np.split(used, np.flatnonzero(np.diff(used) > 1) + 1)
+    kept = np.concatenate([run[: len(run) // WIDTH * WIDTH] for run in runs])
+    return kept, len(kept) // WIDTH
 
 
 def _lines(blow: Blow, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:

@@ -11,6 +11,7 @@ a law that gains more is needed besides, or instead of, anything linear.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
+DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
 LONG_SHAKER = 640.0  # of a shaker, which takes time to shake up a structure
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
@@ -98,7 +100,12 @@ class LawSearch:
 
 
 def search_laws(
-    model: StructuralModel, observations: Observations, options: DiagnoseOptions, *, progress: Progress = silent
+    model: StructuralModel,
+    observations: Observations,
+    options: DiagnoseOptions,
+    *,
+    folder: Path = Path(),
+    progress: Progress = silent,
 ) -> LawSearch:
     """Find the nonlinear law that explains recordings of different levels, and its place.
 
@@ -110,6 +117,8 @@ def search_laws(
         Blows or records, of different levels; they need not start at rest.
     options : DiagnoseOptions
         Tolerances, and what may be missing.
+    folder : Path
+        Where paths of users' own laws start.
     progress : Progress
         Told how far it is.
 
@@ -121,7 +130,7 @@ def search_laws(
     Raises
     ------
     InputError
-        If the model lacks a DOF that was measured, or recordings differ in their sampling rate.
+        If the model lacks a DOF that was measured, recordings differ in their sampling rate, or a law is not known.
     """
     progress(0.0, "comparing weak and strong blows")
     linearity = assess_linearity(observations)
@@ -129,6 +138,9 @@ def search_laws(
         return LawSearch(
             verdict=LINEAR, linearity=linearity, statement="Blows of all levels agree with one linear system."
         )
+    laws = chosen_laws(options, folder)
+    if not laws:
+        return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was looked for.")
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
     plant, noise = make_plant(model, observations), read_noise(observations)
@@ -139,7 +151,7 @@ def search_laws(
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         tracks.append(Track(stretches=stretches, linear=fit_linear(stretches, freedom)))
-    fits = find_candidates(tracks[0], tracks[1], chosen_laws(options))
+    fits = find_candidates(tracks[0], tracks[1], laws)
     found = _judge(tracks[1].stretches, linearity, plant, fits, tracks[1].linear.cost)
     if found.fit is None:
         return found
@@ -169,9 +181,7 @@ def _judge(
     stretches: Stretches, linearity: Linearity, plant: Plant, fits: list[LawFit], linear_cost: float
 ) -> LawSearch:
     if not fits:
-        return LawSearch(
-            verdict=UNEXPLAINED, linearity=linearity, statement="Weak and strong blows disagree; no law explains it."
-        )
+        return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law explains it.")
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
     gains = np.array([_gain(fit, linear_cost, len(plant.places), scale) for fit in fits])
@@ -193,7 +203,7 @@ def _judge(
         linear_limit=limit,
         statement=f"{findings[0].statement} {working_range(best, plant)}"
         if explained
-        else f"Weak and strong blows disagree, and no law of the catalogue explains how: {why}.",
+        else f"{DISAGREE}, and no law of the catalogue explains how: {why}.",
         plant=plant,
         fit=best,
     )

@@ -87,7 +87,7 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
         simulated=shown * (np.abs(measured).max(-1, keepdims=True) > 0),
         motion=done.motion[:, ::FINER],
         force=done.force[:, ::FINER],
-        misfit=_misfit(measured, shown, stretches.step_s, observations.band_hz),
+        misfit=_misfit(measured, shown, stretches.step_s, observations),
     )
 
 
@@ -122,9 +122,9 @@ def _measured(observations: Observations, stretches: Stretches) -> FloatArray:
     return found
 
 
-def _misfit(measured: FloatArray, simulated: FloatArray, step_s: float, band_hz: tuple[float, float]) -> FloatArray:
-    frequency = np.fft.rfftfreq(measured.shape[-1], step_s)
-    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+def _misfit(measured: FloatArray, simulated: FloatArray, step_s: float, observations: Observations) -> FloatArray:
+    frequency = np.asarray(np.fft.rfftfreq(measured.shape[-1], step_s))
+    inside = observations.looks_at(frequency, frequency[1])
     present = np.abs(measured).max(-1, keepdims=True) > 0
     there, away = (_lines(signals)[..., inside] for signals in (measured, (measured - simulated) * present))
     return np.asarray(np.linalg.norm(away, axis=(1, 2)) / np.maximum(np.linalg.norm(there, axis=(1, 2)), 1e-300))

@@ -1,5 +1,6 @@
 """A chain of four masses, struck and measured, integrated by SciPy's adaptive Runge-Kutta method."""
 
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +48,7 @@ def pulse(time_s, peak_n):
 def strike(chain):
     """Strikes node 1 at several levels, with a force at places: law(w, v) times a vector of DOF."""
 
+    @cache
     def run(law=None, where=(0, 0, 1, 0), seed=1):
         where = np.array(where, float)
         time = np.arange(N_SAMPLES) / RATE_HZ

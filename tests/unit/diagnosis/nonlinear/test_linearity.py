@@ -1,7 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
+from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, assess_linearity
+
+HALF_BAND = WIDTH / 2  # lines
 
 
 def test_blows_on_a_linear_chain_agree(strike):
@@ -17,3 +21,12 @@ def test_blows_on_a_linear_chain_agree(strike):
 )
 def test_blows_on_a_nonlinear_chain_do_not(strike, law):
     assert assess_linearity(strike(law)).is_nonlinear
+
+
+def test_groups_of_lines_keep_out_of_what_is_left_out(strike):
+    low, high = 30.0, 40.0
+    found = assess_linearity(replace(strike(), exclude_hz=((low, high),)))
+    spacing = 0.25 * HALF_BAND  # of lines, 4 s of record
+    assert len(found.frequency_hz) > 4
+    assert np.all((found.frequency_hz + spacing < low) | (found.frequency_hz - spacing > high))
+    assert not found.is_nonlinear

@@ -5,8 +5,11 @@ from __future__ import annotations
 import inspect
 import pkgutil
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.catalogue.users_files import read_class
 from frf_ipz.diagnosis.nonlinear import laws
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 
@@ -47,17 +50,26 @@ def laws_in(module: ModuleType) -> list[Law]:
     return [item() for item in classes if issubclass(item, Law) and not inspect.isabstract(item)]
 
 
-def chosen_laws(options: DiagnoseOptions) -> tuple[Law, ...]:
-    """Give the shipped laws that are to be looked for.
+def chosen_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, ...]:
+    """Give the laws that are to be looked for.
 
     Parameters
     ----------
     options : DiagnoseOptions
-        Which effects; all where none are named.
+        Which effects; all shipped laws where none are named, and users' own besides.
+    folder : Path
+        Where paths of users' files start.
 
     Returns
     -------
     tuple of Law
         Perhaps none.
+
+    Raises
+    ------
+    InputError
+        If a user's file cannot be read.
     """
-    return tuple(law for name, law in shipped_laws().items() if not options.effects or name in options.effects)
+    shipped = (law for name, law in shipped_laws().items() if not options.effects or name in options.effects)
+    classes = (read_class(reference, folder, (Effect, Law)) for reference in options.extra_effects)
+    return (*shipped, *(found() for found in classes if issubclass(found, Law)))

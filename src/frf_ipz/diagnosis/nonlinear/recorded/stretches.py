@@ -164,9 +164,8 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         force[number], motion[number, rows] = lines[0], lines[1:]
         present[number, rows] = True
     motion /= s ** np.array([sensor.quantity.power for sensor in plant.sensors])[:, None]
-    low, high = observations.band_hz
     frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
-    floor = np.where(frequency <= high, window.floor, OUTSIDE)
+    floor = np.where(frequency <= observations.band_hz[1], window.floor, OUTSIDE)
     known, of_force = _noise(plant, noise, s, sigma)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
     forced = np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)
@@ -174,7 +173,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     variance[~present] = np.inf
     return Stretches(
         s=s,
-        used=np.flatnonzero((frequency >= low) & (frequency <= high))[::THIN],
+        used=np.flatnonzero(observations.looks_at(frequency, sigma / (2 * np.pi)))[::THIN],
         step_s=step,
         n_samples=n,
         force=force,

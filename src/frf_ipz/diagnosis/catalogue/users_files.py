@@ -1,0 +1,63 @@
+"""Reads classes from users' own files: effects and force laws."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import util
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import ModuleType
+
+WHERE = "[diagnose] extra_effects"
+
+
+def read_class(reference: str, folder: Path, kinds: tuple[type, ...]) -> type:
+    """Read a class from a user's file.
+
+    Parameters
+    ----------
+    reference : str
+        ``file.py:ClassName``.
+    folder : Path
+        Where paths start.
+    kinds : tuple of type
+        What it must derive from one of.
+
+    Returns
+    -------
+    type
+        Not abstract.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be loaded, or has no such class.
+    """
+    file_name, _, class_name = reference.rpartition(":")
+    path = folder / file_name
+    if not file_name or not class_name:
+        raise InputError(f"{WHERE}: '{reference}' is not understood; write it as 'file.py:ClassName'")
+    if not path.is_file():
+        raise InputError(f"{WHERE}: there is no file {path}; paths are relative to the pipeline file")
+    module = _load(path)
+    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
+    found = {item.__name__: item for item in classes if issubclass(item, kinds) and not inspect.isabstract(item)}
+    if class_name not in found:
+        raise InputError(f"{WHERE}: {path} has no effect '{class_name}'; {did_you_mean(class_name, found)}")
+    return found[class_name]
+
+
+def _load(path: Path) -> ModuleType:
+    spec = util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{WHERE}: {path} is no Python file")
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file may raise
+        raise InputError(f"{WHERE}: {path} cannot be loaded: {type(error).__name__}: {error}") from error
+    return module
