@@ -15,6 +15,7 @@ from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
+from frf_ipz.identification.likelihood.alike import levels_of_poles
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.delay import find_delays
@@ -44,13 +45,14 @@ MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, lim
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Fitted:
-    """Poles, and what they were fitted to."""
+    """Poles, and what they were fitted to; `noise` is the variance without what the model fails to follow."""
 
     lines: MeasuredLines
     terms: SmoothTerms
     fit: Refined
     judgement: Judgement
     excess: FloatArray
+    noise: FloatArray
     noise_from: str
     drift: Drift | None
     poles_are_held: bool = False
@@ -139,6 +141,7 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
         fit=fit,
         judgement=judgement,
         excess=_excess(judgement, fit),
+        noise=lines.variance,
         noise_from="recordings" if lines.known.all() else "misfit",
         drift=drift,
         poles_are_held=True,
@@ -186,8 +189,7 @@ def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _F
     if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
         fit = refine(final, fit.poles, terms)
         judgement = judge(final, fit, terms)
-    excess = _excess(judgement, fit)
-    noise_from = "recordings"
+    excess, noise, noise_from = _excess(judgement, fit), lines.variance, "recordings"
     if not lines.known.all() or np.median(excess) > MODEL_ERROR:
         noise_from = "misfit"
         lines = replace(lines, variance=lines.variance * judgement.level)
@@ -198,20 +200,21 @@ def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _F
         fit=fit,
         judgement=judgement,
         excess=excess,
+        noise=noise,
         noise_from=noise_from,
         drift=selected.drift,
     )
 
 
 def _levels(fitted: _Fitted) -> FloatArray:
-    """Factor on the variance of each pole: 1 where the noise is that of the recordings."""
+    """Factor on the variance of each pole's real and imaginary part: 1 where the noise is that of the recordings."""
     poles = fitted.fit.poles
     if fitted.noise_from == "recordings":
-        return np.ones(len(poles))
+        return np.ones(2 * len(poles))
     data = fitted.lines.weighted()
     left = (data.receptance - response(fitted.fit.system, fitted.terms, data.s)) * data.weight
-    alike = fitted.judgement.missing[-1].level_at(poles)
-    return np.asarray(np.maximum(alike, peak_levels(data, fitted.fit, left)))
+    at_peaks = np.maximum(fitted.judgement.missing[-1].level_at(poles), peak_levels(data, fitted.fit, left))
+    return np.asarray(np.maximum(np.tile(at_peaks, 2), levels_of_poles(data, fitted.fit, fitted.terms)))
 
 
 def _excess(judgement: Judgement, fit: Refined) -> FloatArray:
@@ -245,7 +248,7 @@ def _as_modal_fit(
         stabilization=start,
         decisions=pd.DataFrame(decisions, columns=["frequency_hz", "damping_ratio", "action", "reason"]),
         modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.judgement, modes),
-        misfit=misfit_table(lines.frequency_hz, left * unit, np.sqrt(lines.variance) * unit, frfs.labels),
+        misfit=misfit_table(lines.frequency_hz, left * unit, np.sqrt(fitted.noise) * unit, frfs.labels),
         noise_from=fitted.noise_from,
         warnings=_warnings(frfs, fitted),
     )
@@ -270,11 +273,12 @@ def _covariance(errors: FitErrors, found: FoundZeros, modes: IntArray) -> RootCo
 def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
     said = []
     excess = fitted.excess
-    if fitted.lines.known.all() and np.median(excess) > MODEL_ERROR:
+    if np.median(excess) > MODEL_ERROR:
+        noise = "of the recordings" if fitted.lines.known.all() else "that differs from line to line"
         said.append(
-            f"the misfit is {np.median(excess):.2g} times the noise of the recordings (median FRF; "
-            f"{excess.max():.2g} at worst): the structure does what no linear model with these modes does, so standard "
-            "deviations are taken from the misfit"
+            f"the misfit is {np.median(excess):.2g} times the noise {noise} (median FRF; {excess.max():.2g} at worst): "
+            "the structure does what no linear model with these modes does, so standard deviations are taken from the "
+            "misfit"
         )
     if fitted.drift is not None:
         said.append(_about_drift(frfs, fitted.drift, against_poles=fitted.poles_are_held))

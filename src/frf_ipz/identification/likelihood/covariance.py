@@ -99,8 +99,8 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
         The fit.
     terms : SmoothTerms
         What lies out of band.
-    level : (n_poles,) array
-        Factor on each pole's variance, where neighbouring lines err alike.
+    level : (2 n_poles,) array
+        Factor on the variance of each pole's real part, then imaginary part, where lines or FRFs err alike.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
     return FitErrors(
         system=fit.system,
         terms=terms,
-        pole_root=root * np.sqrt(np.tile(level, 2))[:, None],
+        pole_root=root * np.sqrt(level)[:, None],
         level=float(np.sqrt(np.median(level))),
         residues=fit.system.scaled_residues(),
     )
