@@ -122,9 +122,7 @@ def plot(
 
 @app.command()
 def show(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a run, or of a campaign with its pipelines and runs.")
-    ],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, or of a campaign.")],
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Where to listen; 0 for any free port.")] = 0,
     browser: Annotated[
         bool | None, typer.Option("--browser/--no-browser", help="Open the page; by default on a desktop only.")
