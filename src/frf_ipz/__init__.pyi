@@ -1,5 +1,9 @@
 from .diagnosis.apply import apply_to_frfs as apply_to_frfs
 from .diagnosis.apply import apply_to_model as apply_to_model
+from .diagnosis.comparing.compare import Comparison as Comparison
+from .diagnosis.comparing.compare import compare as compare
+from .diagnosis.comparing.states import CompareOptions as CompareOptions
+from .diagnosis.comparing.states import State as State
 from .diagnosis.diagnose import diagnose as diagnose
 from .diagnosis.observed import observe as observe
 from .diagnosis.options import DiagnoseOptions as DiagnoseOptions

@@ -1,0 +1,69 @@
+"""A model as its measurement showed it: what was fitted within tolerances, put into the matrices.
+
+Errors of mass and stiffness act on the modes of the band. With their shapes Phi and with 1 + mu and Lambda + kappa for
+mass and stiffness there, ``M + (M Phi) mu (M Phi)^T`` and ``K + (M Phi) kappa (M Phi)^T`` have exactly the fitted
+modes, and every other mode as before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg, sparse
+
+from frf_ipz.fe.assembly import apply
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.physics.response import Modes
+    from frf_ipz.diagnosis.search.hypothesis import Hypothesis
+    from frf_ipz.structure import Matrix, StructuralModel
+
+
+def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
+    """Put what was fitted within tolerances into a model.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Nothing is missing: no causes.
+    unknown : (n_nuisance,) array
+        What was fitted, in standard deviations. Scatter of stiffness, mass and damping is used; places and gains
+        belong to the test, and cords to the way it was hung.
+
+    Returns
+    -------
+    StructuralModel
+        With the fitted modes.
+    """
+    values = unknown.copy()
+    sizes = hypothesis.nuisance.sizes
+    values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # cords
+    modes = hypothesis.modes(np.zeros(0), values)
+    model, m = hypothesis.specimen.model, hypothesis.nuisance.n_modes
+    plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)
+    momentum = apply(model.mass_all, hypothesis.basis.vectors @ plain)
+    momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
+    back = linalg.inv(modes.rotation)
+    mass = back.T @ back - np.eye(m)
+    stiffness = back.T @ np.diag(modes.squares[:m]) @ back - np.diag(modes.omega[:m] ** 2)
+    return replace(
+        model,
+        mass_all=_with(model.mass_all, momentum, mass),
+        stiffness_all=_with(model.stiffness_all, momentum, stiffness),
+        modal_damping=_damping(model, modes, hypothesis.nuisance.n_rigid, m),
+    )
+
+
+def _with(matrix: Matrix, momentum: FloatArray, block: FloatArray) -> Matrix:
+    added = momentum @ ((block + block.T) / 2) @ momentum.T
+    return sparse.csr_array(matrix + sparse.csr_array((added + added.T) / 2))
+
+
+def _damping(model: StructuralModel, modes: Modes, n_rigid: int, m: int) -> FloatArray:
+    """Fitted ratios of elastic modes; beyond them what the model states."""
+    if not model.modal_damping.size:
+        return model.modal_damping
+    return np.concatenate([modes.ratio[n_rigid:m], modes.stated_ratio[m : m + 1]])

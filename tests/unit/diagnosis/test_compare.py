@@ -1,0 +1,134 @@
+"""What changed between two states of a beam whose model is wrong in mass, stiffness and damping."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from diagnosed import BAND_HZ, beam, labels, measured, observed
+from frf_ipz.diagnosis.comparing.learn import bench_of, learn, nominal_after
+from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.errors import InputError
+from frf_ipz.fe.changes import scaled_parts, with_point_masses
+from frf_ipz.fe.response import model_frfs
+
+FEW = frf_ipz.CompareOptions(
+    effects=("added_mass", "local_stiffness", "grounded_spring", "sensor_gain", "damping_level")
+)
+ADDED_KG, HUNG_KG = 0.004, 0.008
+SCATTER = 0.004  # relative, of the stiffness from test to test
+SIZE = 0.05  # relative: 5 % is what the model may be wrong by
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+@pytest.fixture(scope="module")
+def real(nominal):
+    """The machine: 3 % stiffer than its model, with 6 g (4 %) more and other damping."""
+    return real_one(nominal)
+
+
+def real_one(model):
+    heavier = with_point_masses(model, {10: 0.006})
+    damping = np.array([0.013, 0.008, 0.011, 0.009])
+    return replace(heavier, stiffness_all=1.03 * heavier.stiffness_all, modal_damping=damping)
+
+
+def state(model, machine, seed, **more):
+    return frf_ipz.State(model=model, observed=observed(measured(machine, seed=seed, **more)))
+
+
+def test_nothing_has_changed(nominal, real):
+    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, real, 2), FEW)
+    assert not found.is_changed
+    assert found.changes == ()
+    assert found.statement.startswith("Nothing has changed")
+
+
+def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
+    after = with_point_masses(real, {12: ADDED_KG})
+    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    assert found.diagnosis.verdict == "explained"
+    (change,) = found.changes
+    assert (change.effect, dict(change.location)) == ("added_mass", {"nodes": [12]})
+    size = change.parameters["mass_kg"]
+    assert size.low < ADDED_KG < size.high
+    assert size.value == pytest.approx(ADDED_KG, rel=SIZE)
+
+
+def test_a_mass_that_is_gone_is_found(nominal):
+    with_piece = with_point_masses(nominal, {14: 1.2 * HUNG_KG})  # its mass is not known well either
+    machine = real_one(with_point_masses(nominal, {14: HUNG_KG}))
+    found = frf_ipz.compare(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), FEW)
+    (change,) = found.changes
+    assert (change.effect, dict(change.location)) == ("mass_loss", {"nodes": [14]})
+    assert change.parameters["mass_kg"].value == pytest.approx(HUNG_KG, rel=SIZE)
+    assert "is gone from node 14" in found.statement
+
+
+def test_softer_elements_are_found_with_their_place(nominal, real):
+    after = scaled_parts(real, "element", ["7", "8"], stiffness_ratio=0.8)
+    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    (change,) = found.changes
+    assert (change.effect, dict(change.location)) == ("local_stiffness", {"elements": [7, 8]})
+    assert change.parameters["stiffness_ratio"].value == pytest.approx(0.8, rel=SIZE)
+
+
+def test_gains_that_were_there_before_are_no_change(nominal, real):
+    def channels(frequency_hz):
+        return np.tile([1.05, 0.97], (len(frequency_hz), 1))
+
+    before, after = (state(nominal, real, seed, factors=channels) for seed in (1, 2))
+    assert not frf_ipz.compare(before, after, FEW).is_changed
+    assert frf_ipz.compare(state(nominal, real, 1), after, FEW).is_changed
+
+
+def test_repeats_teach_what_differs_from_test_to_test(nominal, real):
+    drawn = np.random.default_rng(0).standard_normal(7)
+    machines = [replace(real, stiffness_all=(1 + SCATTER * one) * real.stiffness_all) for one in drawn]
+    repeats = [state(nominal, machine, seed) for seed, machine in enumerate(machines)]
+    found = frf_ipz.compare(repeats[:-1], repeats[-1], FEW)
+    assert not found.is_changed
+    std = SCATTER * drawn[:-1].std(ddof=1) / 2  # of frequencies; tolerances are half widths
+    assert found.scatter.frequency_tolerance == pytest.approx(np.sqrt(3 * (1 + 1 / 6)) * std, rel=SIZE)
+    assert frf_ipz.compare(repeats[4], repeats[6], FEW).is_changed
+
+
+def test_the_corrected_model_has_the_measured_frfs(nominal, real):
+    one = state(nominal, real, 1, noise=1e-6)
+    source = divide(one.observed)
+    options = replace(FEW, model=replace(FEW.model, gain_tolerance=1e-5, position_tolerance_m_per_m=1e-6))
+    corrected = nominal_after(one, learn([one], options), options, source)
+    s = 2j * np.pi * np.linspace(*BAND_HZ, 300)
+    wanted, got, plain = (model_frfs(model, labels(), s) for model in (real, corrected, nominal))
+    assert np.linalg.norm(got - wanted) < 0.02 * np.linalg.norm(plain - wanted)
+
+
+def test_a_node_cannot_lose_more_than_it_has(nominal):
+    one = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
+    specimen = bench_of(one, divide(one.observed), FEW.model).specimen
+    effect = MassLoss()
+    (place,) = [place for place in effect.places(specimen) if place.location == {"nodes": [14]}]
+    (mass,) = effect.parameters(specimen, place)
+    assert HUNG_KG < mass.high < HUNG_KG + specimen.mass_kg / 16  # and what an element has
+    change = effect.build(specimen, place)(np.array([mass.high]))
+    left = (specimen.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
+    assert np.linalg.eigvalsh(left).min() > 0
+
+
+def test_no_state_before_is_refused(nominal, real):
+    with pytest.raises(InputError, match="no state before"):
+        frf_ipz.compare([], state(nominal, real, 1), FEW)
+
+
+def test_states_of_other_channels_are_refused(nominal, real):
+    other = state(nominal, real, 2, names=labels(outputs=("17:+z",)))
+    with pytest.raises(InputError, match="channels"):
+        frf_ipz.compare([state(nominal, real, 1), other], state(nominal, real, 3), FEW)
+    with pytest.raises(InputError, match="channels"):
+        frf_ipz.compare(state(nominal, real, 1), other, FEW)
