@@ -7,6 +7,7 @@ from .diagnosis.comparing.states import State as State
 from .diagnosis.diagnose import diagnose as diagnose
 from .diagnosis.observed import observe as observe
 from .diagnosis.options import DiagnoseOptions as DiagnoseOptions
+from .diagnosis.parameters import diagnosed_basis as diagnosed_basis
 from .dofs import Dof as Dof
 from .dofs import parse_dof as parse_dof
 from .errors import FrfIpzError as FrfIpzError

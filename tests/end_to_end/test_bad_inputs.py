@@ -141,6 +141,10 @@ CASES = {
         lambda f: edit(f, "pipeline.toml", "[10.0, 600.0]", "[130.0, 250.0]"),
         ["no mode", "248 Hz", "band_hz"],
     ),
+    "parameters of a diagnosis that is not applied": (
+        lambda f: edit(f, "pipeline.toml", "[predict]", '[update]\nparameters = "diagnosis"\n[predict]'),
+        ["pipeline.toml", "parameters", "apply = true"],
+    ),
     "mass singular": (lambda f: matrices(f, mass=np.array([[1.0, 1.0], [1.0, 1.0]])), ["M.mtx", "definite"]),
     "mass indefinite": (lambda f: matrices(f, mass=np.diag([1.0, -1.0])), ["M.mtx", "21:z", "mass -1"]),
     "stiffness indefinite": (lambda f: matrices(f, stiffness=np.diag([1e6, -1e6])), ["K.mtx", "definite"]),

@@ -9,6 +9,7 @@ import pytest
 from frf_ipz.cli import main as command
 from frf_ipz.export.design_files import load_ensemble, read_weights
 from frf_ipz.export.state_space import load_state_space
+from frf_ipz.runs.folder import read_run
 from small_campaign import write_campaign
 
 FILES = {
@@ -21,6 +22,7 @@ FILES = {
     "report": {"report.html"},
 }
 DELAY = 2e-4  # s
+ROUNDING = 1e-6  # of the largest change: matrices are differences of large numbers
 LATE = 5e-5  # s: of the delay that is found, half a sample of the recordings
 
 
@@ -86,3 +88,15 @@ def test_a_delay_that_was_fitted_is_in_the_state_space_when_asked_for(tmp_path, 
     model = load_state_space(tmp_path / "out" / "statespace.json")
     row = model.state_labels.index("delay of 21:+z 1")
     assert abs(-2 / model.A[row, row] - DELAY) < LATE
+
+
+def test_an_update_changes_what_the_diagnosis_has_found_and_nothing_else(tmp_path, monkeypatch):
+    pipeline = write_campaign(tmp_path)
+    options = '[diagnose]\napply = true\neffects = ["global_stiffness"]\n[update]\nparameters = "diagnosis"\n'
+    pipeline.write_text(pipeline.read_text() + options)
+    stage(monkeypatch, "update", pipeline, tmp_path / "out")
+    updated = read_run(tmp_path / "out").load("update")
+    before, change = updated.nominal.stiffness, updated.model.stiffness - updated.nominal.stiffness
+    factor = np.vdot(before, change) / np.vdot(before, before)
+    assert factor != 0
+    np.testing.assert_allclose(change, factor * before, atol=ROUNDING * np.abs(change).max())

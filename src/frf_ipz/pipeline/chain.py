@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.pipeline import stages
 from frf_ipz.pipeline.desk import Desk
+from frf_ipz.pipeline.stages import measurement, mismatch, modelling, results
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,29 +41,29 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
         The name of each stage when it is done.
     """
     desk = Desk(job=job, folder=folder, progress=progress)
-    recordings = stages.ingest(desk)
+    recordings = measurement.ingest(desk)
     yield "ingest"
     frfs, model = recordings.frfs, job.model
     options = job.pipeline.file.diagnose
     diagnosis = None
     if model is not None and diagnosing and options is not None and options.apply:
-        diagnosis = stages.diagnose(desk, model, frfs)
-        model, frfs = stages.apply_diagnosis(model, frfs, diagnosis)
-    fit = stages.fit(desk, frfs, corrected_by=diagnosis)
+        diagnosis = mismatch.diagnose(desk, model, frfs)
+        model, frfs = mismatch.apply_diagnosis(desk, model, frfs, diagnosis)
+    fit = measurement.fit(desk, frfs, corrected_by=diagnosis)
     yield "fit"
     if model is not None:
         if diagnosing:
             if diagnosis is None:
-                stages.diagnose(desk, model, frfs)
+                mismatch.diagnose(desk, model, frfs)
             yield "diagnose"
-        reduced = stages.reduce(desk, model, fit, corrected_by=diagnosis)
-        pairs = stages.pair(desk, fit, reduced)
+        reduced = modelling.reduce(desk, model, fit, corrected_by=diagnosis)
+        pairs = modelling.pair(desk, fit, reduced)
         yield "pair"
-        updated = stages.update(desk, model, reduced, fit, pairs)
+        updated = modelling.update(desk, model, reduced, fit, pairs, corrected_by=diagnosis)
         yield "update"
-        stages.predict(desk, updated, fit, frfs)
+        results.predict(desk, updated, fit, frfs)
         yield "predict"
-        stages.export(desk, updated, fit, corrected_by=diagnosis)
+        results.export(desk, updated, fit, corrected_by=diagnosis)
         yield "export"
-    stages.report(desk)
+    results.report(desk)
     yield "report"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from frf_ipz.toml_files import STRICT
 
@@ -15,6 +16,9 @@ class UpdateOptions:
     ----------
     method : str
         ``minimal-change`` or ``ipz`` (as published), or the name of a further module in `updating.methods`.
+    parameters : str
+        ``parts`` (those of the FE model and what they cannot express) or ``diagnosis`` (what was found missing, and
+        nothing else; needs ``[diagnose] apply = true``).
     mass : bool
         Let the mass change too (minimal-change).
     damping : bool
@@ -36,6 +40,7 @@ class UpdateOptions:
     __pydantic_config__ = STRICT
 
     method: str = "minimal-change"
+    parameters: Literal["parts", "diagnosis"] = "parts"
     mass: bool = False
     damping: bool = True
     max_iterations: int | None = None

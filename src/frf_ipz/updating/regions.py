@@ -58,7 +58,7 @@ def reduced_regions(full: StructuralModel, model: ReducedModel) -> tuple[Region,
     tuple of Region
         Parts that have stiffness, at most `MAX_REGIONS`; none where the model names no parts.
     """
-    motion, known = _motion(full, model)
+    motion, known = motion_of_all(full, model)
     parts = [part for part in full.parts if part.kind != "point" and known[part.indices].all()]
     if not parts:
         return ()
@@ -70,8 +70,23 @@ def reduced_regions(full: StructuralModel, model: ReducedModel) -> tuple[Region,
     return tuple(region for region in regions if np.abs(region.stiffness).max() > 0)
 
 
-def _motion(full: StructuralModel, model: ReducedModel) -> tuple[FloatArray, BoolArray]:
-    """Motion of every DOF of the FE model for unit motions of the retained ones, and which are known."""
+def motion_of_all(full: StructuralModel, model: ReducedModel) -> tuple[FloatArray, BoolArray]:
+    """Give the motion of every DOF of an FE model for unit motions of the retained ones.
+
+    Parameters
+    ----------
+    full : StructuralModel
+        The FE model.
+    model : ReducedModel
+        What it was reduced to.
+
+    Returns
+    -------
+    motion : (n_all, r) array
+        0 for DOFs that are held or that the expansion does not know.
+    known : (n_all,) bool array
+        False for those that the expansion does not know.
+    """
     motion = np.zeros((len(full.all_dofs), len(model.dofs)))
     known = full.fixed.copy()
     places = np.array([full.place(dof) for dof in model.expanded_dofs], int)

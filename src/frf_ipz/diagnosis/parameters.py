@@ -1,0 +1,120 @@
+"""The parameters of what was found, for an update that changes these and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.errors import InputError
+from frf_ipz.fe.assembly import apply
+from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
+from frf_ipz.updating.regions import motion_of_all
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.structure import ReducedModel, StructuralModel
+
+STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly linear in it
+PRIOR = 0.1  # standard deviation of a value, relative: an update refines a diagnosis, and does not begin anew
+
+
+def diagnosed_basis(
+    nominal: StructuralModel,
+    diagnosis: Diagnosis,
+    reduced: ReducedModel,
+    effects: Mapping[str, Effect] | None = None,
+) -> ParameterBasis:
+    """Take the parameters of a diagnosis as those of an update.
+
+    Parameters
+    ----------
+    nominal : StructuralModel
+        The model that was diagnosed.
+    diagnosis : Diagnosis
+        What it lacks.
+    reduced : ReducedModel
+        Of the model with what it lacked, as `apply_to_model` gives it.
+    effects : mapping of str to Effect, optional
+        Those that were looked for; the shipped ones where it is left out.
+
+    Returns
+    -------
+    ParameterBasis
+        Relative changes of the values that were found, with matrices about these values.
+
+    Raises
+    ------
+    InputError
+        If nothing was found that has a place in the structure.
+    """
+    moving = []
+    for place, finding in enumerate(diagnosis.findings):
+        for index, name in enumerate(_names(finding)):
+            low, high = (
+                apply_to_model(nominal, _with_value(diagnosis, place, index, factor), effects)
+                for factor in (1 - STEP, 1 + STEP)
+            )
+            slope = _reduced(low, high, reduced) / (2 * STEP)
+            if np.abs(slope).max() > 0:
+                moving.append((f"{finding.effect} {name}", slope))
+    if not moving:
+        raise InputError(
+            "the diagnosis found nothing in the structure that an update could change; leave out [update] parameters"
+        )
+    slopes = np.array([slope for _, slope in moving])
+    return ParameterBasis(
+        names=tuple(name for name, _ in moving),
+        mass=slopes[:, 0],
+        damping=slopes[:, 1],
+        stiffness=slopes[:, 2],
+        logarithmic=np.zeros(len(moving), bool),
+        terms=(PriorTerm(name="what was found", root=np.eye(len(moving)), std=PRIOR),),
+        chosen=True,
+    )
+
+
+def _names(finding: Finding) -> list[str]:
+    """Names of the values; of one that the contract does not name, its number."""
+    named = [name for name, value in finding.parameters.items() if not isinstance(value, str)]
+    return named if len(named) == len(finding.values) else [str(number + 1) for number in range(len(finding.values))]
+
+
+def _with_value(diagnosis: Diagnosis, place: int, index: int, factor: float) -> Diagnosis:
+    finding = diagnosis.findings[place]
+    values = tuple(value * factor if number == index else value for number, value in enumerate(finding.values))
+    findings = (*diagnosis.findings[:place], replace(finding, values=values), *diagnosis.findings[place + 1 :])
+    return replace(diagnosis, findings=findings)
+
+
+def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel) -> FloatArray:
+    """Difference of mass, damping and stiffness of two models in the coordinates of the reduced one, (3, r, r)."""
+    motion, _ = motion_of_all(low, reduced)
+    mass, viscous, stiffness = (
+        motion.T @ apply(sparse.csr_array(above - below), motion)
+        for above, below in (
+            (high.mass_all, low.mass_all),
+            (high.damping_all, low.damping_all),
+            (high.stiffness_all, low.stiffness_all),
+        )
+    )
+    return np.array([mass, viscous + _modal(high, reduced) - _modal(low, reduced), stiffness])
+
+
+def _modal(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
+    """Damping matrix of a model's modal damping ratios, N s/m."""
+    poles = undamped_poles(reduced.mass, reduced.stiffness)
+    omega = np.sqrt(np.maximum(poles.values.real, 0.0))
+    given = model.modal_damping if model.modal_damping.size else np.zeros(1)
+    ratios = given[np.minimum(np.arange(len(omega)), len(given) - 1)]
+    shapes = reduced.mass @ poles.right.real
+    return np.asarray((shapes * (2 * ratios * omega)) @ shapes.T)

@@ -1,0 +1,122 @@
+"""The stage that says what the model left out, and what the others need to know of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING
+
+from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.catalogue.finder import chosen_effects
+from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
+from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.frf import FrfSet
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.progress import Progress
+    from frf_ipz.structure import StructuralModel
+
+
+def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
+    """Say what the model left out.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model.
+    frfs : FrfSet
+        The measured FRFs.
+
+    Returns
+    -------
+    Diagnosis
+        The verdict and what it rests on.
+    """
+    job = desk.job
+    options = job.pipeline.file.diagnose or DiagnoseOptions()
+    ingest_options = job.pipeline.file.ingest
+    band = {"fit": [job.pipeline.file.fit.band_hz, job.pipeline.file.fit.exclude_hz]}
+
+    def compute(progress: Progress) -> Diagnosis:
+        seen = observe(job.test, ingest_options, frfs, fit=job.pipeline.file.fit)
+        return find_mismatch(model, seen, options, folder=job.pipeline.path.parent, progress=progress)
+
+    return desk.stage(
+        "diagnose",
+        {"options": asdict(options), "model": job.model_key, "after": desk.after("ingest"), **band},
+        compute,
+        lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
+    )
+
+
+def apply_diagnosis(
+    desk: Desk, model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis
+) -> tuple[StructuralModel, FrfSet]:
+    """Put what was found missing into the model, and take what was wrong in the measuring chain off the FRFs.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model.
+    frfs : FrfSet
+        The measured FRFs.
+    diagnosis : Diagnosis
+        What was found.
+
+    Returns
+    -------
+    model : StructuralModel
+        The corrected model.
+    frfs : FrfSet
+        The corrected FRFs.
+    """
+    effects = effects_of(desk)
+    return apply_to_model(model, diagnosis, effects), apply_to_frfs(frfs, diagnosis, effects)
+
+
+def effects_of(desk: Desk) -> dict[str, Effect]:
+    """Give the effects that were looked for, users' own among them.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+
+    Returns
+    -------
+    dict of str to Effect
+        By name.
+    """
+    pipeline = desk.job.pipeline
+    return chosen_effects(pipeline.file.diagnose or DiagnoseOptions(), pipeline.path.parent)
+
+
+def corrections(diagnosis: Diagnosis | None) -> str:
+    """Say what the model and the FRFs were corrected by, for the key of a stage.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis or None
+        What was applied, if anything was.
+
+    Returns
+    -------
+    str
+        Empty for nothing.
+    """
+    return "" if diagnosis is None else repr(diagnosis.findings)
+
+
+def _write_json(table: dict[str, object], path: Path) -> None:
+    path.write_text(json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,180 @@
+"""Stages that reduce the model, pair it with what was measured, and update it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray
+from frf_ipz.diagnosis.parameters import diagnosed_basis
+from frf_ipz.errors import InputError
+from frf_ipz.export import run_tables as tables
+from frf_ipz.export.state_space import save_reduced_model
+from frf_ipz.export.tables import write_table
+from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.pairing.assignment import pair as pair_roots
+from frf_ipz.pipeline.sensors import unweighed_sensors
+from frf_ipz.pipeline.stages.mismatch import corrections, effects_of
+from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.update import update_model
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.dofs import Dof
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.progress import Progress
+    from frf_ipz.structure import ReducedModel, StructuralModel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+
+def reduce(
+    desk: Desk, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+) -> ReducedModel:
+    """Turn the FE model into a reduced model in physical DOFs.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model.
+    modal_fit : ModalFit
+        Says which band was fitted.
+    corrected_by : Diagnosis, optional
+        What the model was corrected by, if it was.
+
+    Returns
+    -------
+    ReducedModel
+        The reduced model.
+    """
+    job = desk.job
+    options = job.pipeline.file.reduce
+    desk.stage("model", {"model": job.model_key, "corrected": corrections(corrected_by)}, lambda _: model.geometry)
+    return desk.stage(
+        "reduce",
+        {
+            "options": asdict(options),
+            "model": job.model_key,
+            "corrected": corrections(corrected_by),
+            "after": desk.after("fit"),
+            "points": repr(job.points),
+        },
+        lambda _: reduce_model(
+            model,
+            options,
+            actuators=_once(label.input_dof for label in modal_fit.labels),
+            sensors=_once(label.output_dof for label in modal_fit.labels),
+            points=job.points,
+            band_hz=modal_fit.band_hz,
+        ),
+    )
+
+
+def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
+    """Set measured poles and zeros against those of the model.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    modal_fit : ModalFit
+        The fitted model.
+    reduced : ReducedModel
+        The reduced FE model.
+
+    Returns
+    -------
+    Pairs
+        Who belongs to whom, and why.
+    """
+    return desk.stage(
+        "pair",
+        {"after": desk.after("fit", "reduce")},
+        lambda _: pair_roots(modal_fit, reduced),
+        lambda result: {
+            "pairs.parquet": partial(
+                write_table, tables.pair_table(result, modal_fit.labels, _unknown_roots(len(result.targets)))
+            )
+        },
+    )
+
+
+def update(
+    desk: Desk,
+    model: StructuralModel,
+    reduced: ReducedModel,
+    modal_fit: ModalFit,
+    pairs: Pairs,
+    *,
+    corrected_by: Diagnosis | None = None,
+) -> UpdatedModel:
+    """Bring the reduced model to the measured poles and zeros.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model, whose parts may be softer or stiffer than they should be.
+    reduced : ReducedModel
+        The reduced FE model.
+    modal_fit : ModalFit
+        The fitted model with its covariance.
+    pairs : Pairs
+        The targets.
+    corrected_by : Diagnosis, optional
+        What the model was corrected by, if it was: `[update] parameters = "diagnosis"` changes these values only.
+
+    Returns
+    -------
+    UpdatedModel
+        The updated model.
+
+    Raises
+    ------
+    InputError
+        If the parameters are to be those of a diagnosis that is not applied.
+    """
+    options = desk.job.pipeline.file.update
+    sensors = unweighed_sensors(desk.job.test, modal_fit.labels)
+    nominal = desk.job.model
+    if options.parameters == "diagnosis" and corrected_by is None:
+        raise InputError(
+            f"{desk.job.pipeline.path}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
+            "[diagnose] apply = true, or leave parameters out"
+        )
+
+    def compute(progress: Progress) -> UpdatedModel:
+        if options.parameters == "diagnosis" and corrected_by and nominal is not None and model is not nominal:
+            basis = diagnosed_basis(nominal, corrected_by, reduced, effects_of(desk))
+        else:
+            basis = structural_basis(model, reduced, mass=options.mass, sensors=sensors)
+        return update_model(reduced, modal_fit, pairs, options, basis=basis, progress=progress)
+
+    return desk.stage(
+        "update",
+        {"options": asdict(options), "sensors": repr(sensors), "after": desk.after("pair")},
+        compute,
+        lambda result: {
+            "pairs.parquet": partial(write_table, tables.pair_table(pairs, modal_fit.labels, result.after)),
+            "parameters.parquet": partial(write_table, tables.history_table(result)),
+            "updated_model.npz": partial(save_reduced_model, result.model),
+        },
+    )
+
+
+def _once(dofs: Iterable[Dof]) -> tuple[Dof, ...]:
+    return tuple(dict.fromkeys(dofs))
+
+
+def _unknown_roots(count: int) -> ComplexArray:
+    """Roots that are not known yet."""
+    return np.full(count, complex(np.nan, np.nan))

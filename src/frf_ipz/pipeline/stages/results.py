@@ -1,0 +1,125 @@
+"""Stages that give what users take away: predictions, state spaces, the report."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.export import run_tables as tables
+from frf_ipz.export.design_files import save_ensemble, save_weights
+from frf_ipz.export.state_space import save_state_space, to_ensemble, to_state_space
+from frf_ipz.export.tables import write_table
+from frf_ipz.export.uncertainty import uncertainty_weights
+from frf_ipz.frf import FrfSet
+from frf_ipz.pipeline.stages.delays import known_delays
+from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.report.page import write_report
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.dofs import Dof
+    from frf_ipz.export.options import ExportOptions
+    from frf_ipz.export.state_space import StateSpaceModel
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.runs.folder import Writers
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
+
+
+def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
+    """Predict FRFs at the points of interest, on the measured lines of the band.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    updated : UpdatedModel
+        The updated model.
+    modal_fit : ModalFit
+        Says which lines were fitted.
+    frfs : FrfSet
+        The measured FRFs.
+
+    Returns
+    -------
+    Prediction
+        With bands.
+    """
+    job = desk.job
+    if job.reference is not None:
+        desk.stage("reference", {"file": job.inputs[str(job.pipeline.reference_path)]}, lambda _: job.reference)
+    lines = frfs.frequency_hz[frfs.in_band(modal_fit.band_hz)]
+    return desk.stage(
+        "predict",
+        {"points": repr(job.points), "after": desk.after("update")},
+        lambda _: predict_frfs(updated, job.points, modal_fit.labels, lines),
+        lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
+    )
+
+
+def export(
+    desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+) -> StateSpaceModel:
+    """Turn the updated model into a state space; and, for robust design, into members of its posterior.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    updated : UpdatedModel
+        The updated model.
+    modal_fit : ModalFit
+        Names the sensors and actuators.
+    corrected_by : Diagnosis, optional
+        What the FRFs were corrected by, if they were: a delay belongs to the plant.
+
+    Returns
+    -------
+    StateSpaceModel
+        With named inputs and outputs.
+    """
+    job = desk.job
+    options = job.pipeline.file.export
+    delays = known_delays(modal_fit, corrected_by)
+    return desk.stage(
+        "export",
+        {"options": asdict(options), "points": repr(job.points), "after": desk.after("update"), "delays": delays},
+        lambda _: to_state_space(updated, modal_fit.labels, job.points, options, delays_s=delays),
+        lambda model: {
+            **{name: partial(save_state_space, model) for name in ("statespace.json", "statespace.mat")},
+            **(_design_files(updated, modal_fit, job.points, options, delays) if options.ensemble else {}),
+        },
+    )
+
+
+def report(desk: Desk) -> None:
+    """Put everything that the folder holds on one page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    """
+    key = desk.sign("report", {"after": sorted(desk.keys.values())})
+    tell = desk.listener("report")
+    desk.folder.page("report", key, {"report.html": lambda path: write_report(desk.folder, path, progress=tell)})
+
+
+def _design_files(
+    updated: UpdatedModel, modal_fit: ModalFit, points: Sequence[Dof], options: ExportOptions, delays: dict[str, float]
+) -> Writers:
+    """Members of the posterior, and the bound of what they do to each output."""
+    members = to_ensemble(updated, modal_fit.labels, points, options, delays_s=delays)
+    weights = uncertainty_weights(updated, modal_fit.labels, points, np.geomspace(*modal_fit.band_hz, WEIGHT_LINES))
+    return {
+        "statespace_ensemble.mat": partial(save_ensemble, members),
+        "uncertainty.json": partial(save_weights, weights),
+    }
