@@ -23,6 +23,7 @@ from frf_ipz.identification.likelihood.refinement import Refined, refine
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, all_terms
 from frf_ipz.identification.lines.measured import MeasuredLines, measured_lines, with_noise_of
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.identification.results.gains import find_gains
 from frf_ipz.identification.results.measured_model import measured_model, mode_order, residue_covariance
 from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import FoundZeros, find_zeros
@@ -95,7 +96,7 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
     progress(0.7, "refining")
     fitted = _refined(lines, selected, terms)
     progress(0.8, "finding zeros and errors")
-    return _as_modal_fit(frfs, fitted, start=start.table, decisions=selected.decisions, delay_s=delay_s)
+    return _as_modal_fit(frfs, fitted, options, start=start.table, decisions=selected.decisions, delay_s=delay_s)
 
 
 def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> ModalFit:
@@ -147,7 +148,7 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
         poles_are_held=True,
     )
     table = pd.DataFrame(columns=["order", "frequency_hz", "damping_ratio"])
-    return _as_modal_fit(frfs, fitted, start=table, decisions=(), delay_s=np.zeros(frfs.n_frfs))
+    return _as_modal_fit(frfs, fitted, options, start=table, decisions=(), delay_s=np.zeros(frfs.n_frfs))
 
 
 def _selected(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
@@ -224,17 +225,31 @@ def _excess(judgement: Judgement, fit: Refined) -> FloatArray:
 
 
 def _as_modal_fit(
-    frfs: FrfSet, fitted: _Fitted, *, start: pd.DataFrame, decisions: tuple[dict[str, object], ...], delay_s: FloatArray
+    frfs: FrfSet,
+    fitted: _Fitted,
+    options: FitOptions,
+    *,
+    start: pd.DataFrame,
+    decisions: tuple[dict[str, object], ...],
+    delay_s: FloatArray,
 ) -> ModalFit:
     lines, fit, terms = fitted.lines, fitted.fit, fitted.terms
     order, n_modes = mode_order(fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))
     modes = order[:n_modes]
     errors = fit_errors(fit, terms, _levels(fitted))
-    if fitted.poles_are_held:
-        errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
+    own = replace(errors, pole_root=np.zeros_like(errors.pole_root))  # errors of poles move equal FRFs alike
+    gains = find_gains(
+        frfs.labels,
+        fit.system.residues()[modes],
+        residue_covariance(own, np.zeros_like(lines.powers), modes),
+        options.gain,
+    )
+    errors = own if fitted.poles_are_held else errors
     found = find_zeros(errors, lines.s)
     unit = np.abs(lines.s[:, None]) ** lines.powers
     left = lines.receptance - response(fit.system, terms, lines.s)
+    of_frfs = pd.DataFrame({"delay_s": delay_s, "gain": gains.of_frf, "gain_std": gains.of_frf_std})
+    misfit = misfit_table(lines.frequency_hz, left * unit, np.sqrt(fitted.noise) * unit, frfs.labels)
     return ModalFit(
         model=measured_model(fit.system, terms, lines.powers, order, delay_s),
         n_modes=n_modes,
@@ -248,9 +263,11 @@ def _as_modal_fit(
         stabilization=start,
         decisions=pd.DataFrame(decisions, columns=["frequency_hz", "damping_ratio", "action", "reason"]),
         modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.judgement, modes),
-        misfit=misfit_table(lines.frequency_hz, left * unit, np.sqrt(fitted.noise) * unit, frfs.labels),
+        misfit=misfit.join(of_frfs, on="frf"),
+        gain=gains.of_frf,
+        channel_gains=gains.table,
         noise_from=fitted.noise_from,
-        warnings=_warnings(frfs, fitted),
+        warnings=(*_warnings(frfs, fitted), *gains.remarks),
     )
 
 

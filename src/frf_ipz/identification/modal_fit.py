@@ -47,7 +47,12 @@ class ModalFit:
     modes : DataFrame
         One row a mode: ``pole_id, frequency_hz, damping_ratio, mpc, quality`` and what the quality is made of.
     misfit : DataFrame
-        One row an FRF and band: ``frf, output_dof, input_dof, band_low_hz, band_high_hz, misfit, noise, ratio``.
+        One row an FRF and band: ``frf, output_dof, input_dof, band_low_hz, band_high_hz, misfit, noise, ratio``, and
+        what was fitted of the FRF as a whole: ``delay_s, gain, gain_std``.
+    gain : (n_frfs,) array
+        Gain of each FRF: as it was measured it is this times the true one. 1 unless gains were asked for.
+    channel_gains : DataFrame
+        One row a channel whose gain was asked for: ``channel, gain, gain_std``.
     noise_from : str
         ``recordings`` or ``misfit``: where the covariance's sigma comes from.
     warnings : tuple of str
@@ -67,6 +72,8 @@ class ModalFit:
     decisions: pd.DataFrame
     modes: pd.DataFrame
     misfit: pd.DataFrame
+    gain: FloatArray
+    channel_gains: pd.DataFrame
     noise_from: str
     warnings: tuple[str, ...] = ()
 

@@ -47,11 +47,14 @@ class FitOptions:
         Highest model order of the start; chosen from band and lines where it is left out.
     delay : bool
         Fit a pure delay for each output channel too.
+    gain : tuple of str
+        Channels whose constant gain is in doubt and is found; all others are trusted. A gain shows only where two FRFs
+        must be equal but for gains: with blow and sensor exchanged, or recorded by two channels.
 
     Raises
     ------
     InputError
-        If a band ends below its start.
+        If a band ends below its start, or a channel is named twice.
     """
 
     __pydantic_config__ = STRICT
@@ -63,9 +66,13 @@ class FitOptions:
     modes: Literal["complex", "real"] = "complex"
     max_order: int | None = None
     delay: bool = False
+    gain: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         bands = [] if self.band_hz is None else [("band_hz", self.band_hz)]
         for key, (low, high) in (*bands, *(("exclude_hz", pair) for pair in self.exclude_hz)):
             if not 0 <= low < high:
                 raise InputError(f"{key} = [{low:g}, {high:g}] is no band; give the lower frequency first")
+        for name in self.gain:
+            if self.gain.count(name) > 1:
+                raise InputError(f"gain names the channel '{name}' twice; name it once")

@@ -82,7 +82,7 @@ def _residue_matrices(
     for column, label in enumerate(fit.labels):
         place = outputs.index(label.output_dof.unsigned), inputs.index(label.input_dof.unsigned)
         delay = np.exp(-poles * fit.model.delay_s[column])
-        receptance = fit.model.residues[: len(poles), column] * delay / poles**label.quantity.power
+        receptance = fit.model.residues[: len(poles), column] * delay / poles**label.quantity.power / fit.gain[column]
         matrices[:, *place] = label.sign * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance
         measured[place] = True
     return matrices, measured

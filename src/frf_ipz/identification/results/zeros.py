@@ -117,7 +117,8 @@ def _near_band(
     """Choose the eigenvalues in the band and beside it, and say which FRF each belongs to."""
     modulus = np.abs(eigenvalues)
     near = (eigenvalues.imag > -ON_AXIS * band[1]) & (modulus > BESIDE[0] * band[0]) & (modulus < BESIDE[1] * band[1])
-    near &= coefficients.any(axis=1)[:, None]  # a channel without any signal has no zeros
+    has_signal: BoolArray = np.abs(coefficients).max(axis=1) > 0
+    near &= has_signal[:, None]  # a channel without any has no zeros
     return eigenvalues[near], np.nonzero(near)[0]
 
 
