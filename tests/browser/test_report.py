@@ -12,7 +12,7 @@ from synthetic_run import Folder, many_frfs, synthetic_folder
 pytestmark = pytest.mark.browser
 
 PATIENCE_S = 60.0  # on a machine that does much else
-ARROW_RIGHT = "\ue014"  # as WebDriver writes it
+ARROW_RIGHT, TAB, ENTER, SPACE = "\ue014", "\ue004", "\ue007", " "  # as WebDriver writes them
 DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm"
 
 
@@ -51,6 +51,11 @@ def axis_range(page, name, axis="xaxis"):
 
 def visible_traces(page, name):
     script = f"return document.querySelector('#{name} .plot').data.filter((t) => t.visible !== false).length"
+    return page.execute_script(script)
+
+
+def drawn_traces(page, name):
+    script = f"return document.querySelector('#{name} .plot').data.filter((t) => (t.visible ?? true) === true).length"
     return page.execute_script(script)
 
 
@@ -116,6 +121,34 @@ def test_keys_zoom_and_move_and_go_back(page):
     assert axis_range(page, "frf")[0] > zoomed[0]
     plot.send_keys("0")
     np.testing.assert_allclose(axis_range(page, "frf"), whole, rtol=1e-9, atol=0)
+
+
+def test_the_legend_is_worked_with_the_keyboard_and_shows_where_one_is(page):
+    shown = visible_traces(page, "frf")
+    entries = "#frf .legend .traces"
+    page.execute_script("document.querySelector('#frf .plot').focus()")
+    for _ in range(40):  # the buttons of the picture come before
+        page.switch_to.active_element.send_keys(TAB)
+        if page.execute_script("return document.activeElement.matches(arguments[0])", entries):
+            break
+    entry = page.switch_to.active_element
+    label = entry.get_attribute("aria-label")
+    assert (entry.get_attribute("role"), entry.get_attribute("aria-pressed")) == ("button", "true")
+    assert label
+    assert page.execute_script("return getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    for key, pressed in ((ENTER, "false"), (SPACE, "true")):
+        page.switch_to.active_element.send_keys(key)
+        now = f"document.activeElement.getAttribute('aria-pressed') === '{pressed}'"
+        wait_for(page, f"return {now} && document.activeElement.matches('{entries}')")
+        assert page.switch_to.active_element.get_attribute("aria-label") == label
+        assert (drawn_traces(page, "frf") < shown) == (pressed == "false")
+
+
+def test_what_is_switched_off_in_a_legend_stays_off_when_the_page_is_drawn_anew(page):
+    page.execute_script("Plotly.restyle(document.querySelector('#frf .plot'), {visible: 'legendonly'}, [0])")
+    page.find_element("id", "theme").click()
+    assert page.execute_script("return document.querySelector('#frf .plot').data[0].visible") == "legendonly"
+    page.find_element("id", "theme").click()
 
 
 def test_the_dark_theme_changes_page_and_pictures(page):

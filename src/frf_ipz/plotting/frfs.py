@@ -6,20 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.phases import PHASE_LIMITS, phase_degrees
+from frf_ipz.plotting.curves import PHASE_LIMITS, confidence_band, magnitude_title, phase_degrees
 from frf_ipz.plotting.style import MEASURED, axes_or_new, colour, dash, label_axes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.axes import Axes
 
-    from frf_ipz.frf import FrfLabel, FrfSet
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
 
 FREQUENCY = "Frequency, Hz"
-Q95 = 1.96  # standard deviations of a 95 % interval
-LEAST = 0.1  # of the magnitude: a band that reaches below is drawn down to here
 
 
 def plot_frfs(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
@@ -40,8 +37,7 @@ def plot_frfs(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     for place, label in enumerate(frfs.labels):
         magnitude, std = np.abs(frfs.values[:, place]), np.sqrt(frfs.variance[:, place] / 2)
-        low = np.maximum(magnitude - Q95 * std, LEAST * magnitude)
-        ax.fill_between(frfs.frequency_hz, low, magnitude + Q95 * std, color=colour(place), alpha=0.25, linewidth=0)
+        _shade(ax, frfs.frequency_hz, confidence_band(magnitude, std), colour(place))
         ax.semilogy(frfs.frequency_hz, magnitude, dash(place), color=colour(place), linewidth=1, label=str(label))
     return label_axes(ax, FREQUENCY, magnitude_title(frfs.labels))
 
@@ -94,7 +90,7 @@ def plot_coherence(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_fit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
-    """Draw measured FRFs as points and fitted ones as lines.
+    """Draw measured FRFs as points, fitted ones as lines, and the 95 % bands of the fit.
 
     Parameters
     ----------
@@ -115,6 +111,8 @@ def plot_fit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     for place, label in enumerate(used.labels):
         points = {"color": colour(place), "markersize": 2, "alpha": 0.5, "rasterized": used.n_lines > 20_000}
         ax.semilogy(used.frequency_hz, np.abs(used.values[:, place]), ".", **points)
+        limits = confidence_band(fitted[:, place], fit.value_std[:, place] / np.sqrt(2))
+        _shade(ax, used.frequency_hz, limits, colour(place))
         ax.semilogy(
             used.frequency_hz, fitted[:, place], dash(place), color=colour(place), linewidth=1, label=str(label)
         )
@@ -147,18 +145,5 @@ def plot_misfit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     return label_axes(ax, FREQUENCY, "Misfit, " + magnitude_title(used.labels).partition(", ")[2])
 
 
-def magnitude_title(labels: Sequence[FrfLabel]) -> str:
-    """Title of an axis with the magnitude of FRFs.
-
-    Parameters
-    ----------
-    labels : sequence of FrfLabel
-        What is drawn.
-
-    Returns
-    -------
-    str
-        Quantity and unit, or several of them.
-    """
-    kinds = dict.fromkeys((label.quantity.value, label.unit) for label in labels)
-    return " or ".join(f"{quantity.capitalize()}, {unit}" for quantity, unit in kinds)
+def _shade(ax: Axes, frequency_hz: FloatArray, limits: tuple[FloatArray, FloatArray], fill: str) -> None:
+    ax.fill_between(frequency_hz, *limits, color=fill, alpha=0.25, linewidth=0)

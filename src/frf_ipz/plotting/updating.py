@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.frfs import FREQUENCY, magnitude_title
+from frf_ipz.plotting.curves import magnitude_title
+from frf_ipz.plotting.frfs import FREQUENCY
 from frf_ipz.plotting.style import MEASURED, NOMINAL, UPDATED, axes_or_new, colour, label_axes
 
 if TYPE_CHECKING:

@@ -109,7 +109,8 @@ def _render_picture(picture: Picture) -> str:
     frequency = " data-frequency" if picture.is_over_frequency else ""
     return (
         f'<figure id="{picture.name}"{frequency}><figcaption>{escape(picture.title)}</figcaption>'
-        f'<div class="plot" tabindex="0" role="img" aria-label="{escape(picture.alt)}" '
+        f'<div class="plot" tabindex="0" role="group" aria-roledescription="picture" '
+        f'aria-label="{escape(picture.alt)}" '
         f'style="height:{picture.height_px}px"></div>{note}{table}</figure>'
     )
 

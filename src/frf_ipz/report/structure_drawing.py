@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Geometry
 
 MOST_LABELS = 24  # DOFs of a kind that are labelled; more would cover each other
+MOST_JOINED = 4  # labels in a row; of more the first and the last
+CHARACTER = 0.0085  # of the structure's length: width of a character on a page of the usual width
 SHELF = {"sensor": 0.2, "blow": 0.62, "point": -0.34, "missing": 0.0}  # above and below a structure that is a line
 
 
@@ -138,11 +140,50 @@ def _dofs(
     rows = [place[dof.node] for dof in known]
     heights = positions[rows, 1] + (SHELF[kind] if is_line else 0.0)
     where = where if is_line else BESIDE[kind]
-    labelled = {"mode": "markers+text", "textposition": where} if len(known) <= MOST_LABELS else {}
+    labelled = {"mode": "markers+text", "textposition": where} if len(known) <= MOST_LABELS and not is_line else {}
     size = 15 if is_line or kind == "sensor" else 11
     style: Trace = {"symbol": symbol, "size": size, "text": [str(dof) for dof in known], "hover": "%{text}", **labelled}
-    style["textfont"] = {"color": colour, "size": 12.5}
-    return [markers(positions[rows, 0], heights, name, colour, **style)]
+    font = {"color": colour, "size": 12.5}
+    points = markers(positions[rows, 0], heights, name, colour, textfont=font, **style)
+    if not is_line:
+        return [points]
+    extent = float(np.ptp(positions[:, 0])) or 1.0
+    labels = _side_by_side([(float(positions[place[dof.node], 0]), str(dof)) for dof in known], extent)
+    words: Trace = {"mode": "text", "text": [text for _, text in labels], "textposition": where, "textfont": font}
+    quiet: Trace = {**words, "showlegend": False, "legendgroup": name}
+    at = markers([x for x, _ in labels], np.full(len(labels), heights[0]), name, colour, **quiet)
+    return [{**points, "legendgroup": name}, at]
+
+
+def _side_by_side(labels: Sequence[tuple[float, str]], extent: float) -> list[tuple[float, str]]:
+    """Join labels that would cover each other into one, at their middle.
+
+    Parameters
+    ----------
+    labels : sequence of (float, str)
+        Place along the structure, m, and text.
+    extent : float
+        Length of the structure, m.
+
+    Returns
+    -------
+    list of (float, str)
+        From left to right.
+    """
+    joined: list[list[tuple[float, str]]] = []
+    for place, text in sorted(labels):
+        needed = CHARACTER * extent * (len(_joined(joined[-1])[1]) + len(text) + 2) / 2 if joined else 0.0
+        if joined and place - _joined(joined[-1])[0] < needed:
+            joined[-1].append((place, text))
+        else:
+            joined.append([(place, text)])
+    return [_joined(group) for group in joined]
+
+
+def _joined(group: Sequence[tuple[float, str]]) -> tuple[float, str]:
+    texts = [text for _, text in group]
+    shown = texts if len(texts) <= MOST_JOINED else [texts[0], "…", texts[-1]]
+    return (group[0][0] + group[-1][0]) / 2, " ".join(shown)
 
 
 def _missing(missing: Mapping[int, str], positions: FloatArray, place: Mapping[int, int]) -> list[Trace]:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.path import Path
 
+from frf_ipz.plotting.curves import phase_degrees
 from frf_ipz.plotting.ellipses import error_ellipses, root_deviations
-from frf_ipz.plotting.phases import phase_degrees
 from frf_ipz.plotting.projection import project
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 

@@ -30,7 +30,7 @@ class Reader(HTMLParser):
         self.ids += [found["id"]] if "id" in found else []
         self.links += [found["href"]] if "href" in found else []
         self.sources += [found[key] for key in ("src", "srcset") if key in found]
-        self.alts += [found["aria-label"]] if found.get("role") == "img" else []
+        self.alts += [found["aria-label"]] if found.get("aria-roledescription") == "picture" else []
 
 
 def page_of(folder, tmp_path):

@@ -69,3 +69,26 @@ def test_the_drawing_is_told_in_words(frame):
     alt = draw_structure(frame, MARKS).alt
     for words in ("3 nodes", "node 1 clamped", "sensors at 3:+z", "blows at 2:-z", "added mass at node 2"):
         assert words in alt
+
+
+@pytest.mark.parametrize(
+    ("nodes", "labels"),
+    [
+        ((1, 50), ["1:+z", "50:+z"]),
+        ((1, 49, 50), ["1:+z", "49:+z 50:+z"]),
+        ((41, 42, 43, 44, 45, 46), ["41:+z … 46:+z"]),
+    ],
+)
+def test_labels_that_would_cover_each_other_are_written_side_by_side(nodes, labels):
+    along = np.zeros((100, 3))
+    along[:, 0] = np.linspace(0, 1, 100)
+    beam = Geometry(
+        nodes=np.arange(1, 101), coordinates_m=along, lines=np.stack([np.arange(1, 100), np.arange(2, 101)], 1)
+    )
+    picture = draw_structure(beam, Marks(sensors=tuple(parse_dof(f"{node}:+z") for node in nodes)))
+    words = next(one for one in picture.traces if one["mode"] == "text")
+    assert list(words["text"]) == labels
+    joined = [node for node in nodes if str(node) in labels[-1]]
+    np.testing.assert_allclose(
+        words["x"][-1], (along[nodes[-1] - 1, 0] + along[joined[0] - 1, 0]) / 2, rtol=1e-12, atol=0
+    )

@@ -72,10 +72,12 @@
 
   const logarithm = (value) => Math.log10(Math.max(value, page.lowestHz));
 
-  function traces(picture) {
-    return unpack(picture.data).map((trace) => {
+  function traces(picture, before) {
+    return unpack(picture.data).map((trace, place) => {
       const frf = trace.meta && trace.meta.frf;
-      return frf !== undefined && hidden.has(frf) ? { ...trace, visible: false } : trace;
+      if (frf !== undefined && hidden.has(frf)) return { ...trace, visible: false };
+      const isOff = before && before[place].visible === "legendonly"; // switched off in the legend
+      return isOff ? { ...trace, visible: "legendonly" } : trace;
     });
   }
 
@@ -84,12 +86,38 @@
     const figure = document.getElementById(name);
     const plot = figure.querySelector(".plot");
     const config = { responsive: !printing, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
-    Plotly.react(plot, traces(picture), themed(unpack(picture.layout), figure), config);
+    Plotly.react(plot, traces(picture, drawn.has(name) && plot.data), themed(unpack(picture.layout), figure), config);
     if (!drawn.has(name)) {
       drawn.set(name, plot);
       plot.on("plotly_relayout", (change) => follow(name, change));
+      plot.on("plotly_afterplot", () => openLegend(plot));
       plot.addEventListener("keydown", (event) => steer(event, name));
+      openLegend(plot);
     }
+  }
+
+  // The entries of a legend are drawn by plotly for a mouse only: make them buttons for the keyboard too.
+  function openLegend(plot) {
+    plot.querySelectorAll(".legend .traces").forEach((entry) => {
+      const { trace } = entry.__data__[0];
+      const state = { tabindex: 0, role: "button", "aria-label": trace.name, "aria-pressed": trace.visible === true };
+      Object.entries(state).forEach(([key, value]) => entry.setAttribute(key, value));
+      entry.onkeydown = (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault();
+        event.stopPropagation();
+        toggleEntry(plot, trace.index);
+      };
+    });
+  }
+
+  async function toggleEntry(plot, index) {
+    const { legendgroup, visible } = plot.data[index];
+    const places = [...plot.data.keys()].filter((k) => k === index || (legendgroup && plot.data[k].legendgroup === legendgroup));
+    await Plotly.restyle(plot, { visible: visible === "legendonly" ? true : "legendonly" }, places);
+    openLegend(plot);
+    const entries = [...plot.querySelectorAll(".legend .traces")];
+    entries.find((entry) => entry.__data__[0].trace.index === index).focus(); // plotly may have drawn it anew
   }
 
   function redraw() {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.frfs import LEAST, Q95, magnitude_title
+from frf_ipz.plotting.curves import confidence_band, magnitude_title
 from frf_ipz.report.picture import (
     Axis,
     Picture,
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 DOTTED = ". Where the solid curve stays near the dotted one, the fit says all that the data say."
+SHADED = " Shaded: where the fitted curve lies with 95 %; zoom in where it is thinner than the line."
+NO_BAND = " How sure the fitted curve is cannot be said, so no band is drawn."
 LARGE = 2.0  # misfit over noise from which a row of the table is marked
 
 
@@ -77,7 +79,8 @@ def _picture(fit: ModalFit, used: FrfSet, fitted: ComplexArray) -> Picture:
         traces=tuple(traces),
         layout=panels(frequency_axis(*fit.band_hz), *axes),
         note="Below: solid, modulus of measurement minus fit; dotted, standard deviation of the measurement"
-        + (DOTTED if np.isfinite(used.variance).any() else ", which is not known here."),
+        + (DOTTED if np.isfinite(used.variance).any() else ", which is not known here.")
+        + (SHADED if _has_band(fit) else NO_BAND),
         height_px=620,
         is_over_frequency=True,
     )
@@ -93,13 +96,16 @@ def _frf(fit: ModalFit, used: FrfSet, fitted: ComplexArray, place: int, bins: in
     hover = f"%{{x:.6g}} Hz: %{{y:.4g}} {label.unit}"
     quiet: Trace = {**group, "showlegend": False}
     traces: list[Trace] = []
-    if np.isfinite(std).all() and std.any():
-        limits = np.maximum(curve[kept] - Q95 * std, LEAST * curve[kept]), curve[kept] + Q95 * std
-        traces += band(x, limits, f"{label} 95 %", f"{colour}/0.3", **quiet)
+    if _has_band(fit):
+        traces += band(x, confidence_band(curve[kept], std), f"{label} 95 %", f"{colour}/0.3", **quiet)
     points: Trace = {"size": 3.5, "opacity": 0.55, "hover": hover}
     traces.append(markers(x, measured[kept], f"{label} measured", colour, **points, **quiet))
     traces.append(line(x, curve[kept], f"{label} fitted", colour, hover=hover, dash=dash_of(place), **group))
     return traces + _misfit(used, np.abs(fitted[:, place] - used.values[:, place]), place, bins)
+
+
+def _has_band(fit: ModalFit) -> bool:
+    return bool(np.isfinite(fit.value_std).all() and fit.value_std.any())
 
 
 def _misfit(used: FrfSet, misfit: np.ndarray, place: int, bins: int) -> list[Trace]:

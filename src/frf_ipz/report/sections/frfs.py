@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.frfs import LEAST, Q95, magnitude_title
-from frf_ipz.plotting.phases import PHASE_LIMITS, phase_degrees
+from frf_ipz.plotting.curves import PHASE_LIMITS, confidence_band, magnitude_title, phase_degrees
 from frf_ipz.report.picture import (
     Axis,
     Picture,
@@ -103,9 +102,8 @@ def _frf(frfs: FrfSet, place: int, bins: int, *, has_coherence: bool) -> list[Tr
     std = np.sqrt(frfs.variance[kept, place] / 2)
     traces: list[Trace] = []
     if np.isfinite(std).any():
-        low = np.maximum(magnitude[kept] - Q95 * std, LEAST * magnitude[kept])
         shade = {"meta": {"frf": place}, "legendgroup": str(label), "showlegend": False}
-        traces += band(x, (low, magnitude[kept] + Q95 * std), f"{label} 95 %", f"{colour}/0.25", **shade)
+        traces += band(x, confidence_band(magnitude[kept], std), f"{label} 95 %", f"{colour}/0.25", **shade)
     hover = f"%{{x:.6g}} Hz: %{{y:.4g}} {label.unit}"
     traces.append(line(x, magnitude[kept], str(label), colour, hover=hover, **style))
     phase = phase_degrees(frfs.values[kept, place])

@@ -154,8 +154,8 @@ def _point_card(run: RunContents) -> Card:
         compare_frfs(measured[lines], values[lines][:, numbers]) for values in (prediction.nominal, prediction.values)
     )
     figure = f"{number(float(before.median_db.mean()), 2)} → {number(float(after.median_db.mean()), 2)} dB"
-    correlations = f"X_S {after.shape.min():.3f}, X_A {after.amplitude.min():.3f}"
-    meaning = f"median over the band, before and after; correlations {correlations}"
+    correlations = f"{after.shape.min():.3f} in shape, {after.amplitude.min():.3f} in amplitude"
+    meaning = f"median over the band, before and after; correlation {correlations} (1 is perfect)"
     return Card("Error at the point of interest", figure, meaning)
 
 

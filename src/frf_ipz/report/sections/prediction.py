@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.frfs import LEAST, magnitude_title
-from frf_ipz.plotting.phases import phase_degrees
+from frf_ipz.plotting.curves import LEAST, magnitude_title, phase_degrees
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.picture import Axis, Picture, Trace, band, frequency_axis, line, panels
 from frf_ipz.report.reference import measured_at
@@ -119,7 +118,9 @@ def _table(prediction: Prediction, known: dict[int, ComplexArray]) -> Table:
         cells.append(number(float(moved.median_db[place]), 3))
         rows.append(cells + _errors(prediction, place, known.get(place)))
     columns = ["FRF (sensor / blow)", "band ± dB, median", "band ± dB, largest", "moved by the update, dB (median)"]
-    columns += ["error before, dB", "error after, dB", "X_S after", "X_A after"] if known else []
+    columns += (
+        ["error before, dB", "error after, dB", "correlation of shape, after", "of amplitude, after"] if known else []
+    )
     return Table(
         caption="Predicted FRFs", columns=tuple(columns), rows=_trimmed(rows, len(columns)), file="poi_frf.parquet"
     )
