@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis
+    from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis, Linearised
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.structure import StructuralModel
@@ -46,6 +47,7 @@ def apply_to_model(
     StructuralModel
         The model with what it lacked; the same model where findings are in the measuring chain only, or none.
     """
+    model = model if diagnosis.linearised is None else _with_law(model, diagnosis.linearised)
     known = effects or shipped_effects()
     found = [(known[one.effect], one) for one in diagnosis.findings if one.effect in known]
     structural = [(effect, one) for effect, one in found if effect.chain(_place(one)) is None]
@@ -56,6 +58,19 @@ def apply_to_model(
     for effect, finding in structural:
         total = total + effect.build(specimen, _place(finding))(np.array(finding.values))
     return with_change(model, total)
+
+
+def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
+    """Put the spring and the damper that stand for a force law into a model."""
+    across = np.zeros(len(model.all_dofs))
+    for end, sign in zip(reversed(law.ends), (1.0, -1.0), strict=False):
+        across[model.place(end)] = sign
+    pair = sparse.csr_array(np.outer(across, across))
+    return replace(
+        model,
+        stiffness_all=sparse.csr_array(model.stiffness_all + law.stiffness * pair),
+        damping_all=sparse.csr_array(model.damping_all + law.damping * pair),
+    )
 
 
 def _specimen(model: StructuralModel, curves: Curves) -> Specimen:

@@ -31,6 +31,7 @@ from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.search import search_laws
+from frf_ipz.diagnosis.nonlinear.linearised import linearise
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
 
@@ -166,10 +167,12 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         verdict=laws.verdict,
         findings=found[:n_findings],
         alternatives=found[n_findings:],
+    linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
         before=before,
         after=after if n_findings else before,
         ambiguity=(),
-        statement=laws.statement,
+        statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
+        linearised=linearised,
     )
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 
 
@@ -103,6 +104,40 @@ class Curves:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearised:
+    """A force law as a spring and a damper, about the amplitudes of the test.
+
+    Parameters
+    ----------
+    ends : tuple of Dof
+        Where it acts: against the ground at one DOF, or between two.
+    stiffness, damping : float
+        About the motion in all blows together, N/m and N s/m.
+    motion_rms_m : (n_blows,) array
+        Root mean square motion of the place in each blow, ascending.
+    stiffness_each, damping_each : (n_blows,) array
+        About the motion in that blow alone, N/m and N s/m.
+    """
+
+    ends: tuple[Dof, ...]
+    stiffness: float
+    damping: float
+    motion_rms_m: FloatArray
+    stiffness_each: FloatArray
+    damping_each: FloatArray
+
+    @property
+    def statement(self) -> str:
+        """For which motions a linear model may stand for the law."""
+        low, high = (f"{self.stiffness_each[end]:.3g} N/m and {self.damping_each[end]:.3g} N s/m" for end in (0, -1))
+        return (
+            f"About the blows of this test it acts as {self.stiffness:.3g} N/m and {self.damping:.3g} N s/m, which is "
+            f"what a linear model has. It holds between {low} (weakest blow, {self.motion_rms_m[0]:.3g} m "
+            f"rms) and {high} (strongest, {self.motion_rms_m[-1]:.3g} m rms)."
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Diagnosis:
     """What is missing from a nominal model, if anything.
 
@@ -141,6 +176,8 @@ class Diagnosis:
         What the user has to know.
     """
 
+    linearised : Linearised, optional
+        The force law among the findings, for linear models.
     verdict: str
     findings: tuple[Finding, ...]
     alternatives: tuple[Finding, ...]
@@ -161,6 +198,7 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.
+    linearised: Linearised | None = None
 
         Returns
         -------
@@ -207,6 +245,7 @@ class Diagnosis:
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
+            **({} if self.linearised is None else {"linear_model": _linear(self.linearised)}),
     return {
         "effect": finding.effect,
         "location": _location(finding.location),
@@ -221,6 +260,17 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 def _location(location: Mapping[str, object]) -> dict[str, object]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
+
+
+def _linear(law: Linearised) -> dict[str, Any]:
+    return {
+        "between": [dof.name for dof in law.ends],
+        "stiffness_N_m": _plain(law.stiffness),
+        "damping_Ns_m": _plain(law.damping),
+        "motion_rms_m": [_plain(value) for value in law.motion_rms_m],
+        "stiffness_at_N_m": [_plain(value) for value in law.stiffness_each],
+        "damping_at_Ns_m": [_plain(value) for value in law.damping_each],
+    }
 
 
 def _parameter(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name

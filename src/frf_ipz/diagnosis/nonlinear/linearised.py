@@ -1,0 +1,57 @@
+"""A force law as spring and damper about the amplitudes of the test: what a linear model can hold of it.
+
+Statistical linearisation: the linear force that misses the law's force least, in the mean square over the motion that
+the blows caused (Caughey, Equivalent linearization techniques, J. Acoust. Soc. Am. 35 (1963) 1706-1711).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.diagnosis import Linearised
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+
+
+def linearise(fit: LawFit, plant: Plant) -> Linearised:
+    """Replace a law by a spring and a damper.
+
+    Parameters
+    ----------
+    fit : LawFit
+        The law, with the motion of its place in each blow.
+    plant : Plant
+        The structure.
+
+    Returns
+    -------
+    Linearised
+        About all blows together, and about each of them: how far it can be trusted.
+    """
+    moved = np.abs(fit.motion).max(1) > 0
+    motion, velocity = fit.motion[moved], fit.velocity[moved]
+    force = fit.strength * fit.law.unit_force(motion, velocity, fit.shape)
+    each = np.array([_spring_and_damper(*one) for one in zip(motion, velocity, force, strict=True)]).reshape(-1, 2)
+    rms = np.sqrt(np.mean(motion**2, axis=1))
+    order = np.argsort(rms)
+    stiffness, damping = _spring_and_damper(motion.ravel(), velocity.ravel(), force.ravel())
+    return Linearised(
+        ends=plant.places[fit.place].ends,
+        stiffness=stiffness,
+        damping=damping,
+        motion_rms_m=rms[order],
+        stiffness_each=each[order, 0],
+        damping_each=each[order, 1],
+    )
+
+
+def _spring_and_damper(motion: FloatArray, velocity: FloatArray, force: FloatArray) -> tuple[float, float]:
+    columns = np.stack([motion, velocity], axis=1)
+    size = np.linalg.norm(columns, axis=0)
+    found = np.linalg.lstsq(columns / size, force, rcond=None)[0] / size
+    return float(found[0]), float(found[1])

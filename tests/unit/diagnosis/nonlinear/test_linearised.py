@@ -1,0 +1,87 @@
+"""A force law as spring and damper: harmonic balance for a sine, and the place it goes to in a model."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosed import lumped
+from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.diagnosis.diagnosis import Diagnosis, Linearised, Misfit
+from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
+from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
+from frf_ipz.diagnosis.nonlinear.linear.plant import Place
+from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.dofs import Dof
+from frf_ipz.runs.codec import load_result, save_result
+
+OMEGA, AMPLITUDES = 300.0, np.array([2e-4, 1e-4])
+SINE = 1e-3  # relative: whole periods in steps
+NODE = Place(location={"nodes": [2]}, ends=(Dof(2, "x"),))
+SPRING = Place(location={"springs": ["k3"]}, ends=(Dof(2, "x"), Dof(3, "x")))
+
+
+def swinging(law, strength, shape=0.0):
+    time = np.arange(4000) * 2 * np.pi / OMEGA / 1000
+    motion = AMPLITUDES[:, None] * np.sin(OMEGA * time)
+    velocity = AMPLITUDES[:, None] * OMEGA * np.cos(OMEGA * time)
+    return SimpleNamespace(law=law, strength=strength, shape=shape, motion=motion, velocity=velocity, place=0)
+
+
+def test_a_cubic_spring_is_that_of_harmonic_balance():
+    found = linearise(swinging(CubicStiffness(), 1e12), SimpleNamespace(places=[NODE]))
+    assert_allclose(found.motion_rms_m, AMPLITUDES[::-1] / np.sqrt(2), rtol=SINE)
+    assert_allclose(found.stiffness_each, 0.75e12 * AMPLITUDES[::-1] ** 2, rtol=SINE)
+    assert np.abs(found.damping_each * OMEGA).max() < SINE * found.stiffness
+    assert found.stiffness_each[0] < found.stiffness < found.stiffness_each[1]
+    assert "weakest blow, 7.07e-05 m rms" in found.statement
+
+
+def test_friction_is_the_damper_of_harmonic_balance():
+    found = linearise(swinging(DryFriction(), 0.5, shape=1e-9), SimpleNamespace(places=[NODE]))
+    assert_allclose(found.damping_each, 4 * 0.5 / (np.pi * AMPLITUDES[::-1] * OMEGA), rtol=0.01)
+
+
+def test_a_blow_that_did_not_move_the_place_says_nothing():
+    still = swinging(CubicStiffness(), 1e12)
+    still.motion[1], still.velocity[1] = 0.0, 0.0
+    assert linearise(still, SimpleNamespace(places=[NODE])).motion_rms_m.shape == (1,)
+
+
+@pytest.mark.parametrize("place", [NODE, SPRING])
+def test_the_model_that_goes_on_has_spring_and_damper(tmp_path, place):
+    model = lumped(tmp_path)
+    nothing = Misfit(training=0.0, held_out=0.0, training_noise=0.0, held_out_noise=0.0)
+    law = Linearised(
+        ends=place.ends,
+        stiffness=5e4,
+        damping=3.0,
+        motion_rms_m=np.array([1e-4]),
+        stiffness_each=np.array([5e4]),
+        damping_each=np.array([3.0]),
+    )
+    found = Diagnosis(
+        verdict="explained",
+        findings=(),
+        alternatives=(),
+        mismatch_hz=np.zeros(0),
+        mismatch_where="",
+        mismatch=None,
+        before=nothing,
+        updated=nothing,
+        after=nothing,
+        held="blows",
+        linearised=law,
+    )
+    changed = apply_to_model(model, found)
+    motion = dict(zip(reversed(place.ends), (1.0, -1.0), strict=False))
+    row = np.array([motion.get(dof, 0.0) for dof in model.all_dofs])
+    assert_allclose((changed.stiffness_all - model.stiffness_all).toarray(), 5e4 * np.outer(row, row))
+    assert_allclose((changed.damping_all - model.damping_all).toarray(), 3.0 * np.outer(row, row))
+    save_result(found, tmp_path / "d.npz")
+    again = load_result(tmp_path / "d.npz")
+    assert again.to_json()["linear_model"] == found.to_json()["linear_model"]
+    assert again.to_json()["linear_model"]["between"] == [dof.name for dof in place.ends]
+    assert "linear_model" not in replace(found, linearised=None).to_json()
