@@ -27,15 +27,18 @@ from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.resolving import best_sensor
+from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
-from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.judging.decision import Decision
@@ -104,12 +107,14 @@ def diagnose(
     found, proof = _proven(bench, held_out, found)
     where = disagreement(bench, found.null, proof.curves)
     weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
+    findings = _findings(found, weighed)
     linear = Diagnosis(
         verdict=found.verdict,
-        findings=_findings(found, weighed),
+        findings=findings,
         alternatives=_alternatives(found, weighed),
         mismatch_hz=where[0],
         mismatch_where=where[1],
+        mismatch_location=_mismatch_location(bench, found, findings),
         mismatch=where[2],
         before=proof.before,
         updated=proof.updated,
@@ -162,18 +167,26 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     is_needed = bool(found) and found[0].log_evidence_gain > np.fmax(FOUND_NATS, laws.linear_limit)
     is_worse = laws.verdict == UNEXPLAINED and after.held_out > before.held_out
     n_findings = 1 if is_needed and not is_worse else 0
+    linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
     return replace(
         linear,
         verdict=laws.verdict,
         findings=found[:n_findings],
         alternatives=found[n_findings:],
-    linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
         before=before,
         after=after if n_findings else before,
+        mismatch_location=found[0].location if found else linear.mismatch_location,
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
     )
+
+
+def _mismatch_location(bench: Bench, found: Decision, findings: tuple[Finding, ...]) -> Mapping[str, object]:
+    """Give the place of what was found, or of what remains unexplained."""
+    if found.verdict == UNEXPLAINED:
+        return trace(bench, found.null)
+    return findings[0].location if findings else {}
 
 
 def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
@@ -186,20 +199,25 @@ def _findings(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     scale = max(1.0, found.good.misfit)
     if not causes:
         return ()
-    if len(causes) == 1 or found.second is None:
+    if not found.further:
         return (finding_of(weighed[0], gain_over(found.final, found.null), scale),)
-    competing = weigh(found.second.fits, scale)
-    first_alone = found.second.base
-    newest = finding_of(competing[0], gain_over(found.final, first_alone), scale)
-    gain = gain_over(first_alone, found.null)
-    older = describe(found.final, 0, newest.probability, gain, scale, (dict(causes[0].place.location),))
-    return tuple(sorted((older, newest), key=lambda finding: -finding.log_evidence_gain))
+    competing = weigh(found.further[-1].fits, scale)
+    newest = finding_of(competing[0], gain_over(found.final, found.further[-1].base), scale)
+    bases = [found.null, *(ranking.base for ranking in found.further)]
+    older = [
+        describe(
+            found.final, number, newest.probability, gain_over(bases[number + 1], bases[number]), scale,
+            places=(dict(causes[number].place.location),),
+        )
+        for number in range(len(causes) - 1)
+    ]  # fmt: skip
+    return tuple(sorted((*older, newest), key=lambda finding: -finding.log_evidence_gain))
 
 
 def _alternatives(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     scale = max(1.0, found.good.misfit)
-    if found.second is not None:
-        weighed, base = weigh(found.second.fits, scale), found.second.base
+    if found.further:
+        weighed, base = weigh(found.further[-1].fits, scale), found.further[-1].base
     else:
         base = found.null
     rest = weighed if found.final is found.null else weighed[1:]

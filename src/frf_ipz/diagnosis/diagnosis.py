@@ -153,6 +153,8 @@ class Diagnosis:
         Frequencies at which the nominal model disagrees with the measurement, Hz.
     mismatch_where : str
         Which FRFs, bands and DOFs disagree, and by how much.
+    mismatch_location : mapping
+        Where it sits: of the first finding, or where one unknown dynamic stiffness explains most of it; may be empty.
     mismatch : DataFrame
         One row an FRF and band: ``frf``, ``low_hz``, ``high_hz``, ``before``, ``after``: rms misfit over what noise and
         tolerances explain.
@@ -174,10 +176,10 @@ class Diagnosis:
         What the verdict rests on: evidence, misfits, pulls, hypotheses tried.
     warnings : tuple of str
         What the user has to know.
-    """
-
     linearised : Linearised, optional
         The force law among the findings, for linear models.
+    """
+
     verdict: str
     findings: tuple[Finding, ...]
     alternatives: tuple[Finding, ...]
@@ -188,6 +190,7 @@ class Diagnosis:
     updated: Misfit
     after: Misfit
     held: str
+    mismatch_location: Mapping[str, object] = field(default_factory=dict)
     ambiguity: tuple[Ambiguity, ...] = ()
     gates: tuple[Gate, ...] = ()
     detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -195,10 +198,10 @@ class Diagnosis:
     curves: Curves | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    linearised: Linearised | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.
-    linearised: Linearised | None = None
 
         Returns
         -------
@@ -213,6 +216,7 @@ class Diagnosis:
             "mismatch": {
                 "frequency_hz": [round(float(value), 6) for value in self.mismatch_hz],
                 "where": self.mismatch_where,
+                "location": _location(self.mismatch_location),
             },
             "fit": {
                 "before": _misfit(self.before),
@@ -241,11 +245,11 @@ class Diagnosis:
             "detectability": {name: _all_plain(sizes) for name, sizes in self.detectability.items()},
             "numbers": _all_plain(self.numbers),
             "warnings": list(self.warnings),
+            **({} if self.linearised is None else {"linear_model": _linear(self.linearised)}),
         }
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
-            **({} if self.linearised is None else {"linear_model": _linear(self.linearised)}),
     return {
         "effect": finding.effect,
         "location": _location(finding.location),
@@ -258,10 +262,6 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _location(location: Mapping[str, object]) -> dict[str, object]:
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
-
-
 def _linear(law: Linearised) -> dict[str, Any]:
     return {
         "between": [dof.name for dof in law.ends],
@@ -271,6 +271,10 @@ def _linear(law: Linearised) -> dict[str, Any]:
         "stiffness_at_N_m": [_plain(value) for value in law.stiffness_each],
         "damping_at_Ns_m": [_plain(value) for value in law.damping_each],
     }
+
+
+def _location(location: Mapping[str, object]) -> dict[str, object]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
 
 
 def _parameter(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name

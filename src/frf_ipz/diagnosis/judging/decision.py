@@ -1,4 +1,4 @@
-"""One cause, two, or none: searches until what is left is no more than noise and tolerances, and decides."""
+"""One cause, a few, or none: searches until what is left is no more than noise and tolerances, and decides."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.judging.findings import is_significant
-from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, Goodness, goodness
+from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
 
@@ -30,8 +30,8 @@ class Decision:
         Of the nominal model with what its tolerances allow, and with what was found.
     ranking : Ranking
         Of one cause.
-    second : Ranking, optional
-        Of a second one beside its base, where two were found.
+    further : tuple of Ranking
+        Of each further cause beside its base, where several were found.
     good, null_good : Goodness
         Of what was found, and of the nominal model.
     """
@@ -40,7 +40,7 @@ class Decision:
     null: Fit
     final: Fit
     ranking: Ranking
-    second: Ranking | None
+    further: tuple[Ranking, ...]
     good: Goodness
     null_good: Goodness
 
@@ -68,7 +68,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     best = ranking.best
     good = goodness(bench, best)
     one = Decision(
-        verdict=EXPLAINED, null=null, final=best, ranking=ranking, second=None, good=good, null_good=null_good
+        verdict=EXPLAINED, null=null, final=best, ranking=ranking, further=(), good=good, null_good=null_good
     )
     if null_good.is_good and (gain_over(best, null) < FOUND_NATS or not is_significant(best, -1)):
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
@@ -76,11 +76,23 @@ def decide(bench: Bench, progress: Progress) -> Decision:
         return one
     progress(0.6, "searching for a second cause")
     second = search_second(bench, ranking)
-    both = goodness(bench, second.best)
-    if second.fits and gain_over(second.best, best) > SECOND_NATS and both.score < good.score:
-        verdict = EXPLAINED if both.is_good else UNEXPLAINED
-        return replace(one, verdict=verdict, final=second.best, second=second, good=both)
-    return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > FOUND_NATS else null)
+    two = _beside(bench, one, second)
+    if two is None:
+        return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > FOUND_NATS else null)
+    if two.verdict == EXPLAINED or gain_over(second.best, second.base) < STRONG_NATS:
+        return two
+    progress(0.8, "searching for a third cause")
+    three = _beside(bench, two, search(bench, second.best))
+    return three if three is not None and three.verdict == EXPLAINED else two
+
+
+def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
+    """Take a further cause, if it explains much."""
+    good, before = goodness(bench, ranking.best), goodness(bench, found.final)
+    if not ranking.fits or gain_over(ranking.best, found.final) <= SECOND_NATS or good.score >= before.score:
+        return None
+    verdict = EXPLAINED if good.is_good else UNEXPLAINED
+    return replace(found, verdict=verdict, final=ranking.best, further=(*found.further, ranking), good=good)
 
 
 def only_null(bench: Bench) -> Decision:
@@ -100,26 +112,27 @@ def only_null(bench: Bench) -> Decision:
     good = goodness(bench, null)
     nothing = Ranking(base=null, fits=(), n_tried=0)
     verdict = CONSISTENT if good.is_good else UNEXPLAINED
-    return Decision(verdict=verdict, null=null, final=null, ranking=nothing, second=None, good=good, null_good=good)
+    return Decision(verdict=verdict, null=null, final=null, ranking=nothing, further=(), good=good, null_good=good)
 
 
 def without_last(bench: Bench, found: Decision) -> Decision:
-    """Leave out the second cause, or the only one.
+    """Leave out the last cause.
 
     Parameters
     ----------
     bench : Bench
         Data and model.
     found : Decision
-        With one or two causes.
+        With one cause or more.
 
     Returns
     -------
     Decision
         Unexplained, with one cause less.
     """
-    fit = found.null if found.second is None else found.ranking.best
-    return replace(found, verdict=UNEXPLAINED, final=fit, second=None, good=goodness(bench, fit))
+    left = found.further[:-1]
+    fit = left[-1].best if left else found.ranking.best if found.further else found.null
+    return replace(found, verdict=UNEXPLAINED, final=fit, further=left, good=goodness(bench, fit))
 
 
 def gain_over(fit: Fit, base: Fit) -> float:

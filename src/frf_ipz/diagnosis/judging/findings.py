@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.diagnosis.search.search import by_effect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.search.polish import Fit
 
 NORMAL_95 = 1.96
@@ -56,28 +58,24 @@ def weigh(fits: Sequence[Fit], scale: float) -> list[Weighed]:
     Parameters
     ----------
     fits : sequence of Fit
-        Each with one cause more than is known; by falling evidence.
+        Each with one cause more than is known.
     scale : float
         What differences of evidence are divided by: more than 1 where the best fit leaves more than noise.
 
     Returns
     -------
     list of Weighed
-        By falling probability.
+        By falling probability; the first is the best of its ranking.
     """
     if not fits:
         return []
-    top = fits[0].log_evidence
-    groups: dict[str, list[Fit]] = {}
-    for fit in fits:
-        groups.setdefault(fit.hypothesis.causes[-1].effect.name, []).append(fit)
+    top = max(fit.log_evidence for fit in fits)
     found = []
-    for group in groups.values():
+    for group in by_effect(fits):
         weights = np.exp(np.maximum((np.array([fit.log_evidence for fit in group]) - top) / scale, -700.0))
-        found.append((tuple(group), float(weights.sum()), tuple((weights / weights.sum()).tolist())))
+        found.append((group, float(weights.sum()), tuple((weights / weights.sum()).tolist())))
     total = sum(weight for _, weight, _ in found)
-    weighed = [Weighed(fits=group, probability=weight / total, shares=shares) for group, weight, shares in found]
-    return sorted(weighed, key=lambda one: -one.best.log_evidence)
+    return [Weighed(fits=group, probability=weight / total, shares=shares) for group, weight, shares in found]
 
 
 def finding_of(weighed: Weighed, gain: float, scale: float) -> Finding:
@@ -97,11 +95,34 @@ def finding_of(weighed: Weighed, gain: float, scale: float) -> Finding:
     Finding
         To report.
     """
-    return describe(weighed.best, -1, weighed.probability, gain, scale, _places(weighed))
+    return describe(
+        weighed.best, -1, weighed.probability, gain, scale, places=_places(weighed), across=_across_places(weighed)
+    )
+
+
+def _across_places(weighed: Weighed) -> FloatArray:
+    """Variance, as searched, of the newest cause's parameters from place to place: the place is not certain either."""
+    count = weighed.best.hypothesis.counts[-1]
+    own = [
+        (share, fit.hypothesis.start_at(fit.values)[len(fit.values) - count :])
+        for fit, share in zip(weighed.fits, weighed.shares, strict=True)
+        if fit.hypothesis.counts[-1] == count and count
+    ]
+    if not own:
+        return np.zeros(count)
+    off = np.array([values - own[0][1] for _, values in own])
+    return np.asarray(np.array([share for share, _ in own]) @ off**2)
 
 
 def describe(
-    fit: Fit, which: int, probability: float, gain: float, scale: float, places: tuple[dict[str, object], ...]
+    fit: Fit,
+    which: int,
+    probability: float,
+    gain: float,
+    scale: float,
+    *,
+    places: tuple[dict[str, object], ...],
+    across: FloatArray | float = 0.0,
 ) -> Finding:
     """Describe one cause of a fit.
 
@@ -119,6 +140,8 @@ def describe(
         Intervals grow with its root.
     places : tuple of dict
         Where else it could be, the most probable first.
+    across : (n_parameters,) array or float
+        Variance of its parameters, as searched, from place to place.
 
     Returns
     -------
@@ -128,7 +151,7 @@ def describe(
     hypothesis = fit.hypothesis
     cause = hypothesis.causes[which]
     place = which % len(hypothesis.causes)
-    numbers = _estimates(fit, place, scale)
+    numbers = _estimates(fit, place, scale, across)
     start = sum(hypothesis.counts[:place])
     return Finding(
         effect=cause.effect.name,
@@ -157,10 +180,12 @@ def _places(weighed: Weighed) -> tuple[dict[str, object], ...]:
     return tuple(found)
 
 
-def _estimates(fit: Fit, which: int, scale: float) -> dict[str, Estimate]:
+def _estimates(fit: Fit, which: int, scale: float, across: FloatArray | float) -> dict[str, Estimate]:
     hypothesis = fit.hypothesis
     cause, start = hypothesis.causes[which], sum(hypothesis.counts[:which])
-    spread = WIDER * np.sqrt(np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0))
+    variance = np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0)
+    variance[start : start + hypothesis.counts[which]] += across
+    spread = WIDER * np.sqrt(variance)
     spread = np.minimum(spread, hypothesis.high - hypothesis.low)  # where data say nothing, the range still does
     found = {}
     for index in range(start, start + hypothesis.counts[which]):

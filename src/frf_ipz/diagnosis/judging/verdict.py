@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 FOUND_NATS = 40.0  # evidence over the nominal model's: what a finding needs
 SECOND_NATS = 50.0  # evidence of a second finding over the first one's alone
+STRONG_NATS = 200.0  # evidence of a second finding: with less, a third one is not looked for
 MOST_PULL = 45.0  # sum of squares of what cannot be known, where the data determine little of it
 PULL_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
 PIECES = 6  # of the band, by points

@@ -4,7 +4,11 @@ Small errors of mass and stiffness, wherever they are, act on the modes of the b
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
 the shapes, and with it of the zeros. Damping ratios of modes, places of sensors and blows, and gains of channels come
 beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over the square
-root of three.
+root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much faster than a
+normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a normal prior.
+
+Near a struck place FRFs hold how the structure gives way around the blow, which depends on the size of the contact and
+which no mesh tells well: the compliance of all modes beyond those with scatter is not known exactly.
 
 Gains multiply the model's FRFs. As errors in proportion to the measured FRFs they would follow their noise, and pull
 every fit to smaller FRFs by the product of their variance and the number of points.
@@ -16,12 +20,13 @@ Methods in Physics Research A 346 (1994) 306-311.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.diagnosis.physics.layout import extents, shift_rows
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.diagnosis.physics.layout import extents, motion_row, shift_rows
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -36,7 +41,12 @@ CORDS = 0.02  # frequency of a free structure in its cords, over its first elast
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
 MOST_MODES = 16
 LESS_CONVERGED = 20.0  # growth of a mode's error with its frequency over the top of the band: meshes suit the band
+REDUCED = 80.0  # the same with the square: what is far beyond the band may be lost in a reduction
+LOCAL = 0.05  # of the compliance of all modes beyond those with scatter: what is not known
 MOST_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
+EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
+STEEPER = 1.0  # per standard deviation: how much faster
+FARTHEST = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
 SUSPENSION_SPREAD = 0.5  # relative standard deviation of the damping of rigid-body modes in their cords
 
 
@@ -54,6 +64,8 @@ class Unknowns:
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
         How far sensors and blows are from their places, m.
+    local : (n_frfs,) array
+        Errors of the compliance that modes beyond those with scatter give to the FRFs, m/N.
     gains : (n_channels,) array
         Relative errors of the channels' gains, as logarithms.
     """
@@ -64,6 +76,7 @@ class Unknowns:
     cords: FloatArray
     output_shift: FloatArray
     input_shift: FloatArray
+    local: FloatArray
     gains: FloatArray
 
 
@@ -87,10 +100,14 @@ class Nuisance:
         m.
     n_outputs, n_inputs : int
         Sensor positions and blows.
+    local_std : (n_frfs,) array
+        Of the compliance of modes beyond those with scatter, m/N, with the signs of the FRFs.
     n_channels : int
         Channels with gains.
     gain_std : float
         Of gains, relative.
+    is_stated : (m,) bool array
+        Modes whose frequency and damping a tolerance states: elastic ones of the band.
     """
 
     n_modes: int
@@ -103,23 +120,24 @@ class Nuisance:
     shift_std: FloatArray
     n_outputs: int
     n_inputs: int
+    local_std: FloatArray
     n_channels: int
     gain_std: float
+    is_stated: BoolArray
 
     @property
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Rows and columns of the upper triangle of kappa and mu."""
-        rows, columns = np.triu_indices(self.n_modes)
-        return rows.astype(np.int64), columns.astype(np.int64)
+        return _triangle(self.n_modes)
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of parameters: kappa, mu, damping, cords, sensor shifts, blow shifts, gains."""
+        """Numbers of parameters: kappa, mu, damping, cords, shifts of sensors and blows, local, gains."""
         n_pairs = self.n_modes * (self.n_modes + 1) // 2
         shifts = len(self.axes)
         return (
             *(n_pairs, n_pairs, self.n_modes, self.n_rigid),
-            *(shifts * self.n_outputs, shifts * self.n_inputs, self.n_channels),
+            *(shifts * self.n_outputs, shifts * self.n_inputs, len(self.local_std), self.n_channels),
         )
 
     @property
@@ -143,6 +161,40 @@ class Nuisance:
         """Where the gains stand among the parameters."""
         return np.arange(self.size - self.n_channels, self.size)
 
+    @property
+    def is_bounded(self) -> BoolArray:
+        """Which parameters a tolerance bounds, (size,) array: frequencies, damping, places and gains."""
+        rows, columns = self.pairs
+        own = (rows == columns) & self.is_stated[rows]
+        n_shifts = len(self.axes) * (self.n_outputs + self.n_inputs)
+        cords, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
+        shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
+        return np.concatenate([own, own, self.is_stated, cords, shifts, local, gains])
+
+    def pulls(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Give the square roots of twice the prior's cost, and their slopes.
+
+        Parameters
+        ----------
+        values : (size,) array
+            Parameters in standard deviations.
+        is_bounded : bool
+            False for a normal prior of all.
+
+        Returns
+        -------
+        pulls : (size,) array
+            As the parameters, but beyond the edge of a tolerance larger and larger.
+        slopes : (size,) array
+            Of the pulls by the parameters.
+        """
+        if not is_bounded:
+            return values, np.ones_like(values)
+        outside = np.where(self.is_bounded, np.maximum(np.abs(values) - EDGE, 0.0), 0.0)
+        curved = np.minimum(outside, FARTHEST)
+        added = STEEPER * curved * (2 * outside - curved)
+        return values + np.sign(values) * added, 1 + 2 * STEEPER * curved
+
     def unpack(self, values: FloatArray) -> Unknowns:
         """Give physical values.
 
@@ -164,13 +216,21 @@ class Nuisance:
             cords=parts[3] * self.cords_std,
             output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
             input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
-            gains=np.clip(parts[6] * self.gain_std, -MOST_GAIN, MOST_GAIN),
+            local=self.local_std * parts[6],
+            gains=np.clip(parts[7] * self.gain_std, -MOST_GAIN, MOST_GAIN),
         )
 
     def _symmetric(self, triangle: FloatArray) -> FloatArray:
+        rows, columns = self.pairs
         matrix = np.zeros((self.n_modes, self.n_modes))
-        matrix[self.pairs] = triangle
-        return matrix + np.triu(matrix, 1).T
+        matrix[rows, columns] = matrix[columns, rows] = triangle
+        return matrix
+
+
+@cache
+def _triangle(size: int) -> tuple[IntArray, IntArray]:
+    rows, columns = np.triu_indices(size)
+    return rows.astype(np.int64), columns.astype(np.int64)
 
 
 def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nuisance:
@@ -198,7 +258,8 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
     kappa, mu = np.full((n_modes, n_modes), ACROSS * stiffness), np.full((n_modes, n_modes), ACROSS * mass)
     np.fill_diagonal(kappa, np.hypot(stiffness, 2 * options.frequency_tolerance * UNIFORM))
     np.fill_diagonal(mu, mass)
-    growth = 1 + LESS_CONVERGED * np.maximum(frequencies[:n_modes] / basis.highest_rad_s - 1, 0.0)
+    beyond = np.maximum(frequencies[:n_modes] / basis.highest_rad_s - 1, 0.0)
+    growth = 1 + LESS_CONVERGED * beyond + REDUCED * beyond**2
     kappa *= np.sqrt(np.outer(growth, growth))
     kappa[:n_rigid] = kappa[:, :n_rigid] = 0.0
     first = frequencies[n_rigid] if len(frequencies) > n_rigid else 0.0
@@ -216,9 +277,21 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         shift_std=np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes]),
         n_outputs=len(layout.outputs),
         n_inputs=len(layout.inputs),
+        local_std=LOCAL * _local(basis, layout, n_modes),
         n_channels=len(layout.channels),
         gain_std=options.gain_tolerance * UNIFORM,
+        is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
     )
+
+
+def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
+    """Compliance of each FRF by all modes beyond those with scatter, m/N."""
+    outputs = np.array([motion_row(basis.model, dof) for _, dof in layout.outputs]) @ basis.vectors
+    inputs = np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors
+    shift = basis.modes.shift
+    whole = outputs @ np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), inputs.T)
+    scattered = (outputs[:, :n_modes] / (basis.modes.eigenvalues[:n_modes] + shift)) @ inputs[:, :n_modes].T
+    return np.asarray((whole - scattered)[layout.output_of, layout.input_of])
 
 
 def all_shift_rows(basis: Basis, nuisance: Nuisance, dofs: tuple[Dof, ...]) -> FloatArray:

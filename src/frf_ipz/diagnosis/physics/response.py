@@ -208,8 +208,10 @@ def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tupl
     m, rigid = len(unknowns.kappa), len(unknowns.cords)
     block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
     block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
-    least = float(linalg.eigvalsh(unknowns.mu, subset_by_index=(0, 0), check_finite=False)[0]) if m else 0.0
-    mu = unknowns.mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))  # no step may take all mass away
+    mu = unknowns.mu
+    if np.linalg.norm(mu) > MOST_OF_MASS:  # no step may take all mass away
+        least = float(linalg.eigvalsh(mu, subset_by_index=(0, 0), check_finite=False)[0])
+        mu = mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))
     values, rotation = linalg.eigh(block, np.eye(m) + mu, check_finite=False)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation
@@ -261,7 +263,7 @@ def respond(
     stiffness = _coupled(own, attached, change, s)
     motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
     output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
-    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of]
+    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of] + unknowns.local
     chain = s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ unknowns.gains)
     return Response(
         values=receptance * chain,
@@ -350,6 +352,9 @@ def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) ->
     cords = -left[:, rigid] * right[:, rigid] * nuisance.cords_std
     parts = [kappa, mu, damping, cords]
     parts += _shift_jacobians(response, nuisance, layout)
+    parts.append(
+        np.broadcast_to(np.diag(nuisance.local_std), (len(s), len(nuisance.local_std), len(nuisance.local_std)))
+    )
     stacked = np.concatenate(parts, axis=1) * response.chain[:, None, :]
     gains = response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std)
     return np.concatenate([np.moveaxis(stacked, 1, 2), gains], axis=2)

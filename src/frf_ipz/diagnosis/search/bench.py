@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,7 +66,9 @@ class Bench:
 
     def fit_from(self, fit: Fit) -> Fit:
         """Fit exactly, from a fit with large errors."""
-        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=16)
+        freely = replace(self.data, is_bounded=False)
+        near = polish(fit.hypothesis, freely, fit.values, unknown=fit.unknown, iterations=16)
+        return polish(fit.hypothesis, self.data, near.values, unknown=near.unknown, iterations=12)
 
     def fit_beside(self, hypothesis: Hypothesis, values: FloatArray, base: Fit) -> Fit:
         """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies."""
@@ -78,7 +80,8 @@ class Bench:
 
     def _cost(self, hypothesis: Hypothesis, values: FloatArray, unknown: FloatArray) -> float:
         white = self.data.misfit(hypothesis.respond(values, unknown, self.data.measured.s))
-        return float(white @ white + unknown @ unknown)
+        pulls, _ = self.nuisance.pulls(unknown)
+        return float(white @ white + pulls @ pulls)
 
     def go_on(self, fit: Fit) -> Fit:
         """Go on with a fit that has not converged."""

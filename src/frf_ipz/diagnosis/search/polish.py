@@ -50,7 +50,7 @@ class Fit:
     misfit : float
         Sum of squares of the whitened misfit.
     pull : float
-        Sum of squares of `unknown`.
+        Sum of squares of the pulls of `unknown`.
     log_evidence : float
         nats, up to a constant that all hypotheses share.
     covariance : (n_parameters, n_parameters) array
@@ -90,11 +90,14 @@ class Data:
     free_gains : str
         ``none``, ``common`` or ``per_channel``: gains that nobody knows; the model's FRFs are scaled to the measured
         ones.
+    is_bounded : bool
+        Tolerances are bounds; without them far steps are easier.
     """
 
     measured: Measured
     whitening: Whitening
     free_gains: str = "none"
+    is_bounded: bool = True
 
     def gains(self, response: Response) -> FloatArray:
         """Real factors that bring the model's FRFs to the measured ones where scales are unknown, (n_frfs,) array."""
@@ -121,10 +124,12 @@ class _Point:
     unknown: FloatArray
     misfit: FloatArray
     response: Response
+    pulls: FloatArray  # of the unknown
+    slopes: FloatArray
 
     @property
     def objective(self) -> float:
-        return float(self.misfit @ self.misfit + self.unknown @ self.unknown)
+        return float(self.misfit @ self.misfit + self.pulls @ self.pulls)
 
 
 def polish(
@@ -188,18 +193,22 @@ class _Slope:
     squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies
     scatter: FloatArray  # (m, n_unknowns), of the same
     ratios: FloatArray  # (m, n_parameters), of their damping ratios without scatter
+    slopes: FloatArray  # of the unknowns' pulls
 
     def curvature(self, hypothesis: Hypothesis) -> FloatArray:
         """Sum the data's curvature, the unknowns' priors, and uniform priors where data say nothing."""
         n_parameters = len(hypothesis.parameters)
         prior = np.ones(self.jacobian.shape[1])
         prior[:n_parameters] = PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2
+        prior[n_parameters:] = self.slopes**2
         return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior))
 
 
 def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: FloatArray) -> _Point:
     response = hypothesis.respond(hypothesis.physical(searched), unknown, data.measured.s)
-    return _Point(searched=searched, unknown=unknown, misfit=data.misfit(response), response=response)
+    pulls, slopes = hypothesis.nuisance.pulls(unknown, is_bounded=data.is_bounded)
+    misfit = data.misfit(response)
+    return _Point(searched=searched, unknown=unknown, misfit=misfit, response=response, pulls=pulls, slopes=slopes)
 
 
 def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
@@ -224,6 +233,7 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
         squares=np.reshape(squares, (len(columns), m)).T,
         scatter=_scatter_of_squares(point.response.modes, hypothesis.nuisance),
         ratios=np.reshape(ratios, (len(columns), m)).T,
+        slopes=point.slopes[used],
     )
 
 
@@ -231,7 +241,7 @@ def _step(hypothesis: Hypothesis, data: Data, point: _Point, slope: _Slope, damp
     n_parameters = len(hypothesis.parameters)
     curvature = slope.curvature(hypothesis)
     gradient = slope.jacobian.T @ point.misfit
-    gradient[n_parameters:] -= point.unknown[slope.used]
+    gradient[n_parameters:] -= (point.pulls * point.slopes)[slope.used]
     damped = curvature + damping * np.diag(np.diag(curvature))
     step = linalg.cho_solve(linalg.cho_factor(damped, lower=True, check_finite=False), gradient, check_finite=False)
     longest = np.where([parameter.is_log for parameter in hypothesis.parameters], LONGEST_STEP, 0.1)
@@ -328,7 +338,7 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
     log_volume = float(np.sum(np.log(np.diag(lower))))
     log_prior = -sum(np.log(cause.n_places) for cause in hypothesis.causes)
     log_prior -= float(np.sum(np.log(hypothesis.high - hypothesis.low)))
-    misfit, pull = float(point.misfit @ point.misfit), float(point.unknown @ point.unknown)
+    misfit, pull = float(point.misfit @ point.misfit), float(point.pulls @ point.pulls)
     rows = linalg.solve_triangular(lower, np.eye(len(curvature)), lower=True, check_finite=False)
     inverse = linalg.cho_solve((lower, True), np.eye(len(curvature))[:, :n_parameters])
     return Fit(

@@ -33,9 +33,11 @@ class Score:
     misfit : (n_data,) array
         Whitened misfit of the base, as it would be without scatter.
     columns : (n_data, n_nuisance) array
-        Whitened derivatives of the FRFs by what cannot be known.
+        Whitened derivatives of the FRFs by the pulls of what cannot be known.
     factor : (n_nuisance, n_nuisance) array
         Lower Cholesky factor of their curvature with its prior.
+    pulls : (n_nuisance,) array
+        Of the base.
     response : Response
         Of the base.
     """
@@ -46,6 +48,7 @@ class Score:
     misfit: FloatArray
     columns: FloatArray
     factor: FloatArray
+    pulls: FloatArray
     response: Response
 
     def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
@@ -83,7 +86,7 @@ class Score:
         """Whitened misfit, as it would be without scatter."""
         data = self.data
         response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, data.measured.s)
-        return data.misfit(response) + self.columns @ self.base.unknown
+        return data.misfit(response) + self.columns @ self.pulls
 
     def _square(self, one: FloatArray, other: FloatArray) -> float:
         seen = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (one, other)]
@@ -109,13 +112,15 @@ def score_on(bench: Bench, base: Fit, data: Data) -> Score:
     """
     response = base.hypothesis.respond(base.values, base.unknown, data.measured.s)
     jacobian = nuisance_jacobian(response, bench.nuisance, bench.specimen.layout)
-    columns = data.whitening(data.gains(response)[:, None] * jacobian)
+    pulls, slopes = bench.nuisance.pulls(base.unknown)
+    columns = data.whitening(data.gains(response)[:, None] * jacobian) / slopes
     return Score(
         bench=bench,
         base=base,
         data=data,
-        misfit=data.misfit(response) + columns @ base.unknown,
+        misfit=data.misfit(response) + columns @ pulls,
         columns=columns,
         factor=linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]), lower=True),
+        pulls=pulls,
         response=response,
     )

@@ -27,6 +27,7 @@ CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 PLACES_EACH = 3  # of an effect that are refined
+STEPPED, NOT_FAR = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
 NEAR = 2  # nodes or elements: places so near count as one there
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY = 7
@@ -61,15 +62,28 @@ class Ranking:
 
     @property
     def best(self) -> Fit:
-        """The one with the largest evidence; the base where nothing was found."""
-        return self.fits[0] if self.fits else self.base
+        """The best place of the most probable effect; the base where nothing was found."""
+        return by_effect(self.fits)[0][0] if self.fits else self.base
 
-    def by_effect(self) -> dict[str, Fit]:
-        """Give the best fit of each effect, by falling evidence."""
-        found: dict[str, Fit] = {}
-        for fit in self.fits:
-            found.setdefault(fit.hypothesis.causes[-1].effect.name, fit)
-        return found
+
+def by_effect(fits: Iterable[Fit]) -> list[tuple[Fit, ...]]:
+    """Sort fits by effects: one is as probable as all its places together.
+
+    Parameters
+    ----------
+    fits : iterable of Fit
+        Each with one cause more than is known.
+
+    Returns
+    -------
+    list of tuple of Fit
+        The most probable effect first; of each, the most probable place first.
+    """
+    groups: dict[str, list[Fit]] = {}
+    for fit in sorted(fits, key=lambda fit: -fit.log_evidence):
+        groups.setdefault(fit.hypothesis.causes[-1].effect.name, []).append(fit)
+    total = {name: float(np.logaddexp.reduce([fit.log_evidence for fit in group])) for name, group in groups.items()}
+    return [tuple(groups[name]) for name in sorted(groups, key=lambda name: -total[name])]
 
 
 def fit_nothing(bench: Bench) -> Fit:
@@ -151,7 +165,33 @@ def _refined(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
         values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
         found.append(Start(cause=start.cause, values=values, cost=cost))
-    return sorted(found, key=lambda start: start.cost)
+    found.sort(key=lambda start: start.cost)
+    stepped = [_stepped(bench, base, start) for start in found[:STEPPED] if start.cost < NOT_FAR * found[0].cost]
+    best: dict[tuple[object, ...], Start] = {}
+    for start in sorted([*stepped, *found[len(stepped) :]], key=lambda start: start.cost):
+        best.setdefault(start.cause.key, start)
+    return list(best.values())
+
+
+def _stepped(bench: Bench, base: Fit, start: Start) -> Start:
+    """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way."""
+    weights = weights_of(bench.coarse, REFINED_ERROR)
+    seen = {start.cause.key}
+    for _ in range(MOST_STEPS):
+        better = start
+        for place in start.cause.effect.neighbours(bench.specimen, start.cause.place):
+            cause = Cause(effect=start.cause.effect, place=place, n_places=start.cause.n_places)
+            hypothesis = bench.suppose((*base.hypothesis.causes, cause))
+            if cause.key in seen or len(hypothesis.parameters) != len(start.values):
+                continue
+            seen.add(cause.key)
+            values, cost = refine(hypothesis, bench.coarse, weights, start.values, iterations=3)
+            if cost < better.cost - GAIN:
+                better = Start(cause=cause, values=values, cost=cost)
+        if better is start:
+            break
+        start = better
+    return start
 
 
 def spread(starts: Iterable[Start], each: int) -> list[Start]:
@@ -253,10 +293,15 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)
-    if len(hypothesis.parameters) == len(fit.values):
+    is_near = fit.misfit < NEARLY_RIGHT * 2 * bench.data.measured.values.size
+    if len(hypothesis.parameters) == len(fit.values) and is_near:
         values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
         unknown = same_modes(hypothesis, values, fit)
         return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1)
-    start = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
-    values, _ = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
+    if len(hypothesis.parameters) == len(fit.values):
+        start = fit.values
+    else:
+        best = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
+        start = np.concatenate([base.values, best.values])
+    values, _ = refine(hypothesis, bench.coarse, weights, start)
     return bench.fit(causes, values)

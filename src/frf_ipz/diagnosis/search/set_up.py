@@ -79,13 +79,14 @@ def set_up(
     half = points_of(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
     few = points_of(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
     specimen = Specimen(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
+    early = with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
     return Bench(
         specimen=specimen,
         nuisance=nuisance,
         effects=effects,
         coarse=coarse,
         data=with_errors(source.training, options, free_gains=free_gains),
-        early=with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR),
+        early=replace(early, is_bounded=False),
         thin=with_errors(few, options, free_gains=free_gains),
         kind=source.kind,
     )
