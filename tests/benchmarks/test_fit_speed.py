@@ -22,7 +22,7 @@ from synthetic_frfs import of_bench
 ROUNDS = 3
 ORDERS = {"b": 60, "c": 100}  # of the peer: what its own examples use, as in the bench
 POLES_FASTER = {"b": 2.0, "c": 20.0}  # pole step against sdypy-EMA's
-WHOLE_FASTER = {"c": 2.0}  # whole fit with covariance against sdypy-EMA's pole step alone
+WHOLE_FASTER = {"b": 2.0, "c": 2.0}  # whole fit with covariance against sdypy-EMA's poles, on b with their selection
 AUTO_FASTER = 50.0  # whole fit against scikit-rf's auto_fit on set b
 MEMORY_MB = 300.0  # above the data, on set c
 
@@ -46,7 +46,8 @@ def cpu_seconds(work):
     return float(np.median(seconds))
 
 
-def sdypy_seconds(truth, order):
+def sdypy_seconds(truth, order, *, select):
+    """CPU seconds of sdypy-EMA's stabilisation, and with `select` of its choice of poles nearest the true ones too."""
     ema = pytest.importorskip("sdypy.EMA", reason="needs the extra 'peers'")
     rows = truth["H"].reshape(-1, truth["H"].shape[2])
 
@@ -61,6 +62,8 @@ def sdypy_seconds(truth, order):
                 frf_form="accelerance",
             )
             model.get_poles(method="lscf", show_progress=False)
+            if select:
+                model.select_closest_poles(list(truth["fn"]))
 
     return cpu_seconds(poles)
 
@@ -70,21 +73,25 @@ def sdypy_seconds(truth, order):
 def test_against_sdypy(benchmark, truth_sets, name):
     truth = truth_sets[name]
     frfs = of_bench(truth)
-    peer = sdypy_seconds(truth, ORDERS[name])
+    peer = sdypy_seconds(truth, ORDERS[name], select=False)
+    chosen = sdypy_seconds(truth, ORDERS[name], select=True)
     options = FitOptions()
     lines = measured_lines(frfs, options)
     poles = cpu_seconds(lambda: start_poles(frfs, lines))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     whole = cpu_seconds(lambda: fit_modes(frfs, options))
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    benchmark.extra_info.update(peer_cpu_s=peer, poles_cpu_s=poles, whole_cpu_s=whole, memory_mb=memory)
+    benchmark.extra_info.update(
+        peer_cpu_s=peer, peer_chosen_cpu_s=chosen, poles_cpu_s=poles, whole_cpu_s=whole, memory_mb=memory
+    )
     print(
-        f"\nset {name}: poles {poles:.3f} s, whole fit {whole:.3f} s, sdypy-EMA's poles {peer:.3f} s of CPU: "
-        f"{peer / poles:.1f} and {peer / whole:.2f} times faster; {memory:.0f} MB more at the peak"
+        f"\nset {name}: poles {poles:.3f} s, whole fit {whole:.3f} s of CPU; sdypy-EMA's stabilisation {peer:.3f} s, "
+        f"with its choice of poles {chosen:.3f} s: poles {peer / poles:.1f}, whole fit {peer / whole:.2f} and "
+        f"{chosen / whole:.2f} times faster; {memory:.0f} MB more at the peak"
     )
     benchmark.pedantic(lambda: None, rounds=1)
     assert peer >= POLES_FASTER[name] * poles
-    assert peer >= WHOLE_FASTER.get(name, 0.0) * whole
+    assert (chosen if name == "b" else peer) >= WHOLE_FASTER[name] * whole
     assert memory < MEMORY_MB
 
 
