@@ -12,6 +12,7 @@ import pandas as pd
 
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, Diagnosis, Gate, Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.dofs import Dof
 from frf_ipz.export.state_space import to_state_space
 from frf_ipz.fe.options import ReduceOptions
@@ -43,6 +44,7 @@ def synthetic_folder(*, without=(), diagnosed=False):
     """A folder with the results of every stage but some."""
     results = {name: result for name, result in synthetic_results().items() if name not in without}
     if diagnosed:
+        results["levels"] = synthetic_levels(results["fit"].labels, results["fit"].band_hz)
         results["diagnose"] = synthetic_diagnosis(results["fit"].labels, results["model"].geometry.nodes.tolist())
     stages = {name: {"key": f"{place:064x}", "seconds": 0.1 * place} for place, name in enumerate(results)}
     record = {
@@ -212,6 +214,35 @@ def reference_of(truth, points, blows, lines):
         variance=unknown,
         coherence=unknown,
         averages=np.zeros(len(labels), int),
+    )
+
+
+def synthetic_levels(labels, band):
+    """Two modes of three blows each; the second one falls with the level."""
+    frequency = np.linspace(*band, 300)
+    weak = np.abs(1 / (1 - (frequency / np.mean(band)) ** 2 + 0.02j))[:, None] * np.ones(len(labels))
+    rows = [
+        (
+            mode,
+            str(labels[0]),
+            f"hits/p_{blow:02d}.csv",
+            level,
+            100.0 * (1 + mode - 0.01 * mode * blow),
+            0.01,
+            0.004,
+            1e-4,
+        )
+        for mode in range(2)
+        for blow, level in enumerate((2.0, 8.0, 30.0))
+    ]
+    return LevelDependence(
+        frequency_hz=frequency,
+        labels=tuple(labels),
+        weak=weak,
+        strong=1.1 * weak,
+        weak_N=np.full(len(labels), 4.0),
+        strong_N=np.full(len(labels), 20.0),
+        modes=pd.DataFrame(rows, columns=list(COLUMNS)),
     )
 
 

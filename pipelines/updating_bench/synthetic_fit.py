@@ -236,6 +236,8 @@ def as_fit(
         modes=pd.DataFrame(),
         misfit=pd.DataFrame(),
         noise_from="recordings",
+        gain=np.ones(len(labels)),
+        channel_gains=pd.DataFrame(columns=["channel", "gain", "gain_std"]),
     )
 
 

@@ -55,6 +55,7 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
         if diagnosing:
             if diagnosis is None:
                 mismatch.diagnose(desk, model, frfs)
+            mismatch.levels(desk, fit, recordings.frfs)
             yield "diagnose"
         reduced = modelling.reduce(desk, model, fit, corrected_by=diagnosis)
         pairs = modelling.pair(desk, fit, reduced)

@@ -21,6 +21,7 @@ Result = TypeVar("Result")
 NEEDS = {
     "fit": ("ingest",),
     "diagnose": ("ingest",),
+    "levels": ("ingest", "fit"),
     "reduce": ("fit",),
     "pair": ("fit", "reduce"),
     "update": ("pair",),

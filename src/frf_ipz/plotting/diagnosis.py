@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.plotting.style import FAINT, UPDATED, axes_or_new, colour, label_axes
+from frf_ipz.plotting.curves import Q95
+from frf_ipz.plotting.style import FAINT, UPDATED, axes_or_new, colour, dash, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.measured.levels import LevelDependence
 
 MOST_RANKED = 12
 
@@ -104,3 +106,30 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     ax.set_yscale("log")
     ax.set_xticks(place, list(steps))
     return label_axes(ax, "", "Normalised FRF error, %")
+
+
+def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:
+    """Draw the change of each mode's frequency over the level of the blows, with 95 % bars.
+
+    Parameters
+    ----------
+    levels : LevelDependence
+        Weak beside strong blows.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        A line of a linear structure stays at zero.
+    """
+    ax = axes_or_new(ax)
+    for place, (_, rows) in enumerate(levels.modes.groupby(["mode", "frf"])):
+        ordered = rows.sort_values("level_N")
+        hertz = ordered["frequency_hz"].to_numpy(float)
+        bars = 100 * Q95 * ordered["frequency_std_hz"].to_numpy(float) / hertz
+        name = f"mode {int(ordered['mode'].iloc[0]) + 1}, {ordered['frf'].iloc[0]}"
+        style: dict[str, Any] = {"color": colour(place), "linestyle": dash(place), "marker": "o", "markersize": 3}
+        ax.errorbar(ordered["level_N"], 100 * (hertz / hertz[-1] - 1), bars, label=name, capsize=2, **style)
+    ax.set_xscale("log")
+    return label_axes(ax, "Peak force of the blow, N", "Change of frequency, %")

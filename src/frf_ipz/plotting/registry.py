@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from matplotlib.figure import Figure
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.plotting.diagnosis import plot_mismatch, plot_proof, plot_ranking
+from frf_ipz.plotting.diagnosis import plot_levels, plot_mismatch, plot_proof, plot_ranking
 from frf_ipz.plotting.frfs import plot_coherence, plot_fit, plot_frfs, plot_misfit, plot_phases
 from frf_ipz.plotting.poles import plot_pairs, plot_pole_zero_map, plot_stabilization
 from frf_ipz.plotting.recordings import plot_blows, plot_structure
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
     from frf_ipz.updating.updated_model import UpdatedModel
@@ -57,6 +58,7 @@ PICTURES: dict[str, _Entry] = {
     "mismatch": _Entry(("diagnose",), plot_mismatch),
     "ranking": _Entry(("diagnose",), plot_ranking),
     "proof": _Entry(("diagnose",), plot_proof),
+    "levels": _Entry(("levels",), lambda levels: _levels(levels)),
 }
 
 
@@ -118,6 +120,12 @@ def _change(updated: UpdatedModel) -> Axes:
             "the update of this run has not changed named parts of the FE model, so there is no such picture"
         )
     return plot_stiffness_change(updated.parts)
+
+
+def _levels(levels: LevelDependence) -> Axes:
+    if not len(levels.modes):
+        raise InputError("no place was struck at several levels, so there is no such picture")
+    return plot_levels(levels)
 
 
 def _structure(model: Any, recordings: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them

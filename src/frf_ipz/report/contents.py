@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import ComplexArray, IntArray
     from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.dofs import Dof
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.frf import FrfLabel, FrfSet
@@ -43,6 +44,8 @@ class RunContents:
         As the stages gave them.
     diagnosis : Diagnosis, optional
         What is missing from the model.
+    levels : LevelDependence, optional
+        Weak beside strong blows.
     geometry : Geometry, optional
         Where the nodes of the FE model are.
     reference : FrfSet, optional
@@ -60,6 +63,7 @@ class RunContents:
     prediction: Prediction | None = None
     state_space: StateSpaceModel | None = None
     diagnosis: Diagnosis | None = None
+    levels: LevelDependence | None = None
     geometry: Geometry | None = None
     reference: FrfSet | None = None
     stale: frozenset[str] = frozenset()
@@ -180,6 +184,7 @@ def read_contents(folder: RunFolder) -> RunContents:
         prediction=folder.load("predict") if has_model else None,
         state_space=folder.load("export") if has_model else None,
         diagnosis=folder.load("diagnose"),
+        levels=folder.load("levels"),
         geometry=model.geometry if isinstance(model, StructuralModel) else model,
         reference=folder.load("reference"),
         stale=frozenset(name for name in stages if folder.is_stale(name)),

@@ -18,7 +18,6 @@ from frf_ipz.report.packing import Packer, to_json
 from frf_ipz.report.picture import colour_of
 from frf_ipz.report.section import Section, pictures_of, render_section
 from frf_ipz.report.sections import (
-    diagnosis,
     fit,
     frfs,
     overview,
@@ -31,6 +30,7 @@ from frf_ipz.report.sections import (
     state_space,
     updating,
 )
+from frf_ipz.report.sections.diagnosis import section as diagnosis
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

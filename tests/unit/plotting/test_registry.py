@@ -3,13 +3,14 @@
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 
 import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.plotting.registry import PICTURES, draw, picture_names
 from frf_ipz.plotting.style import FORMATS, save_figure
-from synthetic_run import synthetic_folder
+from synthetic_run import Folder, synthetic_folder
 
 OF_A_DIAGNOSIS = {"mismatch", "ranking", "proof"}
 STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
@@ -49,6 +50,12 @@ def test_a_wrong_name_is_answered_with_the_closest():
 def test_a_missing_stage_is_named(name):
     with pytest.raises(InputError, match="needs the result of 'diagnose'"):
         draw(name, synthetic_folder())
+
+
+def test_a_run_with_one_level_has_no_picture_of_levels(folder):
+    one = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
+    with pytest.raises(InputError, match="no place was struck at several levels"):
+        draw("levels", Folder(results={"levels": one}, record={}, stale=()))
 
 
 def test_names_are_in_the_order_of_the_chain():

@@ -7,7 +7,7 @@ import pytest
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
 from frf_ipz.report.picture import Picture
-from frf_ipz.report.sections.diagnosis import build
+from frf_ipz.report.sections.diagnosis.section import build
 from frf_ipz.report.table import Table
 from synthetic_run import synthetic_folder
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
+from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.frf import FrfSet
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.desk import Desk
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
@@ -55,6 +58,31 @@ def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
         {"options": asdict(options), "model": job.model_key, "after": desk.after("ingest"), **band},
         compute,
         lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
+    )
+
+
+def levels(desk: Desk, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
+    """Compare weak blows with strong ones.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    fit : ModalFit
+        The fitted model.
+    frfs : FrfSet
+        The measured FRFs.
+
+    Returns
+    -------
+    LevelDependence
+        Empty where there is one level only.
+    """
+    file = desk.job.pipeline.file
+    return desk.stage(
+        "levels",
+        {"after": desk.after("ingest", "fit")},
+        lambda _: compare_levels(observe(desk.job.test, file.ingest, frfs, fit=file.fit), fit),
     )
 
 

@@ -10,6 +10,7 @@ from frf_ipz.diagnosis.finding import Estimate
 from frf_ipz.report.findings import plain_signs, verdict_of
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
+from frf_ipz.report.sections.diagnosis.levels import level_pictures
 from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, number, percent, with_error
 
@@ -51,7 +52,7 @@ def build(run: RunContents) -> Section | None:
     blocks.append(_proof(diagnosis))
     if diagnosis.curves is not None:
         blocks.append(_curves(diagnosis.curves, run.band_hz))
-    blocks += _gates(diagnosis) + _detectability(diagnosis)
+    blocks += _gates(diagnosis) + level_pictures(run.levels, run.labels, run.band_hz) + _detectability(diagnosis)
     lead = plain_signs(diagnosis.statement) or verdict_of(diagnosis)[0]
     notes = (*[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity], *diagnosis.warnings)
     return Section(anchor="diagnosis", title="Diagnosis", lead=lead, blocks=tuple(blocks), notes=notes)

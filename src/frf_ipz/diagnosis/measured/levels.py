@@ -1,0 +1,226 @@
+"""FRFs and modes of weak and of strong blows: what a structure that is not linear changes with the level.
+
+Each FRF is estimated anew from the weaker and from the stronger half of the blows at a place. Around each mode, the FRF
+of every single blow gives a frequency and a damping ratio: over a few lines it is a quotient (c0 + c1 s) / (s - p).
+Records of a shaker are blows that go on: each is cut into segments as long as those of the FRFs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.measured.forces import isolate_pulse
+from frf_ipz.frf import FrfLabel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.dofs import Dof
+    from frf_ipz.identification.modal_fit import ModalFit
+
+LEAST_RATIO = 1.5  # of the strongest to the weakest blow at a place: below, there is one level only
+LEAST_BLOWS = 2
+WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
+LEAST_LINES = 8
+ROUNDS = 4  # of weights
+UNSURE = 0.01  # relative standard deviation of a frequency: of a blow that drowns in noise nothing is said
+COLUMNS = (
+    "mode",
+    "frf",
+    "blow",
+    "level_N",
+    "frequency_hz",
+    "frequency_std_hz",
+    "damping_ratio",
+    "damping_ratio_std",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LevelDependence:
+    """Weak beside strong blows.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Lines of the band, Hz.
+    labels : tuple of FrfLabel
+        FRFs of places that were struck at several levels.
+    weak, strong : (n_lines, n_frfs) array
+        Magnitudes, SI, under the window of the FRFs.
+    weak_N, strong_N : (n_frfs,) array
+        Mean peak force of the blows behind them, N.
+    modes : DataFrame
+        One row a mode and blow: ``mode`` (from 0), ``frf``, ``blow``, ``level_N``, ``frequency_hz``,
+        ``frequency_std_hz``, ``damping_ratio``, ``damping_ratio_std``.
+    """
+
+    frequency_hz: FloatArray
+    labels: tuple[FrfLabel, ...]
+    weak: FloatArray
+    strong: FloatArray
+    weak_N: FloatArray  # noqa: N815  a unit
+    strong_N: FloatArray  # noqa: N815  a unit
+    modes: pd.DataFrame
+
+
+def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence:
+    """Compare weak and strong blows, FRF by FRF and mode by mode.
+
+    Parameters
+    ----------
+    observations : Observations
+        The blows or records. Places that were struck at one level only say nothing.
+    fit : ModalFit
+        Says which modes there are.
+
+    Returns
+    -------
+    LevelDependence
+        Without FRFs where nothing can be compared.
+    """
+    groups, frfs = list(_groups(observations)), observations.frfs
+    if not groups or frfs is None:
+        return _put_together(np.zeros(0), [], [])
+    low, high = observations.band_hz
+    step = groups[0][0].step_s
+    n = max(blow.n_samples for group in groups for blow in group)
+    if observations.kind != "hammer":
+        n = round(1 / (step * float(np.diff(frfs.frequency_hz[:2])[0])))
+    frequency = np.asarray(np.fft.rfftfreq(n, step))
+    used = (frequency >= low) & (frequency <= high)
+    s = frfs.window_decay_1_s + 2j * np.pi * frequency[used]
+    curves: list[_Curve] = []
+    rows: list[tuple[object, ...]] = []
+    for group in groups:
+        cut = _decaying if observations.kind == "hammer" else _going_on
+        spectra = [cut(blow, n, frfs.window_decay_1_s)[:, :, used] for blow in group]
+        curves += _halves(group, spectra)
+        rows += _modes(group, spectra, s, fit)
+    return _put_together(frequency[used], curves, rows)
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """One FRF of weak and of strong blows."""
+
+    label: FrfLabel
+    weak: FloatArray
+    strong: FloatArray
+    weak_level: float
+    strong_level: float
+
+
+def _put_together(
+    frequency_hz: FloatArray, curves: Sequence[_Curve], rows: Sequence[tuple[object, ...]]
+) -> LevelDependence:
+    shape = len(curves), len(frequency_hz)
+    return LevelDependence(
+        frequency_hz=frequency_hz,
+        labels=tuple(one.label for one in curves),
+        weak=np.array([one.weak for one in curves]).reshape(shape).T,
+        strong=np.array([one.strong for one in curves]).reshape(shape).T,
+        weak_N=np.array([one.weak_level for one in curves]),
+        strong_N=np.array([one.strong_level for one in curves]),
+        modes=pd.DataFrame(list(rows), columns=list(COLUMNS)),
+    )
+
+
+def _halves(group: Sequence[Blow], spectra: Sequence[ComplexArray]) -> list[_Curve]:
+    parts = slice(len(group) // 2, None), slice(None, len(group) // 2)  # the strongest come first
+    weak, strong = (np.abs(_h1(np.concatenate(spectra[part]))) for part in parts)
+    levels = [float(np.mean([blow.level for blow in group[part]])) for part in parts]
+    return [_Curve(label, weak[:, row], strong[:, row], *levels) for row, label in enumerate(_labels(group[0]))]
+
+
+def _groups(observations: Observations) -> Iterator[tuple[Blow, ...]]:
+    """Blows of several levels at one place with the sensors in one place, the strongest first."""
+    for dof in observations.input_dofs:
+        blows = [blow for blow in observations.at(dof) if blow.rested or observations.kind != "hammer"]
+        for labels in dict.fromkeys(tuple(_labels(blow)) for blow in blows):
+            group = tuple(blow for blow in blows if tuple(_labels(blow)) == labels)
+            if len(group) >= LEAST_BLOWS and group[0].level > LEAST_RATIO * group[-1].level:
+                yield group
+
+
+def _labels(blow: Blow) -> list[FrfLabel]:
+    return [
+        FrfLabel(sensor.dof, blow.input_dof, sensor.quantity, sensor.channel, blow.input_channel)
+        for sensor in blow.sensors
+    ]
+
+
+def _decaying(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
+    """Transform the pulse of the force and the responses, (1, 1 + n_sensors, n_lines)."""
+    signals = np.vstack([isolate_pulse(blow).blow.force, blow.responses])
+    window = np.exp(-decay_1_s * blow.step_s * np.arange(blow.n_samples))
+    return np.asarray(np.fft.rfft(signals * window, n))[None] * blow.step_s
+
+
+def _going_on(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
+    """Transform segments that overlap by half, (n_segments, 1 + n_sensors, n_lines)."""
+    del decay_1_s
+    signals = np.vstack([blow.force, blow.responses])
+    starts = range(0, max(blow.n_samples - n, 0) + 1, max(n // 2, 1))
+    return np.array([np.fft.rfft(signals[:, start : start + n] * np.hanning(n), n) * blow.step_s for start in starts])
+
+
+def _h1(spectra: ComplexArray) -> ComplexArray:
+    """FRFs of some blows or segments together, (n_lines, n_sensors)."""
+    force, responses = spectra[:, :1], spectra[:, 1:]
+    cross = np.sum(responses * force.conj(), axis=0)
+    return np.asarray((cross / np.sum(np.abs(force) ** 2, axis=0)).T)
+
+
+def _modes(
+    group: Sequence[Blow], spectra: Sequence[ComplexArray], s: ComplexArray, fit: ModalFit
+) -> list[tuple[object, ...]]:
+    labels = _labels(group[0])
+    rows: list[tuple[object, ...]] = []
+    for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
+        sensor = _clearest(labels, fit, mode)
+        half = (s[0].real - pole.real) * WIDTH
+        near = np.flatnonzero(np.abs(s.imag - pole.imag) <= half)
+        if sensor is None or len(near) < LEAST_LINES:
+            continue
+        for blow, lines in zip(group, spectra, strict=True):
+            found = _pole_near(s[near], _h1(lines)[near, sensor], complex(pole))
+            if found is not None:
+                rows.append((mode, str(labels[sensor]), blow.name, blow.level, *found))
+    return rows
+
+
+def _clearest(labels: Sequence[FrfLabel], fit: ModalFit, mode: int) -> int | None:
+    """Which of the sensors shows a mode best."""
+    residues: dict[tuple[Dof, Dof, object], float] = {
+        (label.output_dof, label.input_dof, label.quantity): abs(complex(residue))
+        for label, residue in zip(fit.labels, fit.model.residues[mode], strict=True)
+    }
+    sizes = [residues.get((label.output_dof, label.input_dof, label.quantity), 0.0) for label in labels]
+    return int(np.argmax(sizes)) if max(sizes, default=0.0) > 0 else None
+
+
+def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[float, float, float, float] | None:
+    """Fit a local quotient; frequency, damping ratio and their deviations, each beside its own."""
+    pole = start
+    middle, scale = s.mean(), np.ptp(s.imag)
+    away = (s - middle) / scale
+    deviation = 0.0
+    for _ in range(ROUNDS):
+        weight = 1 / np.abs(s - pole)
+        columns = np.column_stack([values, np.ones_like(s), away]) * weight[:, None]
+        found, *_ = np.linalg.lstsq(columns, s * values * weight, rcond=None)
+        left = s * values * weight - columns @ found
+        variance = float(np.vdot(left, left).real) / (len(s) - columns.shape[1])
+        covariance = np.linalg.pinv(columns.conj().T @ columns)[0, 0].real * variance
+        pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2))
+    size = abs(pole)
+    if not np.isfinite(size) or pole.imag <= 0 or pole.real >= 0 or deviation > UNSURE * size:
+        return None
+    return size / (2 * np.pi), deviation / (2 * np.pi), -pole.real / size, deviation / size
