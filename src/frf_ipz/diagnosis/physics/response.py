@@ -166,12 +166,7 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
     Modes
         By ascending frequency.
     """
-    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
-    if change.mass is None:
-        squares, vectors = linalg.eigh(stiffness, check_finite=False)
-    else:
-        mass = np.eye(len(stiffness)) + basis.project(change.mass)
-        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
+    squares, vectors = _solved(basis, change)
     largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
     vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
     n_rigid = basis.modes.n_rigid
@@ -202,6 +197,26 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
         vectors=turned,
         viscous=viscous,
     )
+
+
+def _solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
+    """Squared frequencies and modes, mass-normalised.
+
+    The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
+    times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
+    """
+    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
+    mass = np.eye(len(stiffness))
+    if change.mass is not None:
+        mass = mass + basis.project(change.mass)
+    shift = basis.modes.shift
+    try:
+        inverses, vectors = linalg.eigh(mass, stiffness + shift * mass, check_finite=False)
+    except linalg.LinAlgError:
+        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
+        return squares, vectors
+    inverses = np.maximum(inverses[::-1], np.finfo(float).tiny)
+    return 1 / inverses - shift, vectors[:, ::-1] / np.sqrt(inverses)
 
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:

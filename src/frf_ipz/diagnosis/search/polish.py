@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.response import Modes
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
 
-STEP = 1e-5  # of the logarithm of a parameter, for its derivative
+STEP = 1e-6  # of the logarithm of a parameter, to both sides: peaks are so narrow that one side is not exact enough
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-5, 1e-9, 1e6
 FASTER, SLOWER = 0.2, 6.0  # what damping is multiplied with after a good and a bad step
 LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear range
@@ -216,14 +216,17 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
     columns, squares, ratios = [], [], []
     gains = data.gains(point.response)
     for index in range(len(hypothesis.parameters)):
-        moved = point.searched.copy()
-        step = STEP if moved[index] + STEP <= hypothesis.high[index] else -STEP
-        moved[index] += step
-        response = hypothesis.respond(hypothesis.physical(moved), point.unknown, data.measured.s)
-        columns.append(data.whitening(gains * (response.values - point.response.values) / step)[:, None])
-        here, there = point.response.modes, response.modes
-        squares.append((there.squares[:m] - here.squares[:m]) / step)
-        ratios.append((there.stated_ratio[:m] - here.stated_ratio[:m]) / step)
+        low, high = point.searched.copy(), point.searched.copy()
+        low[index] = max(low[index] - STEP, hypothesis.low[index])
+        high[index] = min(high[index] + STEP, hypothesis.high[index])
+        before, after = (
+            hypothesis.respond(hypothesis.physical(searched), point.unknown, data.measured.s)
+            for searched in (low, high)
+        )
+        step = high[index] - low[index]
+        columns.append(data.whitening(gains * (after.values - before.values) / step)[:, None])
+        squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
+        ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
     white = data.whitening(gains[:, None] * by_unknown)
     used = np.sum(white**2, 0) > MATTERS
