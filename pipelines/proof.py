@@ -21,12 +21,14 @@ from proof_tools.plan import FULL, SLICE, Folders, Order, plan_cases
 from proof_tools.scoring import Bar, bars, open_cases
 from proof_tools.sealing import BrokenSealError, check_seal, make_cases
 
+MOST_PREDICTED = 80  # explained cases: each is updated and predicted twice
+
 
 def main(arguments: list[str] | None = None, *, command: list[str] | None = None) -> None:
     options = read_arguments(arguments)
     folders, orders = choose_cases(options)
     names = [order.name for order in orders] or sorted(path.stem for path in folders.sealed.glob("case_*.json"))
-    both = {"workers": options.workers, "command": command}
+    both = {"workers": options.jobs, "command": command}
     with Progress(TextColumn("{task.description:24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as bar:
 
         def steps(text: str, total: int) -> Callable[[], None]:
@@ -34,9 +36,9 @@ def main(arguments: list[str] | None = None, *, command: list[str] | None = None
             return lambda: bar.advance(task)
 
         if orders:
-            make_cases(orders, folders, workers=options.workers, step=steps("making cases", len(names)))
+            make_cases(orders, folders, workers=options.jobs, step=steps("making cases", len(names)))
         diagnose_all(names, folders, step=steps("diagnosing", len(names)), **both)
-        told = [name for name in names if worth_predicting(name, folders) and not options.no_points]
+        told = [name for name in names if worth_predicting(name, folders)][: options.points]
         predict_all(told, folders, step=steps("predicting points", len(told)), **both)
     try:
         check_seal(folders, names)
@@ -57,7 +59,7 @@ def choose_cases(options: argparse.Namespace) -> tuple[Folders, list[Order]]:
         return Folders(root, options.cases, options.answers or options.cases / "truth"), []
     usual = SLICE if options.quick else FULL
     counts = {group: usual[group] if (n := getattr(options, group)) is None else n for group in FULL}
-    return Folders.inside(options.out or Path("results") / "proof"), plan_cases(counts)
+    return Folders.inside(options.out or Path("results") / "proof"), plan_cases(counts, shift=options.other_seeds)
 
 
 def line(bar: Bar) -> str:
@@ -73,8 +75,15 @@ def read_arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help=f"a slice: {SLICE}")
     for group, count in FULL.items():
         parser.add_argument(f"--{group}", type=int, metavar="N", help=f"cases of this group (default: {count})")
-    parser.add_argument("--workers", type=int, default=2, help="cases at the same time (default: 2)")
-    parser.add_argument("--no-points", action="store_true", help="predict nothing at points of interest")
+    parser.add_argument("--other-seeds", type=int, default=0, metavar="N", help="added to all seeds, for a trial")
+    parser.add_argument("--jobs", type=int, default=2, help="cases at the same time (default: 2)")
+    parser.add_argument(
+        "--points",
+        type=int,
+        default=MOST_PREDICTED,
+        metavar="N",
+        help=f"explained cases whose points of interest are predicted (default: {MOST_PREDICTED})",
+    )
     parser.add_argument("--cases", type=Path, help="folder of case_NN folders to score instead of making cases")
     parser.add_argument("--answers", type=Path, help="folder of their answers case_NN.json (default: truth in it)")
     return parser.parse_args(arguments)

@@ -86,13 +86,16 @@ def turns(group: str) -> list[str]:
     return [effects[i] for i in np.random.default_rng(ORDER_SEED).permutation(len(effects))]
 
 
-def plan_cases(counts: dict[str, int]) -> list[Order]:
+def plan_cases(counts: dict[str, int], *, shift: int = 0) -> list[Order]:
     """List the cases of a proof.
 
     Parameters
     ----------
     counts : dict of str to int
         How many of each group. The first ones of a group are the same, however many there are.
+
+    shift : int
+        Added to all seeds: for a trial on other cases than those of the proof.
 
     Returns
     -------
@@ -104,5 +107,6 @@ def plan_cases(counts: dict[str, int]) -> list[Order]:
         effects = turns(group)
         for i in range(count):
             name = "case_" + hashlib.blake2s(f"{group} {i}".encode(), digest_size=5).hexdigest()
-            orders.append(Order(name=name, group=group, effect=effects[i % len(effects)], seed=FIRST_SEEDS[group] + i))
+            seed = FIRST_SEEDS[group] + shift + i
+            orders.append(Order(name=name, group=group, effect=effects[i % len(effects)], seed=seed))
     return sorted(orders, key=lambda order: order.name)
