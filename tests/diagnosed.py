@@ -21,7 +21,7 @@ name = "beam"
 modal_ratio = 0.01
 [beam]
 length_m = 0.5
-elements = 16
+elements = {elements}
 formulation = "{formulation}"
 youngs_modulus_Pa = 69e9
 density_kg_m3 = 2690.0
@@ -63,8 +63,8 @@ stiffness_N_m = 2e5
 """
 
 
-def beam(folder: Path, *, formulation="euler-bernoulli", thickness_m=0.005, left="clamped", right="free"):
-    text = BEAM.format(formulation=formulation, thickness_m=thickness_m, left=left, right=right)
+def beam(folder: Path, *, elements=16, formulation="euler-bernoulli", thickness_m=0.005, left="clamped", right="free"):
+    text = BEAM.format(elements=elements, formulation=formulation, thickness_m=thickness_m, left=left, right=right)
     return _read(folder, text)
 
 

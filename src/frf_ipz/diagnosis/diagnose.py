@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.judging.decision import (
     EXPLAINED,
     UNEXPLAINED,
     decide,
+    fit_without,
     gain_over,
     only_null,
     without_last,
@@ -107,7 +108,7 @@ def diagnose(
     found, proof = _proven(bench, held_out, found)
     where = disagreement(bench, found.null, proof.curves)
     weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
-    findings = _findings(found, weighed)
+    findings = _findings(bench, found, weighed)
     linear = Diagnosis(
         verdict=found.verdict,
         findings=findings,
@@ -164,7 +165,7 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
     found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > FOUND_NATS)
     before, after = laws.before or linear.before, laws.after or linear.updated
-    is_needed = bool(found) and found[0].log_evidence_gain > np.fmax(FOUND_NATS, laws.linear_limit)
+    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.beyond_linear)) > FOUND_NATS
     is_worse = laws.verdict == UNEXPLAINED and after.held_out > before.held_out
     n_findings = 1 if is_needed and not is_worse else 0
     linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
@@ -177,6 +178,7 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         after=after if n_findings else before,
         mismatch_location=found[0].location if found else linear.mismatch_location,
         ambiguity=(),
+        mismatch_place=laws.place,
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
     )
@@ -194,7 +196,7 @@ def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
     return effects if scale == "none" else {name: one for name, one in effects.items() if name != "sensor_gain"}
 
 
-def _findings(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
+def _findings(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     causes = found.final.hypothesis.causes
     scale = max(1.0, found.good.misfit)
     if not causes:
@@ -203,11 +205,10 @@ def _findings(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
         return (finding_of(weighed[0], gain_over(found.final, found.null), scale),)
     competing = weigh(found.further[-1].fits, scale)
     newest = finding_of(competing[0], gain_over(found.final, found.further[-1].base), scale)
-    bases = [found.null, *(ranking.base for ranking in found.further)]
     older = [
         describe(
-            found.final, number, newest.probability, gain_over(bases[number + 1], bases[number]), scale,
-            places=(dict(causes[number].place.location),),
+            found.final, number, newest.probability, gain_over(found.final, fit_without(bench, found.final, number)),
+            scale, places=(dict(causes[number].place.location),),
         )
         for number in range(len(causes) - 1)
     ]  # fmt: skip

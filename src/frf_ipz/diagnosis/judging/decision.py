@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
@@ -133,6 +135,30 @@ def without_last(bench: Bench, found: Decision) -> Decision:
     left = found.further[:-1]
     fit = left[-1].best if left else found.ranking.best if found.further else found.null
     return replace(found, verdict=UNEXPLAINED, final=fit, further=left, good=goodness(bench, fit))
+
+
+def fit_without(bench: Bench, fit: Fit, number: int) -> Fit:
+    """Fit all causes of a fit but one: what that one explains beside the others.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and model.
+    fit : Fit
+        With several causes.
+    number : int
+        Which one is left out.
+
+    Returns
+    -------
+    Fit
+        With one cause less.
+    """
+    counts = fit.hypothesis.counts
+    start = sum(counts[:number])
+    values = np.delete(fit.values, np.arange(start, start + counts[number]))
+    causes = tuple(cause for index, cause in enumerate(fit.hypothesis.causes) if index != number)
+    return bench.fit(causes, values)
 
 
 def gain_over(fit: Fit, base: Fit) -> float:

@@ -1,0 +1,161 @@
+"""What the search rests on: bounds of tolerances, exact modes, steps to places, several causes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosed import BAND_HZ, beam, labels, measured, observed
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
+from frf_ipz.diagnosis.judging.tracing import trace
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.diagnosis.physics.response import modify
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
+from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.dofs import parse_dof
+from frf_ipz.fe.changes import with_point_masses, with_springs
+
+FEW = ("added_mass", "grounded_spring", "sensor_gain")
+STEP = 1e-6
+ROUNDING = 1e-5  # of a derivative by differences of that step, where low modes keep their digits
+SAME = 1e-6  # relative, of a slope by differences
+INSIDE = np.array([-1.9, 0.0, 1.5])
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+def bench_of(model, frfs, names=FEW):
+    effects = {name: effect for name, effect in shipped_effects().items() if name in names}
+    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
+
+
+@pytest.fixture(scope="module")
+def bench(nominal):
+    return bench_of(nominal, measured(nominal))
+
+
+def test_inside_a_tolerance_the_prior_is_normal(bench):
+    values = np.resize(INSIDE, bench.nuisance.size)
+    pulls, slopes = bench.nuisance.pulls(values)
+    assert_allclose(pulls, values, rtol=0)
+    assert_allclose(slopes, 1.0, rtol=0)
+
+
+def test_far_outside_a_tolerance_the_prior_rises_faster_but_not_for_shapes(bench):
+    nuisance, far = bench.nuisance, np.full(bench.nuisance.size, -5.0)
+    pulls, slopes = nuisance.pulls(far)
+    bounded = np.zeros(nuisance.size, bool)
+    bounded[[nuisance.frequency_places[0], nuisance.damping_places[0], nuisance.gain_places[0]]] = True
+    assert (pulls[bounded] < 2 * far[bounded]).all()
+    across = np.flatnonzero(nuisance.pairs[0] != nuisance.pairs[1])
+    assert_allclose(pulls[across], far[across], rtol=0)
+    beyond, _ = nuisance.pulls(far + STEP)
+    assert_allclose((beyond - pulls) / STEP, slopes, rtol=SAME)
+    assert_allclose(nuisance.pulls(far, is_bounded=False)[0], far, rtol=0)
+
+
+def test_a_frequency_far_outside_its_tolerance_is_no_tolerance(nominal):
+    found = diagnose(nominal, observed(measured(with_point_masses(nominal, {17: 4e-4}))), DiagnoseOptions(effects=FEW))
+    assert found.verdict == "explained"
+    assert found.numbers["evidence_gain_nats"] > 100
+    assert found.findings[0].effect == "added_mass"
+
+
+def test_low_modes_keep_their_digits(bench):
+    effect = bench.effects["added_mass"]
+    place = next(place for place in effect.places(bench.specimen) if place.key == (12, "z"))
+    hypothesis = bench.suppose((Cause(effect=effect, place=place, n_places=1),))
+    nothing = np.zeros(bench.nuisance.size)
+    slopes = [
+        (
+            hypothesis.modes(np.array([0.02 + step]), nothing).squares[0]
+            - hypothesis.modes(np.array([0.02]), nothing).squares[0]
+        )
+        / step
+        for step in (0.02 * STEP, 0.01 * STEP)
+    ]
+    assert slopes[0] == pytest.approx(slopes[1], rel=ROUNDING)
+
+
+def test_an_unstable_structure_has_modes_too(bench):
+    basis, nuisance = bench.specimen.basis, bench.nuisance
+    hypothesis = bench.suppose(())
+    softer = Change(stiffness=-1.5 * basis.model.stiffness_all)
+    modes = modify(basis, softer, hypothesis.rows, nuisance.unpack(np.zeros(nuisance.size)))
+    assert modes.squares.min() < 0
+    assert np.isfinite(modes.vectors).all()
+
+
+def test_a_misfit_is_traced_to_its_node(nominal):
+    bench = bench_of(nominal, measured(with_springs(nominal, {parse_dof("8:z"): 8e3})))
+    assert trace(bench, fit_nothing(bench)) == {"nodes": [8]}
+
+
+def test_one_frf_tells_no_node_from_another(nominal):
+    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: 0.02}), labels(outputs=("17:+z",))))
+    assert trace(bench, fit_nothing(bench)) == {}
+
+
+def test_where_nothing_is_wrong_nothing_is_traced(nominal):
+    found = diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=FEW))
+    assert found.to_json()["mismatch"]["location"] == {}
+
+
+def test_what_was_found_says_where_the_mismatch_is(nominal):
+    found = diagnose(nominal, observed(measured(with_point_masses(nominal, {12: 0.02}))), DiagnoseOptions(effects=FEW))
+    assert found.to_json()["mismatch"]["location"] == {"nodes": [12]}
+
+
+def test_three_causes_are_found_at_once(nominal):
+    changed = with_springs(with_point_masses(nominal, {12: 0.02}), {parse_dof("6:z"): 6e3})
+    gain = np.array([1.0, 1.06])
+    frfs = measured(changed, factors=lambda frequency: np.ones((len(frequency), 1)) * gain)
+    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=FEW))
+    assert found.verdict == "explained"
+    assert {finding.effect for finding in found.findings} == set(FEW)
+    assert all(finding.log_evidence_gain > 50 for finding in found.findings)
+
+
+def fit_of(name, evidence, value, std, place):
+    effect = SimpleNamespace(
+        name=name, reported=lambda _place, _name, value: value, statement=lambda *_: "", imitators=()
+    )
+    cause = SimpleNamespace(effect=effect, place=SimpleNamespace(location={"nodes": [place]}, text={}, key=(place,)))
+    parameter = SimpleNamespace(name="mass_kg", is_log=True, low=1e-4, high=1.0, tolerance=0.0)
+    hypothesis = SimpleNamespace(
+        causes=(cause,), counts=(1,), parameters=(parameter,), specimen=None,
+        low=np.log([1e-4]), high=np.log([1.0]), start_at=np.log,
+    )  # fmt: skip
+    return SimpleNamespace(
+        hypothesis=hypothesis, values=np.array([value]), covariance=np.array([[std**2]]), log_evidence=evidence
+    )
+
+
+def test_an_effect_is_as_probable_as_all_its_places():
+    one = fit_of("grounded_spring", 10.0, 0.1, 0.01, 1)
+    others = [fit_of("added_mass", 9.5, 0.1, 0.01, place) for place in (3, 4, 5)]
+    groups = by_effect([one, *others])
+    assert [group[0].hypothesis.causes[-1].effect.name for group in groups] == ["added_mass", "grounded_spring"]
+    first, second = weigh([one, *others], 1.0)
+    assert first.name == "added_mass"
+    assert first.probability == pytest.approx(3 * np.exp(-0.5) / (1 + 3 * np.exp(-0.5)))
+    assert first.probability + second.probability == pytest.approx(1.0)
+
+
+def test_an_interval_spans_the_places_that_are_possible():
+    fits = tuple(fit_of("added_mass", 9.5, value, 0.01, place) for place, value in ((3, 0.1), (4, 0.2)))
+    known = Weighed(fits=fits, probability=1.0, shares=(1.0, 0.0))
+    unknown = Weighed(fits=fits, probability=1.0, shares=(0.6, 0.4))
+    narrow, wide = (finding_of(one, 100.0, 1.0).parameters["mass_kg"] for one in (known, unknown))
+    assert narrow.high < 0.11
+    assert wide.low < 0.1
+    assert wide.high > 0.2
