@@ -132,4 +132,4 @@ def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:
         style: dict[str, Any] = {"color": colour(place), "linestyle": dash(place), "marker": "o", "markersize": 3}
         ax.errorbar(ordered["level_N"], 100 * (hertz / hertz[-1] - 1), bars, label=name, capsize=2, **style)
     ax.set_xscale("log")
-    return label_axes(ax, "Peak force of the blow, N", "Change of frequency, %")
+    return label_axes(ax, "Largest force of the blow, N", "Change of frequency, %")

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frf_ipz.diagnosis.observations import Blow, Observations
-    from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
 
 LEAST_RATIO = 1.5  # of the strongest to the weakest blow at a place: below, there is one level only
@@ -29,6 +28,7 @@ LEAST_BLOWS = 2
 WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 LEAST_LINES = 8
 ROUNDS = 4  # of weights
+STANDS_OUT = 0.5  # of an FRF at its peak: a mode that has less of it is not seen by itself
 UNSURE = 0.01  # relative standard deviation of a frequency: of a blow that drowns in noise nothing is said
 COLUMNS = (
     "mode",
@@ -185,7 +185,7 @@ def _modes(
     rows: list[tuple[object, ...]] = []
     for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
         sensor = _clearest(labels, fit, mode)
-        half = (s[0].real - pole.real) * WIDTH
+        half = (s[0].real - pole.real) * WIDTH  # rad/s, of what the window makes of it
         near = np.flatnonzero(np.abs(s.imag - pole.imag) <= half)
         if sensor is None or len(near) < LEAST_LINES:
             continue
@@ -197,13 +197,18 @@ def _modes(
 
 
 def _clearest(labels: Sequence[FrfLabel], fit: ModalFit, mode: int) -> int | None:
-    """Which of the sensors shows a mode best."""
-    residues: dict[tuple[Dof, Dof, object], float] = {
-        (label.output_dof, label.input_dof, label.quantity): abs(complex(residue))
-        for label, residue in zip(fit.labels, fit.model.residues[mode], strict=True)
-    }
-    sizes = [residues.get((label.output_dof, label.input_dof, label.quantity), 0.0) for label in labels]
-    return int(np.argmax(sizes)) if max(sizes, default=0.0) > 0 else None
+    """Which of the sensors shows a mode best; none where others hide it in all of them."""
+    pole = complex(fit.model.poles[mode])
+    peak = np.array([1j * pole.imag])
+    alone = np.abs(fit.model.residues[mode] / (peak[0] - pole))
+    share = alone / np.maximum(np.abs(fit.model(peak)[0]), np.finfo(float).tiny)
+    ends = [(label.output_dof, label.input_dof, label.quantity) for label in fit.labels]
+    seen = [
+        (float(alone[ends.index(own)]), row)
+        for row, label in enumerate(labels)
+        if (own := (label.output_dof, label.input_dof, label.quantity)) in ends and share[ends.index(own)] > STANDS_OUT
+    ]
+    return max(seen)[1] if seen else None
 
 
 def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[float, float, float, float] | None:
@@ -221,6 +226,7 @@ def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[f
         covariance = np.linalg.pinv(columns.conj().T @ columns)[0, 0].real * variance
         pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2))
     size = abs(pole)
-    if not np.isfinite(size) or pole.imag <= 0 or pole.real >= 0 or deviation > UNSURE * size:
+    is_near = np.abs(pole.imag - middle.imag) < scale / 2
+    if not np.isfinite(size) or not is_near or pole.real >= 0 or deviation > UNSURE * size:
         return None
     return size / (2 * np.pi), deviation / (2 * np.pi), -pole.real / size, deviation / size

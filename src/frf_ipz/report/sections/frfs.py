@@ -69,7 +69,7 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
     for number_of in range(frfs.n_frfs):
         traces += _frf(frfs, number_of, bins, has_coherence=has_coherence)
     axes = [
-        Axis(title=magnitude_title(frfs.labels), share=2.2, scale="log"),
+        Axis(title=magnitude_title(frfs.labels), share=2.2, scale="log", options=_shown(frfs, run.band_hz)),
         Axis(title="Phase, °", options=PHASE_AXIS),
     ]
     axes += [Axis(title="Coherence", share=0.8, options={"range": [-0.02, 1.05]})] if has_coherence else []
@@ -91,6 +91,13 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
         height_px=620,
         is_over_frequency=True,
     )
+
+
+def _shown(frfs: FrfSet, band_hz: tuple[float, float]) -> dict[str, list[float]]:
+    """Give the range of the magnitudes in the band: lines near 0 Hz would take up half of the height."""
+    sizes = np.abs(frfs.values[frfs.in_band(band_hz)])
+    sizes = sizes[sizes > 0]
+    return {"range": [float(np.log10(sizes.min())) - 0.2, float(np.log10(sizes.max())) + 0.2]} if sizes.size else {}
 
 
 def _frf(frfs: FrfSet, place: int, bins: int, *, has_coherence: bool) -> list[Trace]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.frf import FrfLabel
 
+MOST_MODES = 6  # in the picture; the table has them all
 SYMBOLS = ("circle", "square", "diamond", "cross", "triangle-up", "x", "star")
 
 
@@ -98,12 +99,12 @@ def _weak_and_strong(levels: LevelDependence, row: int, place: int) -> list[Trac
 
 def _modes(modes: pd.DataFrame) -> Picture:
     traces: list[Trace] = []
-    groups = [(key, rows.sort_values("level_N")) for key, rows in modes.groupby(["mode", "frf"], sort=True)]
-    for place, (_, rows) in enumerate(groups):
+    groups = _clear_ones(modes)
+    for place, rows in enumerate(groups):
         traces += _mode(rows, place)
     limits = [float(modes["level_N"].min()), float(modes["level_N"].max())]
     wide = [0.9 * limits[0], 1.1 * limits[1]]
-    x = {"title": {"text": "Peak force of the blow, N"}, "type": "log", "range": np.log10(wide).tolist()}
+    x = {"title": {"text": "Largest force of the blow, N"}, "type": "log", "range": np.log10(wide).tolist()}
     return Picture(
         name="level-modes",
         title="Frequency and damping of each mode against the level of the blow, with 95 % bars",
@@ -116,6 +117,21 @@ def _modes(modes: pd.DataFrame) -> Picture:
         table=_table(modes),
         height_px=460,
     )
+
+
+def _clear_ones(modes: pd.DataFrame) -> list[pd.DataFrame]:
+    """Of each mode the FRF with the most blows, and of many modes those that are known best, by frequency."""
+    best = []
+    for _, of_mode in modes.groupby("mode"):
+        groups = [rows.sort_values("level_N") for _, rows in of_mode.groupby("frf")]
+        best.append(max(groups, key=lambda rows: (len(rows), -_unsure(rows))))
+    best = [rows for rows in best if len(rows) > 1]
+    best = sorted(best, key=lambda rows: (-len(rows), _unsure(rows)))[:MOST_MODES]
+    return sorted(best, key=lambda rows: float(rows["frequency_hz"].iloc[-1]))
+
+
+def _unsure(rows: pd.DataFrame) -> float:
+    return float((rows["frequency_std_hz"] / rows["frequency_hz"]).max())
 
 
 def _mode(rows: pd.DataFrame, place: int) -> list[Trace]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 MOST_ALTERNATIVES = 15
 POWERS = {"exponentformat": "power", "dtick": 1}
+SURELY_NOT = 1e-6  # a probability below is written as being below
+CLOSE = 0.8  # of the best evidence: where all explanations gain more, their differences are drawn
 WIDE = 30.0  # ratio of evidences from which their axis is logarithmic
 
 
@@ -51,7 +53,7 @@ def build(run: RunContents) -> Section | None:
         blocks.append(_findings(diagnosis))
     blocks.append(_proof(diagnosis))
     if diagnosis.curves is not None:
-        blocks.append(_curves(diagnosis.curves, run.band_hz))
+        blocks.append(_curves(diagnosis.curves, run.band_hz, _explained(diagnosis)))
     blocks += _gates(diagnosis) + level_pictures(run.levels, run.labels, run.band_hz) + _detectability(diagnosis)
     lead = plain_signs(diagnosis.statement) or verdict_of(diagnosis)[0]
     notes = (*[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity], *diagnosis.warnings)
@@ -76,8 +78,11 @@ def _map(diagnosis: Diagnosis) -> Picture:
             values[place] = row[column]
         traces.append(_heat(values, names, bands, (rank, column, top)))
     shared = {"type": "category", "autorange": "reversed"}
-    axes = Axis(title="as it is", options=shared), Axis(title="with findings", options=shared)
-    x = {"title": {"text": "Band, Hz"}, "type": "category", "tickangle": -40}
+    axes = (
+        Axis(title="as it is", options=shared),
+        Axis(title=_explained(diagnosis).replace("the ", "").replace("its ", ""), options=shared),
+    )
+    x = {"title": {"text": "Band, Hz", "standoff": 30}, "type": "category", "tickangle": -40}
     return Picture(
         name="mismatch",
         title="Where model and measurement disagree: misfit over what noise and tolerances explain",
@@ -118,31 +123,44 @@ def _ranking(diagnosis: Diagnosis) -> Picture:
     names = [f"{place + 1}. {name}" for place, name in enumerate(names)]
     found = len(diagnosis.findings)
     gains = np.array([one.log_evidence_gain for one in ranked])
-    wide = bool(gains.max() > WIDE * max(float(np.median(gains)), 1.0))
+    close = len(gains) > 1 and gains.min() > CLOSE * gains.max()
+    sizes = gains.max() - gains if close else gains
+    wide = close or bool(gains.max() > WIDE * max(float(np.median(gains)), 1.0))
     bars: Trace = {
         "type": "bar",
         "orientation": "h",
-        "x": np.maximum(gains, 1.0) if wide else gains,
+        "x": np.maximum(sizes, 1.0) if wide else sizes,
         "customdata": gains,
         "y": names,
         "marker": {"color": ["@updated"] * found + ["@muted/0.7"] * (len(ranked) - found)},
-        "text": [f"p = {number(one.probability, 3)}" for one in ranked],
+        "text": [f"p {_chance(one)}" for one in ranked],
         "textposition": "auto",
-        "hovertemplate": "%{y}: %{customdata:.4g} nats, %{text}<extra></extra>",
+        "insidetextfont": {"color": "@paper"},
+        "hovertemplate": "%{y}: gains %{customdata:.6g} nats, %{text}<extra></extra>",
         "name": "evidence",
     }
     y = Axis(title="", options={"autorange": "reversed", "type": "category"})
     scale = {"type": "log", **POWERS} if wide else {}
+    falls_short = "Log evidence that is missing to the best one, nats: the longer, the worse"
+    across = falls_short if close else "Gain of log evidence over the model without it, nats"
     return Picture(
         name="ranking",
         title="Explanations by their evidence",
         alt="Bars: "
         + "; ".join(f"{name}: {number(one.log_evidence_gain)} nats" for name, one in zip(names, ranked, strict=True)),
         traces=(bars,),
-        layout=panels({"title": {"text": "Gain of log evidence over the model without it, nats"}, **scale}, y),
-        note="Blue: the findings; grey: other explanations. p is the probability among all that were tried.",
+        layout=panels({"title": {"text": across}, **scale}, y),
+        note="Blue: the findings; grey: other explanations. p is the probability among all that were tried; 7 nats "
+        "make one a thousand times more probable than the other.",
         height_px=int(np.clip(110 + 30 * len(ranked), 180, 640)),
     )
+
+
+def _chance(finding: Finding) -> str:
+    """Probability for people: what is not needed has none, and nobody reads a number with 190 zeros."""
+    if finding.log_evidence_gain <= 0:
+        return "–"
+    return f"= {number(finding.probability, 3)}" if finding.probability > SURELY_NOT else "< 1e-6"
 
 
 def _findings(diagnosis: Diagnosis) -> Table:
@@ -154,8 +172,8 @@ def _findings(diagnosis: Diagnosis) -> Table:
                 kind,
                 _where(one.location),
                 _parameters(one),
-                number(one.probability, 3),
-                number(one.log_evidence_gain),
+                _chance(one).removeprefix("= "),
+                number(one.log_evidence_gain, 6),
                 plain_signs(one.statement),
             ]
             for one in entries
@@ -188,7 +206,7 @@ def _proof(diagnosis: Diagnosis) -> Picture:
     steps = [
         ("model as it is", diagnosis.before),
         ("within its tolerances", diagnosis.updated),
-        ("with the findings", diagnosis.after),
+        *([("with the findings", diagnosis.after)] if diagnosis.findings else []),
     ]
     held = f"{diagnosis.held} not shown to the fit" if diagnosis.held else "held out"
     rows = [
@@ -227,23 +245,29 @@ def _bars(values: Sequence[tuple[str, float]], name: str, colour: str, pattern: 
     }
 
 
-def _curves(curves: Curves, band_hz: tuple[float, float]) -> Picture:
+def _explained(diagnosis: Diagnosis) -> str:
+    return "with the findings" if diagnosis.findings else "within its tolerances"
+
+
+def _curves(curves: Curves, band_hz: tuple[float, float], explained: str) -> Picture:
     frequency = curves.s.imag / (2 * np.pi)
     traces: list[Trace] = []
     for place, label in enumerate(curves.labels):
-        traces += _misfits(curves, place, frequency, str(label))
+        traces += _misfits(curves, place, frequency, (str(label), explained))
     return Picture(
         name="diagnosed",
-        title="Misfit before (dashed) and with the findings (solid), over what one expects",
+        title=f"Misfit of the model as it is (dashed) and {explained} (solid), over what one expects",
         alt=f"Misfit of {counted(len(curves.labels), 'FRF')} over frequency, before and after, over the expected one.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*band_hz), Axis(title="Misfit over expected", scale="log")),
+        note="1 is all that noise and tolerances let one expect.",
         height_px=420,
         is_over_frequency=True,
     )
 
 
-def _misfits(curves: Curves, place: int, frequency: np.ndarray, label: str) -> list[Trace]:
+def _misfits(curves: Curves, place: int, frequency: np.ndarray, names: tuple[str, str]) -> list[Trace]:
+    label, explained = names
     expected = np.maximum(curves.expected[:, place], np.finfo(float).tiny)
     colour, group = colour_of(place), {"meta": {"frf": place}, "legendgroup": label}
     before = np.abs(curves.measured[:, place] - curves.nominal[:, place]) / expected
@@ -251,7 +275,7 @@ def _misfits(curves: Curves, place: int, frequency: np.ndarray, label: str) -> l
     hover = "%{x:.6g} Hz: %{y:.3g} times what one expects"
     return [
         line(frequency, before, f"{label} model as it is", colour, hover=hover, dash="dash", width=1.1, **group),
-        line(frequency, after, f"{label} with the findings", colour, hover=hover, **group),
+        line(frequency, after, f"{label} {explained}", colour, hover=hover, **group),
     ]
 
 
