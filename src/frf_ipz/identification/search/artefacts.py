@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.rational import damping_ratio
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.compression import Weighted
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 UNDER = 1.1  # times the sum of two half widths: poles closer than that share a peak
 MINOR = 0.06  # significance of the weaker of two such poles, over that of the stronger
+PEAK = 0.05  # damping ratio up to which a pole makes a peak, whose error another pole could be
 SAME, WEAK = 0.5, 50.0  # the same distance at which two poles are one peak, unless the weaker is as significant as that
 BESIDE = 0.1  # relative distance up to which a strong mode has side bands
 SIDE_BAND = 1e-5  # energy of their peaks over that of the mode's
@@ -53,7 +55,7 @@ def find_artefacts(data: Weighted, fit: Refined, judgement: Judgement) -> list[s
         reason = _beside_stronger(number, poles, distance, significance, energy)
         if not reason and -pole.real < SPIKE * line:
             reason = f"is a single line: its half width is {-pole.real / line:.2g} of the distance of lines"
-        if not reason and significance[number] < DEMANDED:
+        if not reason and significance[number] < DEMANDED and not judgement.is_needed[number]:
             reason = (
                 f"takes off the misfit {significance[number]:.2g} times what the BIC demands: within the model error"
             )
@@ -68,7 +70,8 @@ def _beside_stronger(
     apart = distance / -(poles.real + pole.real)
     minor = significance[number] < MINOR * significance
     same = (apart < SAME) & (significance[number] < np.minimum(significance, WEAK))
-    under = np.flatnonzero(((apart < UNDER) & minor) | same)
+    peaks = damping_ratio(poles) < PEAK
+    under = np.flatnonzero((((apart < UNDER) & minor) | same) & peaks & peaks[number])
     if len(under):
         strong = poles[under[np.argmax(significance[under])]]
         return f"lies under the peak at {abs(strong) / (2 * np.pi):.6g} Hz and is far weaker: an error of that mode"

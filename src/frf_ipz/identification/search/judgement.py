@@ -61,7 +61,7 @@ class Judgement:
     is_needed: BoolArray
 
 
-def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
+def judge(data: Weighted, fit: Refined, terms: SmoothTerms, *, best: Judgement | None = None) -> Judgement:
     """Set a fit against noise and misfit.
 
     Parameters
@@ -72,6 +72,9 @@ def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
         The fit.
     terms : SmoothTerms
         What lies out of band.
+    best : Judgement, optional
+        Of a fit with more poles: its level tells what the model cannot follow. Otherwise each pole that is dropped
+        would raise the level, by which the next one is judged.
 
     Returns
     -------
@@ -85,7 +88,8 @@ def judge(data: Weighted, fit: Refined, terms: SmoothTerms) -> Judgement:
     most = 2 + len(fit.poles) // GROWTH
     leveled = find_candidates(frequency, misfit / np.sqrt(level), most)
     missing = (find_candidates(frequency, misfit, most), leveled) if (level > 1).any() else (leveled,)
-    factor = _level_near(data, fit.poles, level) * leveled.level_at(fit.poles)[:, None]
+    unexplained, alike = (level, leveled) if best is None else (best.level, best.missing[-1])
+    factor = _level_near(data, fit.poles, unexplained) * alike.level_at(fit.poles)[:, None]
     gains = pole_gains(fit.system)
     far = fit.misfit > FAR * 2 * data.receptance.size
     return Judgement(

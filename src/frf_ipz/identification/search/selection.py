@@ -127,10 +127,11 @@ def select_modes(
 
 
 def _strike(search: _Search, poles: ComplexArray) -> ComplexArray:
-    near = _near_struck(search, poles)
-    reasons = [next(why for hz, why in search.struck if _is_near(pole, hz)) for pole in poles[near]]
-    search.note(poles[near], "struck", reasons)
-    return poles[~near]
+    for hz, why in search.struck:
+        mine = np.array([_is_near(pole, hz) for pole in poles], bool)
+        found = poles[mine] if mine.any() else np.array([2j * np.pi * hz])  # remembered even where no pole came up
+        search.note(found, "struck", [why] * len(found))
+    return poles[~_near_struck(search, poles)]
 
 
 def _near_struck(search: _Search, poles: ComplexArray) -> BoolArray:
@@ -161,8 +162,10 @@ def _protected(search: _Search, poles: ComplexArray) -> BoolArray:
 
 def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
     """Drop poles that are not significant, the weakest half of them at a time: one may have hidden another."""
+    best = None
     while True:
-        judgement = judge(search.data, fit, search.terms)
+        judgement = judge(search.data, fit, search.terms, best=best)
+        best = best if search.trusted else best or judgement
         struck = _near_struck(search, fit.poles)
         uncertain = (judgement.damping_std > UNCERTAIN) & (judgement.significance < SURE)
         weak = ((judgement.significance < 1) | uncertain) & ~judgement.is_needed
