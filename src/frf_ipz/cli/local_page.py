@@ -12,6 +12,7 @@ from frf_ipz.show.server import serve
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from frf_ipz.pipeline.job import Job
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder
 
@@ -39,7 +40,7 @@ def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
         if _has_desktop() if browser is None else browser:
             webbrowser.open(address)
 
-    serve(folder, _run, port=port, announce=announce)
+    serve(folder, _run, _read, port=port, announce=announce)
 
 
 def _run(path: Path, out: Path, *, progress: Progress) -> RunFolder:
@@ -47,6 +48,13 @@ def _run(path: Path, out: Path, *, progress: Progress) -> RunFolder:
     from frf_ipz.pipeline.run import run_pipeline
 
     return run_pipeline(path, out, progress=progress)
+
+
+def _read(path: Path) -> Job:
+    """Read a pipeline; what reads tests and models is imported with the first page that needs it."""
+    from frf_ipz.pipeline.job import read_job
+
+    return read_job(path)
 
 
 def _has_desktop() -> bool:

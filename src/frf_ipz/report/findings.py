@@ -71,7 +71,9 @@ def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:
         return (
             ("nothing", "within the stated tolerances") if verdict == "consistent" else ("unknown", SENTENCES[verdict])
         )
-    names = " and ".join(finding.effect.replace("_", " ") for finding in diagnosis.findings)
+    effects = [finding.effect.replace("_", " ") for finding in diagnosis.findings]
+    counts = {effect: effects.count(effect) for effect in effects}
+    names = " and ".join(effect if count == 1 else f"{effect} ({count})" for effect, count in counts.items())
     if diagnosis.verdict == "unexplained":
         return "unknown", f"nothing in the catalogue explains it; best in part: {names}"
     sure = min(finding.probability for finding in diagnosis.findings)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
@@ -11,7 +13,6 @@ from frf_ipz.report.findings import SENTENCES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from frf_ipz.show.workbench import Workbench
 
@@ -37,26 +38,32 @@ def render_list(benches: Sequence[Workbench]) -> str:
     str
         HTML; the k-th run is at ``k/``, from 1.
     """
-    rows = "".join(_row(number, bench) for number, bench in enumerate(benches, start=1))
+    top = Path(os.path.commonpath([bench.folder for bench in benches]))
+    rows = "".join(_row(number, bench, top) for number, bench in enumerate(benches, start=1))
     head = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
+    lead = f"In {top}. Open one to look at it and to work on it; one that is not yet computed can be started there."
     return (
-        f'{HEAD}<p class="lead">Open one to look at it and to work on it; one that is not yet computed can be started '
-        f'there.</p><table id="runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></main></body></html>'
+        f'{HEAD}<p class="lead">{escape(lead)}</p><table id="runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody>'
+        "</table></main></body></html>"
     )
 
 
-def _row(number: int, bench: Workbench) -> str:
+def _row(number: int, bench: Workbench, top: Path) -> str:
     record = bench.record
     name = str(record.get("name", "")) or _name_in_file(bench)
     when = str(record.get("when", ""))[:16].replace("T", " ")
     computed = f"{when} UTC" if when else "at work" if bench.status.running else "not yet"
     said = _verdict(bench.folder) if record else ""
-    cells = [bench.pipeline, bench.folder, computed, said]
+    cells = [_below(bench.pipeline, top), _below(bench.folder, top), computed, said]
     return (
         f'<tr><th scope="row"><a href="{number}/">{escape(name)}</a></th>'
         + "".join(f"<td>{escape(str(cell))}</td>" for cell in cells)
         + "</tr>"
     )
+
+
+def _below(path: Path, top: Path) -> Path:
+    return path.relative_to(top) if path.is_relative_to(top) else path
 
 
 def _name_in_file(bench: Workbench) -> str:

@@ -68,7 +68,7 @@ def render_page(bench: Workbench, *, home: str = "") -> str:
         run = bench.contents()
         sections = page_sections(run, choices)
     else:
-        run, setup = read_setup(bench.pipeline)
+        run, setup = read_setup(bench.pipeline, bench.read)
         sections = [setup if choices is None or not setup.blocks else _pickable(setup, run, choices)]
     name = escape(str(run.record.get("name", "")) or "run")
     links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)

@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from frf_ipz.pipeline.job import Job
     from frf_ipz.show.workbench import Run
 
 ADDRESS = "127.0.0.1"
 TOKEN_BYTES = 24
 
 
-def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None]) -> None:
+def serve(folder: Path, run: Run, read: Callable[[Path], Job], *, port: int, announce: Callable[[str], None]) -> None:
     """Serve the page of a run, or of a campaign, until the process is interrupted.
 
     Parameters
@@ -32,6 +33,8 @@ def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None])
         The run's folder, or the campaign's.
     run : Run
         Runs a pipeline.
+    read : callable
+        Reads a pipeline file and all that it names.
     port : int
         Where to listen on the loopback; 0 for any that is free.
     announce : callable
@@ -42,7 +45,7 @@ def serve(folder: Path, run: Run, *, port: int, announce: Callable[[str], None])
     InputError
         If there is no run and no pipeline in the folder, or the port is taken.
     """
-    benches = [Workbench(place, run) for place in find_places(folder)]
+    benches = [Workbench(place, run, read) for place in find_places(folder)]
     with listen(port) as listener:
         taken = int(listener.getsockname()[1])
         token = secrets.token_urlsafe(TOKEN_BYTES)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.job import Job, read_job
 from frf_ipz.report.contents import RunContents
 from frf_ipz.report.section import Block, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
@@ -13,18 +12,22 @@ from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, listed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from frf_ipz.dofs import Dof
+    from frf_ipz.pipeline.job import Job
 
 
-def read_setup(pipeline: Path) -> tuple[RunContents, Section]:
+def read_setup(pipeline: Path, read: Callable[[Path], Job]) -> tuple[RunContents, Section]:
     """Read a pipeline that has not been run yet.
 
     Parameters
     ----------
     pipeline : Path
         The pipeline file.
+    read : callable
+        Reads it and all that it names, as `pipeline.job.read_job` does.
 
     Returns
     -------
@@ -35,7 +38,7 @@ def read_setup(pipeline: Path) -> tuple[RunContents, Section]:
     """
     title, anchor = "Set-up", "overview"
     try:
-        job = read_job(pipeline)
+        job = read(pipeline)
     except InputError as error:
         notes = (str(error), "Correct the file, then load this page again.")
         lead = "This pipeline cannot be run as it stands."

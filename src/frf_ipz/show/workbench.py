@@ -14,9 +14,11 @@ from frf_ipz.show.worker import Worker
 from frf_ipz.toml_files import read_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from frf_ipz.pipeline.config import PipelineFile
+    from frf_ipz.pipeline.job import Job
     from frf_ipz.progress import Progress
     from frf_ipz.show.campaign import Place
     from frf_ipz.show.worker import Status
@@ -58,11 +60,14 @@ class Workbench:
         The run's folder and its pipeline file.
     run : Run
         Runs a pipeline.
+    read : callable
+        Reads a pipeline file and all that it names, as `pipeline.job.read_job` does.
     """
 
-    def __init__(self, place: Place, run: Run) -> None:
+    def __init__(self, place: Place, run: Run, read: Callable[[Path], Job]) -> None:
         self.folder = place.folder.resolve()
         self.pipeline = place.pipeline
+        self.read = read
         self._run = run
         self._changing = Lock()
         self._before: str | None = None

@@ -69,4 +69,4 @@ def test_a_port_that_is_taken_is_refused_in_a_sentence():
 
 def test_a_folder_without_a_run_is_refused_before_anything_listens(tmp_path):
     with pytest.raises(InputError, match=r"there is no run here.*and no pipeline"):
-        serve(tmp_path, None, port=0, announce=pytest.fail)
+        serve(tmp_path, None, None, port=0, announce=pytest.fail)
