@@ -62,12 +62,12 @@ def _evidence(bench: Bench, null: Fit) -> Callable[[Hypothesis, FloatArray], flo
     """Half the squared norm of a change that no scatter explains."""
     data, nothing = bench.data, np.zeros(bench.nuisance.size)
     nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
-    columns = data.whitening(nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout))
+    columns = data.slopes(nominal, nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout))
     factor = linalg.cho_factor(columns.T @ columns + np.eye(columns.shape[1]), lower=True)
 
     def evidence(hypothesis: Hypothesis, values: FloatArray) -> float:
         changed = hypothesis.respond(values, nothing, data.measured.s)
-        white = data.whitening(changed.values - nominal.values)
+        white = data.slopes(nominal, (changed.values - nominal.values)[:, :, None])[:, 0]
         seen = columns.T @ white
         return 0.5 * float(white @ white - seen @ linalg.cho_solve(factor, seen))
 

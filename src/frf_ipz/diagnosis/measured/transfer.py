@@ -13,7 +13,6 @@ from frf_ipz.frf import FrfLabel
 SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that varies slowly along the band
 SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
 ROUGH_PART = 0.15  # of the tolerance: the same from point to point
-FREE = 30.0  # relative standard deviation of a gain that nobody knows: as good as none
 NOISY = 25.0  # points whose noise is a fifth of the FRF tell nothing of gains
 NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
 
@@ -131,7 +130,7 @@ def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     return np.concatenate([white.real, white.imag], axis=1)
 
 
-def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0, free_gains: str = "none") -> Whitening:
+def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0) -> Whitening:
     """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
 
     Parameters
@@ -142,8 +141,6 @@ def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0, free_gai
         Relative tolerance of the model: its FRFs are off by a part of it that no parameter stands for.
     floor : float
         Factor of the model's errors: large ones let a search see past narrow peaks.
-    free_gains : str
-        ``none``, ``common`` or ``per_channel``: gains that nobody knows; their directions are taken out.
 
     Returns
     -------
@@ -161,28 +158,17 @@ def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0, free_gai
         inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True, check_finite=False)
         factors.append(np.asarray(inverse, np.complex128))
     found = np.array(factors, np.complex128)
-    return Whitening(factors=found, blocks=tuple(_blocks(measured, found, free_gains)))
+    return Whitening(factors=found, blocks=tuple(_blocks(measured, found)))
 
 
-def _blocks(
-    measured: Measured, factors: ComplexArray, free_gains: str
-) -> list[tuple[IntArray, FloatArray, FloatArray]]:
-    """Noise of the force for each blow's place; then gains that nobody knows."""
+def _blocks(measured: Measured, factors: ComplexArray) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+    """Noise of the force for each blow's place."""
     blocks = []
     for place, shared in enumerate(measured.common):
         frfs = np.flatnonzero(measured.input_of == place)
         if shared.shape[1]:
             blocks.append(_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
-    if free_gains == "none":
-        return blocks
-    every = np.arange(len(measured.labels))
-    gains = np.eye(len(every))[None] if free_gains == "per_channel" else np.ones((1, len(every), 1))
-    errors = measured.certain[:, :, None] * gains * FREE
-    found = _separately(factors, errors).reshape(-1, gains.shape[2])
-    for frfs, directions, shrink in blocks:
-        rows = (frfs[:, None] * 2 * len(measured.s) + np.arange(2 * len(measured.s))).ravel()
-        found[rows] -= directions @ (shrink[:, None] * (directions.T @ found[rows]))
-    return [*blocks, (every, *_directions(found))]
+    return blocks
 
 
 def _block(

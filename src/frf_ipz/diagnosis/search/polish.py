@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.diagnosis.physics.response import Response, nuisance_jacobian
 
 if TYPE_CHECKING:
@@ -104,9 +104,8 @@ class Data:
         n_frfs = len(self.measured.labels)
         if self.free_gains == "none":
             return np.ones(n_frfs)
-        weight = 1 / self.measured.size**2
-        across = np.sum(weight * (response.values.conj() * self.measured.values).real, 0)
-        own = np.sum(weight * np.abs(response.values) ** 2, 0)
+        model, measured = self._compared(response.values), self._compared(self.measured.values)
+        across, own = np.sum(model * measured, 1), np.sum(model**2, 1)
         if self.free_gains == "common":
             return np.full(n_frfs, across.sum() / own.sum())
         return np.asarray(across / own)
@@ -114,6 +113,29 @@ class Data:
     def misfit(self, response: Response) -> FloatArray:
         """Whitened difference of measurement and model, (n_data,) array."""
         return self.whitening(self.measured.values - self.gains(response) * response.values)
+
+    def slopes(self, response: Response, changes: ComplexArray) -> FloatArray:
+        """Whitened changes of the model's FRFs, (n_data, n) array, without what gains that nobody knows make up for.
+
+        [Kaufman1975] L. Kaufman, A variable projection method for solving separable nonlinear least squares problems,
+        BIT 15 (1975) 49-57.
+        """
+        white = self.whitening(self.gains(response)[:, None] * changes)
+        if self.free_gains == "none":
+            return white
+        model = self._compared(response.values)
+        by_frf = white.reshape(len(model), model.shape[1], -1)
+        across, own = np.einsum("fd,fdn->fn", model, by_frf), np.sum(model**2, 1)[:, None]
+        if self.free_gains == "common":
+            across, own = np.broadcast_to(across.sum(0), across.shape), np.broadcast_to(own.sum(), own.shape)
+        return np.asarray((by_frf - model[:, :, None] * (across / own)[:, None]).reshape(white.shape))
+
+    def _compared(self, values: ComplexArray) -> FloatArray:
+        """Weigh FRFs as misfits are weighed, (n_frfs, 2 n_points) array; by their size where there is no whitening."""
+        if self.whitening.factors.size:
+            return self.whitening(values).reshape(len(self.measured.labels), -1)
+        relative = (values / self.measured.size).T
+        return np.concatenate([relative.real, relative.imag], axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -214,7 +236,6 @@ def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: Float
 def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
     m = hypothesis.nuisance.n_modes
     columns, squares, ratios = [], [], []
-    gains = data.gains(point.response)
     for index in range(len(hypothesis.parameters)):
         low, high = point.searched.copy(), point.searched.copy()
         low[index] = max(low[index] - STEP, hypothesis.low[index])
@@ -224,11 +245,11 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
             for searched in (low, high)
         )
         step = high[index] - low[index]
-        columns.append(data.whitening(gains * (after.values - before.values) / step)[:, None])
+        columns.append(data.slopes(point.response, ((after.values - before.values) / step)[:, :, None]))
         squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
         ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
-    white = data.whitening(gains[:, None] * by_unknown)
+    white = data.slopes(point.response, by_unknown)
     used = np.sum(white**2, 0) > MATTERS
     return _Slope(
         jacobian=np.hstack([*columns, white[:, used]]),

@@ -75,7 +75,7 @@ class Score:
         sizes, gains : (n,) array
             Sizes may be negative; gains in nats.
         """
-        white = self.data.whitening(self.data.gains(self.response)[:, None] * changes)
+        white = self.data.slopes(self.response, changes)
         seen = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
         known = linalg.solve_triangular(self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False)
         squares = np.maximum(np.sum(white**2, 0) - np.sum(seen**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
@@ -113,7 +113,7 @@ def score_on(bench: Bench, base: Fit, data: Data) -> Score:
     response = base.hypothesis.respond(base.values, base.unknown, data.measured.s)
     jacobian = nuisance_jacobian(response, bench.nuisance, bench.specimen.layout)
     pulls, slopes = bench.nuisance.pulls(base.unknown)
-    columns = data.whitening(data.gains(response)[:, None] * jacobian) / slopes
+    columns = data.slopes(response, jacobian) / slopes
     return Score(
         bench=bench,
         base=base,

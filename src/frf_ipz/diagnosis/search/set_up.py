@@ -115,7 +115,6 @@ def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str
         measured,
         tolerance=options.stiffness_tolerance,
         floor=floor,
-        free_gains=free_gains,
     )
     return Data(measured=measured, whitening=whitening, free_gains=free_gains)
 

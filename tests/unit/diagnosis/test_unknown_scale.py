@@ -1,0 +1,70 @@
+"""FRFs whose scale nobody knows: the rest of them still tells what is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosed import BAND_HZ, beam, measured, observed
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search.search import fit_nothing
+from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.fe.changes import with_point_masses
+
+FEW = DiagnoseOptions(effects=("added_mass", "local_stiffness"))
+MASS_KG, SMALL_KG = 0.02, 0.004
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+def of_unknown_scale(machine, kind="per_channel"):
+    gains = [5.0, -0.2] if kind == "per_channel" else [5.0, 5.0]
+    frfs = measured(machine, factors=lambda frequency_hz: np.tile(gains, (len(frequency_hz), 1)))
+    return observed(replace(frfs, unknown_scale=kind))
+
+
+def fit_of(nominal, kind):
+    """The fit of the model without a mass to FRFs with one."""
+    seen = of_unknown_scale(with_point_masses(nominal, {12: MASS_KG}), kind)
+    bench = set_up(nominal, divide(seen), BAND_HZ, FEW, {}, free_gains=kind)
+    return bench, fit_nothing(bench)
+
+
+@pytest.mark.parametrize("kind", ["per_channel", "common"])
+def test_no_gain_hides_what_is_missing(nominal, kind):
+    bench, fit = fit_of(nominal, kind)
+    assert fit.misfit > 10 * 2 * bench.data.measured.values.size
+
+
+@pytest.mark.parametrize("kind", ["per_channel", "common"])
+def test_slopes_are_those_of_the_misfit_with_the_best_gains(nominal, kind):
+    bench, _ = fit_of(nominal, kind)
+    data, nothing = bench.data, bench.suppose(())
+    step, start = 1e-4, np.zeros(bench.nuisance.size)
+    moved = start.copy()
+    moved[0] = step
+    here, there = (nothing.respond(np.zeros(0), unknown, data.measured.s) for unknown in (start, moved))
+    exact = replace(data, measured=replace(data.measured, values=here.values))  # where the misfit vanishes
+    change = ((there.values - here.values) / step)[:, :, None]
+    slope = exact.slopes(here, change)[:, 0]
+    assert -exact.misfit(there) / step == pytest.approx(
+        slope, abs=1e-2 * np.abs(slope).max()
+    )  # of second order in step
+
+
+def test_a_mass_is_found_without_scales(nominal):
+    found = diagnose(nominal, of_unknown_scale(with_point_masses(nominal, {12: SMALL_KG})), FEW)
+    assert found.verdict == "explained"
+    (finding,) = found.findings
+    assert (finding.effect, dict(finding.location)) == ("added_mass", {"nodes": [12]})
+    assert finding.parameters["mass_kg"].value == pytest.approx(SMALL_KG, rel=0.05)
+    assert found.after.held_out < 0.05 * found.before.held_out
+
+
+def test_nothing_missing_is_consistent_without_scales(nominal):
+    assert diagnose(nominal, of_unknown_scale(nominal), FEW).verdict == "consistent"
