@@ -177,3 +177,9 @@ def test_a_command_that_fails_or_hangs_is_written_down(tmp_path):
     assert busy.status == 0
     assert busy.cpu_s >= 0.3
     assert not list(tmp_path.iterdir())
+
+
+def test_a_trial_has_the_same_effects_and_other_seeds():
+    orders, others = plan_cases(COUNTS), plan_cases(COUNTS, shift=7)
+    assert [one.effect for one in orders] == [one.effect for one in others]
+    assert [one.seed + 7 for one in orders] == [one.seed for one in others]

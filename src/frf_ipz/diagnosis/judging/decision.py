@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
+from frf_ipz.diagnosis.search.search import NEARLY_RIGHT, Ranking, fit_nothing, search
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -77,11 +77,12 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     if good.is_good:
         return one
     progress(0.6, "searching for a second cause")
-    second = search_second(bench, ranking)
+    second = search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good)
     two = _beside(bench, one, second)
     if two is None:
         return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > FOUND_NATS else null)
-    if two.verdict == EXPLAINED or gain_over(second.best, second.base) < STRONG_NATS:
+    is_far = two.good.misfit > NEARLY_RIGHT
+    if two.verdict == EXPLAINED or is_far or gain_over(second.best, second.base) < STRONG_NATS:
         return two
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search(bench, second.best))

@@ -28,6 +28,8 @@ from frf_ipz.diagnosis.search.sketches import Start
 from frf_ipz.diagnosis.search.wide import wide_search
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
 FIRSTS = 5  # causes that get companions
@@ -36,7 +38,7 @@ EARLY_PAIRS, EXACT_PAIRS = 6, 3  # that are fitted with large errors, and exactl
 GAIN = 0.5  # nats
 
 
-def search_second(bench: Bench, first: Ranking) -> Ranking:
+def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
     """Search for two causes.
 
     Parameters
@@ -45,6 +47,8 @@ def search_second(bench: Bench, first: Ranking) -> Ranking:
         Data and effects.
     first : Ranking
         Of one cause.
+    is_good : callable
+        Tells whether a fit leaves nothing to explain: then the first cause needs no second look.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def search_second(bench: Bench, first: Ranking) -> Ranking:
     if first.best.misfit > NEARLY_RIGHT * size and first.refined:
         return _of_pairs(bench, first)
     beside = search(bench, first.best)
-    if not beside.fits:
+    if not beside.fits or is_good(beside.best):
         return beside
     exchanged = search(bench, _newest_alone(bench, beside.best))
     return exchanged if exchanged.best.log_evidence > beside.best.log_evidence + GAIN else beside
