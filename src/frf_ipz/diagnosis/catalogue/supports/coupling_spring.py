@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,10 +59,14 @@ class CouplingSpring(Effect):
         )
 
     def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
-        """One of the ends at a node beside."""
+        """One of the ends at a node beside; in a row also both, for what one end loses the other makes up."""
         first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
         pairs = [(near, second) for near in specimen.nodes_near(first, direction)]
         pairs += [(first, near) for near in specimen.nodes_near(second, direction)]
+        if specimen.model.kind in ("beam", "lumped"):
+            nodes = {dof.node for dof in specimen.moving_dofs if dof.direction == direction}
+            both = [(first + step, second + other) for step, other in product((-1, 1), repeat=2)]
+            pairs += [pair for pair in both if nodes.issuperset(pair)]
         found = [_place(a, b, direction) for a, b in pairs if a != b and _is_new(specimen, a, b)]
         if is_floating(place):
             return [floating(other) for other in found]
