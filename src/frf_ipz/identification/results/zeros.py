@@ -21,6 +21,7 @@ POLISHING = 2  # Newton steps
 MIRRORED = 0.5  # of a zero's distance from the axis: its mirror image must lie that close to make a quadruple
 ON_AXIS = 1e-9  # of the modulus: a zero with a smaller imaginary part is real
 ROUGH = 0.03  # relative standard deviation above which a zero is no number: it lies far from all lines
+INSIDE = 3.0  # standard deviations by which a zero must lie inside the band
 APART = 5.0  # standard deviations that must lie between a zero and the next root of its FRF, for errors to be linear
 
 
@@ -188,7 +189,7 @@ def _reasons(
     values: ComplexArray, std: FloatArray, poles: ComplexArray, s: ComplexArray, band: tuple[float, float]
 ) -> tuple[str, ...]:
     modulus = np.abs(values)
-    outside = (modulus < band[0]) | (modulus > band[1])
+    outside = (modulus - INSIDE * std < band[0]) | (modulus + INSIDE * std > band[1])
     others = np.abs(values[:, None] - values) + np.where(np.eye(len(values), dtype=bool), np.inf, 0.0)
     next_zero = others.min(axis=1, initial=np.inf)
     next_pole = np.abs(values[:, None] - poles).min(axis=1, initial=np.inf)
@@ -202,7 +203,7 @@ def _reason(
     outside: np.bool_, in_hole: np.bool_, std: float, modulus: float, next_zero: float, next_pole: float
 ) -> str:
     if outside:
-        return "lies outside the fitted band"
+        return "lies outside the fitted band, or may lie there"
     if in_hole:
         return "lies where lines were left out"
     if not std < ROUGH * modulus:
