@@ -206,6 +206,25 @@ def test_the_structure_moves_and_rests(page):
     assert page.find("#operating").is_displayed()
 
 
+def test_nothing_but_the_run_is_served(page, demo):
+    (demo / "secret.txt").write_text("secret", encoding="utf-8")
+    (demo / "out" / "link.txt").symlink_to(demo / "secret.txt")
+    asked = [
+        "run/poles.parquet",
+        "run/..%2fsecret.txt",
+        "run/%2e%2e%2fpipeline.toml",
+        "run/link.txt",
+        "run//etc/passwd",
+        "secret.txt",
+    ]
+    answers = page.browser.execute_async_script(
+        "Promise.all(arguments[0].map((one) => fetch(one).then((answer) => answer.status))).then(arguments[1])",
+        asked,
+    )
+    assert answers == [200, 404, 404, 404, 404, 404]
+    page.browser.get_log("browser")  # the browser notes each answer 404
+
+
 def test_it_can_be_worked_with_the_keyboard(page):
     keys = pytest.importorskip("selenium.webdriver").Keys
     page.run("document.querySelector('#modes [data-fill]').focus()")

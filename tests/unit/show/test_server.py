@@ -62,6 +62,11 @@ def _address_of_this_machine():
         return probe.getsockname()[0]
 
 
+def test_the_server_starts_without_what_is_slow_to_import():
+    code = "import sys, frf_ipz.show.server; sys.exit(bool({'matplotlib', 'pint', 'control'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_a_port_that_is_taken_is_refused_in_a_sentence():
     with listen(0) as listener, pytest.raises(InputError, match="leave out --port"):
         listen(listener.getsockname()[1])
