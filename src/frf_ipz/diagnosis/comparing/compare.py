@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.comparing import mass_loss
-from frf_ipz.diagnosis.comparing.learn import error_of_change, learn, nominal_after, without_gains
+from frf_ipz.diagnosis.comparing.learn import error_of_change, learn, nominal_after
+from frf_ipz.diagnosis.comparing.missed import trusted
 from frf_ipz.diagnosis.comparing.states import CompareOptions, State
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.diagnosis import Diagnosis
@@ -18,7 +19,6 @@ from frf_ipz.diagnosis.judging.decision import CONSISTENT
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.progress import silent
-from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.comparing.learn import Learned
@@ -36,14 +36,14 @@ class Comparison:
     ----------
     diagnosis : Diagnosis
         Of the state after against what the states before lead one to expect.
-    expected : StructuralModel
-        The model of the state after if nothing had changed.
+    expected : State
+        The state after as it was judged: its model if nothing had changed, and the measurement as far as it is trusted.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed: those stated, or what the states before show beyond them.
     """
 
     diagnosis: Diagnosis
-    expected: StructuralModel
+    expected: State
     scatter: DiagnoseOptions
 
     @property
@@ -122,7 +122,7 @@ def judge(learned: Learned, after: State, options: CompareOptions, *, progress: 
     Comparison
         What changed.
     """
-    observed = without_gains(after.observed, learned.gains)
+    observed = trusted(after.observed, learned.gains, learned.missed)
     source = divide(observed)
     nominal = replace(after, observed=observed)
     expected = nominal_after(nominal, learned, options, source)
@@ -135,4 +135,4 @@ def judge(learned: Learned, after: State, options: CompareOptions, *, progress: 
         extra_effects=(MASS_LOSS,),
     )
     found = diagnose(expected, observed, scatter, progress=progress)
-    return Comparison(diagnosis=found, expected=expected, scatter=scatter)
+    return Comparison(diagnosis=found, expected=replace(nominal, model=expected), scatter=scatter)

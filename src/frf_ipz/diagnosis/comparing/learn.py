@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.diagnosis.comparing.missed import Missed, missed_by, trusted
 from frf_ipz.diagnosis.comparing.nominal import as_fitted
 from frf_ipz.diagnosis.comparing.states import State
 from frf_ipz.diagnosis.judging.verdict import goodness
 from frf_ipz.diagnosis.measured.source import Source, divide
-from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.errors import InputError
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.diagnosis.comparing.states import CompareOptions
-    from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.physics.response import Modes
     from frf_ipz.diagnosis.search.bench import Bench
@@ -32,8 +32,14 @@ if TYPE_CHECKING:
 HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that
 ENOUGH_REPEATS = 3  # states: fewer tell nothing of scatter
 ENOUGH_STATES = 0.9  # of the states before that have to be explained by what was learned
-GROWTH = 1.3  # of the tolerance from try to try
+ENOUGH_FOR_MEDIANS = 10  # states
+NORMAL_OF_MEDIAN = 1.4826  # standard deviation over the median distance from the median
+COARSER = 4.0  # errors of fits to the states before, from try to try
+GROWTH = 1.6  # of the tolerance from try to try
 MOST_TOLERANCE = 0.3
+MOST_ERROR = 0.05  # tolerance of fits to the states before: what is larger is no matter of tolerances
+NEAR_A_PEAK = 3.0  # standard deviations of a frequency: so far from a peak of the measurement a mode may start
+MOST_START = 1.5  # standard deviations of a damping ratio
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,11 +54,14 @@ class Learned:
         Of the channels, as factors.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed.
+    missed : Missed, optional
+        What the model cannot follow whatever is corrected; None where it follows all within `options.scatter`.
     """
 
     correction: FloatArray
     gains: Mapping[str, float]
     scatter: DiagnoseOptions
+    missed: Missed | None
 
 
 def learn(before: Sequence[State], options: CompareOptions) -> Learned:
@@ -78,20 +87,65 @@ def learn(before: Sequence[State], options: CompareOptions) -> Learned:
     if not before:
         raise InputError("there is no state before to compare with; give at least one")
     sources = [divide(state.observed) for state in before]
-    pairs = list(zip(before, sources, strict=True))
-    benches = [bench_of(state, source, options.model, options.scatter) for state, source in pairs]
-    if len({bench.specimen.layout.channels for bench in benches}) > 1:
+    fits, errors = _fits(list(zip(before, sources, strict=True)), options)
+    if len({fit.hypothesis.specimen.layout.channels for fit in fits}) > 1:
         raise InputError("the states to compare were measured with different channels; give FRFs of the same labels")
-    fits = [fit_nothing(bench) for bench in benches]
-    n_modes = min(fit.hypothesis.nuisance.n_modes for fit in fits)
-    if n_modes < max(fit.hypothesis.nuisance.n_modes for fit in fits):
+    if len({len(fit.unknown) for fit in fits}) > 1:
         raise InputError("the models of the states have different numbers of modes in the band; narrow the band")
     corrections = np.array([fit.unknown * signs_of(fit) for fit in fits])
     gains = np.array([fit.hypothesis.nuisance.unpack(fit.unknown).gains for fit in fits])
-    scatter = _scatter(fits, options.scatter)
-    by_channel = dict(zip(benches[0].specimen.layout.channels, np.exp(gains.mean(0)).tolist(), strict=True))
-    learned = Learned(correction=corrections.mean(0), gains=by_channel, scatter=scatter)
+    by_channel = dict(zip(fits[0].hypothesis.specimen.layout.channels, np.exp(np.median(gains, 0)), strict=True))
+    learned = Learned(
+        correction=np.median(corrections, 0),
+        gains=by_channel,
+        scatter=_scatter(fits, options.scatter),
+        missed=None if errors == options.scatter else missed_by([state.observed.frfs for state in before], fits),
+    )
     return _widened(before, sources, learned, options)
+
+
+def _fits(before: Sequence[tuple[State, Source]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
+    """Fit the models, as closely as nearly all of them can follow what was measured."""
+    errors = options.scatter
+    while True:
+        benches = [bench_of(state, source, options.model, errors) for state, source in before]
+        fits = [fit_from_peaks(bench, source) for bench, (_, source) in zip(benches, before, strict=True)]
+        good = [goodness(bench, fit).is_good for bench, fit in zip(benches, fits, strict=True)]
+        if np.mean(good) >= ENOUGH_STATES or errors.stiffness_tolerance > MOST_ERROR:
+            return fits, errors
+        errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
+
+
+def fit_from_peaks(bench: Bench, source: Source) -> Fit:
+    """Fit the model from the frequencies and damping that peaks of the measurement show: a model may be far off.
+
+    Parameters
+    ----------
+    bench : Bench
+        To fit the model.
+    source : Source
+        What was measured.
+
+    Returns
+    -------
+    Fit
+        The better one of the fits from there and from the model as it is.
+    """
+    nothing, nuisance, peaks = bench.suppose(()), bench.nuisance, source.survey.resonances
+    modes = nothing.modes(np.zeros(0), np.zeros(nuisance.size))
+    start = np.zeros(nuisance.size)
+    for mode in range(nuisance.n_rigid, nuisance.n_modes):
+        apart = np.abs(np.log(peaks.omega_rad_s / modes.omega[mode]))
+        reach = NEAR_A_PEAK * nuisance.kappa_std[mode, mode] / 2
+        if apart.size and apart.min() < reach:
+            found = int(np.argmin(apart))
+            off = (peaks.omega_rad_s[found] / modes.omega[mode]) ** 2 - 1
+            start[nuisance.frequency_places[mode]] = off / nuisance.kappa_std[mode, mode]
+            ratio = peaks.decay_1_s[found] / peaks.omega_rad_s[found] / max(modes.stated_ratio[mode], 1e-9) - 1
+            damping = nuisance.damping_std[mode]
+            start[nuisance.damping_places[mode]] = np.clip(ratio / damping, -MOST_START, MOST_START)
+    fits = [polish(nothing, bench.data, np.zeros(0), unknown=start, iterations=30), fit_nothing(bench)]
+    return min(fits, key=lambda fit: fit.cost)
 
 
 def bench_of(state: State, source: Source, options: DiagnoseOptions, errors: DiagnoseOptions | None = None) -> Bench:
@@ -168,7 +222,7 @@ def error_of_change(corrected: State, source: Source, learned: Learned, options:
     float
         Largest relative change of a frequency in the band, times what the model may be wrong by.
     """
-    fit = fit_nothing(bench_of(corrected, source, options.model, learned.scatter))
+    fit = fit_from_peaks(bench_of(corrected, source, options.model, learned.scatter), source)
     change = _shift(fit.hypothesis, fit.unknown)
     return options.model.stiffness_tolerance * float(np.abs(change).max(initial=0.0))
 
@@ -178,40 +232,17 @@ def _shift(hypothesis: Hypothesis, unknown: FloatArray) -> FloatArray:
     nuisance = hypothesis.nuisance
     modes = hypothesis.modes(np.zeros(0), unknown)
     squares, omega = (values[nuisance.n_rigid : nuisance.n_modes] for values in (modes.squares, modes.omega))
-    inside = omega <= 2 * np.pi * hypothesis.specimen.band_hz[1]
+    inside = _in_band(hypothesis)
     return np.asarray(np.sqrt(np.abs(squares[inside])) / omega[inside] - 1)
 
 
-def without_gains(observed: Observations, gains: Mapping[str, float]) -> Observations:
-    """Take gains of channels out of what was observed.
-
-    Parameters
-    ----------
-    observed : Observations
-        Of a state.
-    gains : mapping of str to float
-        Factors by channel.
-
-    Returns
-    -------
-    Observations
-        As channels without these gains would have shown it.
-    """
-    blows = tuple(
-        replace(
-            blow,
-            force=blow.force / gains.get(blow.input_channel, 1.0),
-            responses=blow.responses / np.array([[gains.get(sensor.channel, 1.0)] for sensor in blow.sensors]),
-        )
-        for blow in observed.blows
-    )
-    frfs = observed.frfs
-    if frfs is None:
-        return replace(observed, blows=blows)
-    layout = lay_out(frfs.labels)
-    factors = np.exp(-layout.gain_signs @ np.log([gains.get(channel, 1.0) for channel in layout.channels]))
-    scaled = replace(frfs, values=frfs.values * factors, variance=frfs.variance * factors**2)
-    return replace(observed, blows=blows, frfs=scaled)
+def _in_band(hypothesis: Hypothesis) -> BoolArray:
+    """Tell which elastic modes lie in the band: nothing is known of others."""
+    nuisance = hypothesis.nuisance
+    modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance.size))
+    frequency = modes.omega[nuisance.n_rigid : nuisance.n_modes] / (2 * np.pi)
+    low, high = hypothesis.specimen.band_hz
+    return np.asarray((frequency > low) & (frequency < high))
 
 
 def signs_of(fit: Fit) -> FloatArray:
@@ -247,7 +278,8 @@ def _scatter(fits: Sequence[Fit], least: DiagnoseOptions) -> DiagnoseOptions:
     frequency = np.array([_shift(fit.hypothesis, fit.unknown) for fit in fits])
     unknowns = [fit.hypothesis.nuisance.unpack(fit.unknown) for fit in fits]
     elastic = slice(fits[0].hypothesis.nuisance.n_rigid, None)
-    damping = np.array([np.log1p(unknown.damping)[elastic][: frequency.shape[1]] for unknown in unknowns])
+    inside = _in_band(fits[0].hypothesis)
+    damping = np.array([np.log1p(unknown.damping)[elastic][inside] for unknown in unknowns])
     gains = np.array([unknown.gains for unknown in unknowns])
     wider = HALF_WIDTH * np.sqrt(1 + 1 / n)  # the mean that they are compared with is not exact either
     return replace(
@@ -259,7 +291,14 @@ def _scatter(fits: Sequence[Fit], least: DiagnoseOptions) -> DiagnoseOptions:
 
 
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values.var(0, ddof=1)))) if values.shape[1] else 0.0
+    """Give the standard deviation over states, of all columns together; by the median, for a state may be a bad one."""
+    n, columns = values.shape
+    if not columns:
+        return 0.0
+    if n < ENOUGH_FOR_MEDIANS:
+        return float(np.sqrt(np.mean(values.var(0, ddof=1))))
+    apart = np.abs(values - np.median(values, 0))
+    return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(apart, 0)) ** 2)))
 
 
 def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learned, options: CompareOptions) -> Learned:
@@ -267,7 +306,7 @@ def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learne
     nominals = [
         State(
             model=nominal_after(state, learned, options, source),
-            observed=without_gains(state.observed, learned.gains),
+            observed=trusted(state.observed, learned.gains, learned.missed),
         )
         for state, source in zip(before, sources, strict=True)
     ]
@@ -283,4 +322,4 @@ def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learne
 
 def _is_explained(state: State, source: Source, scatter: DiagnoseOptions) -> bool:
     bench = bench_of(state, source, scatter)
-    return goodness(bench, fit_nothing(bench)).is_good
+    return goodness(bench, fit_from_peaks(bench, source)).is_good

@@ -1,0 +1,146 @@
+"""What real beams have that their models lack, in order of weight; and whether that helps where nothing was measured.
+
+Run from the checkout: ``python pipelines/real_beam_physics.py ../shared/recordings/steel_beam_5x3 OUT_FOLDER``, or with
+``../shared/recordings/freefree_beam``.
+
+One cause after the other is added, each time the one with the largest evidence, until the next one brings too little or
+nothing is left to explain. What `CASES` states of a test is not searched for: how wrong section and material may be,
+which scales nobody knows, and how far resonances drift from file to file, as a variance of the FRFs.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib import pyplot as plt
+
+import frf_ipz
+import real_beams
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.judging.findings import describe
+from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, goodness
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.observations import Observations
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.search.search import fit_nothing, search
+from frf_ipz.diagnosis.search.set_up import set_up
+
+MOST_CAUSES = 4
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is known of a test."""
+
+    band_hz: tuple[float, float]
+    scale: str
+    tolerances: frf_ipz.DiagnoseOptions
+    drift: float = 0.0  # relative, of resonances from file to file
+    left_out: int = 0  # node of a sensor that is predicted
+
+
+CASES = {
+    "steel_beam_5x3": Case(
+        band_hz=(20.0, 600.0),
+        scale="per_channel",
+        tolerances=frf_ipz.DiagnoseOptions(stiffness_tolerance=0.02, frequency_tolerance=0.01, damping_tolerance=0.9),
+        left_out=70,
+    ),
+    "freefree_beam": Case(
+        band_hz=(50.0, 1000.0),
+        scale="none",
+        tolerances=frf_ipz.DiagnoseOptions(
+            stiffness_tolerance=0.01, frequency_tolerance=0.005, damping_tolerance=0.9, gain_tolerance=0.05
+        ),
+        drift=1e-4,
+    ),
+}
+
+
+def main(folder: Path, out: Path) -> None:
+    """Print what is missing, and draw measurement and models."""
+    case = CASES[folder.name]
+    test = frf_ipz.read_test(folder / "test.toml")
+    model = frf_ipz.read_model(folder / "model.toml")
+    frfs = replace(frf_ipz.estimate_frfs(test, frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
+    frfs = with_drift(frfs.lines(frfs.in_band(case.band_hz)), case.drift)
+    kept = [place for place, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
+    fits, bench, table = causes_of(frfs.frfs(kept), model, case)
+    print(table.to_string(index=False, float_format="{:.4g}".format))
+    out.mkdir(parents=True, exist_ok=True)
+    draw(frfs.frfs(kept), bench, {"model": fits[0], "with what was found": fits[-1]}, out / f"{folder.name}.png")
+    if case.left_out:
+        full = with_change(model, fits[-1].hypothesis.change(fits[-1].values))
+        for name, one in (("plain", model), ("with what was found", full)):
+            found = real_beams.leave_out(frfs, one, case.band_hz, "output", case.left_out)
+            print(
+                f"\nsensor at node {case.left_out} left out, {name} model\n",
+                found.to_string(float_format="{:.4g}".format),
+            )
+
+
+def with_drift(frfs: frf_ipz.FrfSet, drift: float) -> frf_ipz.FrfSet:
+    """State that resonances differ by a part of their frequency from file to file."""
+    if not drift:
+        return frfs
+    slope = np.abs(np.gradient(frfs.values, frfs.frequency_hz, axis=0))
+    noise = 0.003 * np.abs(frfs.values)
+    return replace(frfs, variance=(drift * frfs.frequency_hz[:, None] * slope) ** 2 + noise**2)
+
+
+def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list, object, pd.DataFrame]:
+    """Add the cause with the largest evidence until the next one brings too little."""
+    effects = {name: one for name, one in shipped_effects().items() if case.scale == "none" or name != "sensor_gain"}
+    source = divide(Observations(kind="frf", blows=(), band_hz=case.band_hz, frfs=frfs))
+    bench = set_up(model, source, case.band_hz, case.tolerances, effects, free_gains=case.scale)
+    fits, rows = [fit_nothing(bench)], []
+    while True:
+        good = goodness(bench, fits[-1])
+        causes = fits[-1].hypothesis.causes
+        finding = describe(fits[-1], -1, 1.0, 0.0, max(1.0, good.misfit), places=()) if causes else None
+        rows.append(
+            {
+                "misfit": np.sqrt(good.misfit),
+                "worst": np.sqrt(good.worst_piece),
+                "pull": good.pull,
+                "nats": fits[-1].log_evidence - fits[max(len(fits) - 2, 0)].log_evidence,
+                "what": finding.statement if finding else "the model, within its tolerances",
+            }
+        )
+        print(f"{rows[-1]}", flush=True)
+        if good.is_good or len(causes) == MOST_CAUSES:
+            break
+        best = search(bench, fits[-1]).best
+        if best.log_evidence - fits[-1].log_evidence < FOUND_NATS:
+            break
+        fits.append(best)
+    print("explained" if good.is_good else f"unexplained: what was found {good.complaint}")
+    return fits, bench, pd.DataFrame(rows)
+
+
+def draw(frfs: frf_ipz.FrfSet, bench: object, fits: dict, path: Path) -> None:
+    """Draw measured FRFs and models, on the gains that fit best."""
+    rows = -(-frfs.n_frfs // 3)
+    figure, axes = plt.subplots(rows, 3, figsize=(18, 3.2 * rows), squeeze=False)
+    for name, fit in fits.items():
+        gains = bench.data.gains(fit.hypothesis.respond(fit.values, fit.unknown, bench.data.measured.s))
+        values = gains * fit.hypothesis.respond(fit.values, fit.unknown, frfs.s).values
+        for axis, column in zip(axes.flat, values.T, strict=False):
+            axis.semilogy(frfs.frequency_hz, np.abs(column), lw=0.8, label=name)
+    for axis, label, column in zip(axes.flat, frfs.labels, frfs.values.T, strict=False):
+        axis.semilogy(frfs.frequency_hz, np.abs(column), "k", lw=0.6, label="measured")
+        axis.set_title(str(label), fontsize=9)
+    axes.flat[0].legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=60)
+    print(f"drawn: {path}")
+
+
+if __name__ == "__main__":
+    mpl.use("Agg")
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
