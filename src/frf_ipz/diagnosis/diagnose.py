@@ -33,6 +33,7 @@ from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.diagnosis.nonlinear.search import FOUND_NATS as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
@@ -163,9 +164,9 @@ def _laws(
 
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
-    found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > FOUND_NATS)
+    found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
     before, after = laws.before or linear.before, laws.after or linear.updated
-    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.beyond_linear)) > FOUND_NATS
+    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.beyond_linear)) > LAW_NATS
     is_worse = laws.verdict == UNEXPLAINED and after.held_out > before.held_out
     n_findings = 1 if is_needed and not is_worse else 0
     linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
@@ -176,9 +177,8 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         alternatives=found[n_findings:],
         before=before,
         after=after if n_findings else before,
-        mismatch_location=found[0].location if found else linear.mismatch_location,
+        mismatch_location=laws.place or (found[0].location if n_findings else {}),
         ambiguity=(),
-        mismatch_place=laws.place,
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
     )

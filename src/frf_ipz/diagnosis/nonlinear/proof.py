@@ -78,6 +78,24 @@ def _figures(stretches: Stretches, misfit: FloatArray) -> tuple[float, float]:
     return float(away / size), float(expected)
 
 
+def relative_misfit(stretches: Stretches, misfit: FloatArray) -> float:
+    """Give what is left as a part of the response.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    misfit : (n_rows,) array
+        Weighted, as `LawFit.misfit`.
+
+    Returns
+    -------
+    float
+        Norm over norm, on the used lines.
+    """
+    return _figures(stretches, misfit)[0]
+
+
 def working_range(fit: LawFit, plant: Plant) -> str:
     """Say for which motions of its place a law was seen.
 

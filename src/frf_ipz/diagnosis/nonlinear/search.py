@@ -4,26 +4,29 @@ The recordings of all levels are asked first (`assess_linearity`). If no linear 
 at every place on the first part of each blow, or on stretches of records. What is held out takes no part in that.
 
 Evidence is in nats: half the drop of the weighted sum of squares against the linear model with its tolerances, less
-what the freedom of the law costs. Nothing linear can gain more than `linear_limit` on the same data, whatever it is:
-a law that gains more is needed besides, or instead of, anything linear.
+what the freedom of the law costs. A law is needed if it explains how blows of different levels disagree, which nothing
+linear can (`beyond_linear`). If none explains it, the place is looked for at which some force, of whatever law, would.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
+from frf_ipz.diagnosis.nonlinear.fitting.anywhere import find_place
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
-from frf_ipz.diagnosis.nonlinear.proof import prove, working_range
+from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
 from frf_ipz.progress import silent
@@ -31,6 +34,8 @@ from frf_ipz.progress import silent
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import Misfit
+    from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+    from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
@@ -48,7 +53,12 @@ LONG_SHAKER = 640.0  # of a shaker, which takes time to shake up a structure
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains the recordings
-FOUND_NATS = 25.0  # evidence that a law needs
+CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
+MOST_APART = 2.0  # mean square of what blows disagree in besides the law, over the expected one
+NEARLY = 0.02  # or so much of the response is left
+FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
+WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
+PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
 WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
@@ -68,8 +78,8 @@ class LawSearch:
         What the recordings say without a model.
     findings : tuple of Finding
         The best place of each law, the most probable first; empty for a linear system.
-    linear_limit : float
-        Evidence over the linear model that nothing linear can exceed, nats; NaN where stretches start in motion.
+    beyond_linear : float
+        Evidence of the first finding beyond anything linear, nats; NaN where stretches start in motion.
     before, after : Misfit
         Of the linear model with its tolerances, and with the first finding.
     statement : str
@@ -80,18 +90,21 @@ class LawSearch:
         The best law at its place.
     freedom : Freedom, optional
         Unknowns of the linear model that it was fitted with; `simulate` needs them.
+    place : mapping
+        Where a force sits whose law is not known, as in `diagnosis.json`; empty where that was not asked or not found.
     """
 
     verdict: str
     linearity: Linearity
     findings: tuple[Finding, ...] = ()
-    linear_limit: float = np.nan
+    beyond_linear: float = np.nan
     before: Misfit | None = None
     after: Misfit | None = None
     statement: str = ""
     plant: Plant | None = None
     fit: LawFit | None = None
     freedom: Freedom | None = None
+    place: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def is_nonlinear(self) -> bool:
@@ -151,13 +164,27 @@ def search_laws(
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         tracks.append(Track(stretches=stretches, linear=fit_linear(stretches, freedom)))
-    fits = find_candidates(tracks[0], tracks[1], laws)
-    found = _judge(tracks[1].stretches, linearity, plant, fits, tracks[1].linear.cost)
+    found = _judge(tracks[1], linearity, plant, find_candidates(tracks[0], tracks[1], laws))
+    if found.verdict == UNEXPLAINED:
+        progress(0.6, "looking for the place of an unknown law")
+        found = _with_place(found, plant, find_place(tracks[0], tracks[1])[0], tracks[1])
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
     before, after = prove(tracks[1], _held_out(held_out, plant, noise, tracks[1]), found.fit)
     return replace(found, freedom=tracks[1].linear.freedom, before=before, after=after)
+
+
+def _with_place(found: LawSearch, plant: Plant, best: AnyForce, track: Track) -> LawSearch:
+    """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
+    left = best.cost / track.linear.n_rows
+    if left > min(PLACED, HALVED * track.linear.cost / track.linear.n_rows):
+        return found
+    place = plant.places[best.place]
+    where = (
+        f"A force of another kind at {place.words} would: {np.sqrt(left):.2g} times the expected misfit is then left."
+    )
+    return replace(found, place=dict(place.location), statement=f"{found.statement} {where}")
 
 
 def _held_out(held_out: Observations, plant: Plant, noise: ChannelNoise, track: Track) -> Stretches | None:
@@ -177,43 +204,65 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
     return replace(observations, blows=kept), replace(observations, blows=tuple(held))
 
 
-def _judge(
-    stretches: Stretches, linearity: Linearity, plant: Plant, fits: list[LawFit], linear_cost: float
-) -> LawSearch:
+def _judge(track: Track, linearity: Linearity, plant: Plant, fits: list[LawFit]) -> LawSearch:
     if not fits:
-        return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law explains it.")
+        return LawSearch(
+            verdict=UNEXPLAINED, linearity=linearity, plant=plant, statement=f"{DISAGREE}; no law explains it."
+        )
+    fits, drops = _ranked(track, fits)
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
-    gains = np.array([_gain(fit, linear_cost, len(plant.places), scale) for fit in fits])
+    gains = np.array(
+        [_gain(fit, drop / scale, len(plant.places), scale) for fit, drop in zip(fits, drops, strict=True)]
+    )
     weights = np.exp(gains - gains.max())
     findings = _findings(plant, fits, gains, weights / weights.sum(), scale)
-    limit = _linear_limit(stretches, linear_cost) / scale
-    needed = findings[0].log_evidence_gain > np.fmax(FOUND_NATS, limit)
-    explained = bool(best.cost <= MOST_MISFIT * best.n_rows and needed)
-    left = float(np.sqrt(best.cost / best.n_rows))
-    why = (
-        f"{left:.3g} times the expected misfit is left by the best one ({findings[0].effect})"
-        if needed
-        else f"the best one ({findings[0].effect}) gains no more than a linear system could"
-    )
+    agreement = agreement_with(track.stretches, track.linear.freedom, best)
+    why = _complaint(track, best, agreement, float(gains[0]))
     return LawSearch(
-        verdict=EXPLAINED if explained else UNEXPLAINED,
+        verdict=UNEXPLAINED if why else EXPLAINED,
         linearity=linearity,
         findings=findings,
-        linear_limit=limit,
-        statement=f"{findings[0].statement} {working_range(best, plant)}"
-        if explained
-        else f"{DISAGREE}, and no law of the catalogue explains how: {why}.",
+        beyond_linear=agreement.gain,
+        statement=f"{DISAGREE}, and no law of the catalogue explains how: the best one ({findings[0].effect}) {why}."
+        if why
+        else f"{findings[0].statement} {working_range(best, plant)}",
         plant=plant,
         fit=best,
     )
 
 
-def _gain(fit: LawFit, linear_cost: float, n_places: int, scale: float) -> float:
+def _ranked(track: Track, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]:
+    """Order fits by their evidence, which is given too: half the drop of the cost.
+
+    Where that is little, how blows disagree counts besides, which the model's errors do not hide.
+    """
+    drops = np.array([0.5 * (track.linear.cost - fit.cost) for fit in fits])
+    if drops[0] < WEAK_NATS and not track.stretches.moving.any():
+        drops += [agreement_with(track.stretches, track.linear.freedom, fit).gain for fit in fits]
+    order = np.argsort(-drops)
+    return [fits[i] for i in order], drops[order]
+
+
+def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) -> str:
+    """Say what is wrong with a law; nothing where it explains the recordings."""
+    if np.fmin(gain, agreement.gain) < FOUND_NATS:
+        return "gains no more than a linear system could"
+    part = relative_misfit(track.stretches, best.misfit)
+    left = best.cost / best.n_rows
+    if left > MOST_MISFIT and part > CLOSE:
+        return f"leaves {np.sqrt(left):.3g} times the expected misfit"
+    if agreement.left > MOST_APART and part > NEARLY:
+        return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
+    return ""
+
+
+def _gain(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
+    """Take off from a drop of the cost what the freedom of the law is worth."""
     numbers = [(fit.strength, fit.covariance[0, 0])]
     if fit.law.shape_name:
         numbers.append((fit.shape, fit.covariance[1, 1]))
-    gain = 0.5 * (linear_cost - fit.cost) / scale - np.log(n_places)
+    gain = drop - np.log(n_places)
     for value, variance in numbers:
         spread = min(np.sqrt(max(variance, 1e-300) * scale) / max(abs(value), 1e-300), LOG_RANGE)
         gain += np.log(np.sqrt(2 * np.pi) * max(spread, 1e-12) / LOG_RANGE)
@@ -255,18 +304,3 @@ def _numbers(fit: LawFit, scale: float) -> dict[str, Estimate]:
         std = WIDER * float(np.sqrt(max(variance, 0.0) * scale))
         found[name] = Estimate(value=value, std=std, low=value - NORMAL_95 * std, high=value + NORMAL_95 * std)
     return found
-
-
-def _linear_limit(stretches: Stretches, linear_cost: float) -> float:
-    """Evidence that the best FRF of each line and place would gain, for free."""
-    if stretches.moving.any():
-        return float(np.nan)
-    force, motion = stretches.force[:, stretches.used], stretches.motion[:, :, stretches.used]
-    weight = 1 / stretches.variance[:, :, stretches.used]
-    cost = 0.0
-    for number in np.unique(stretches.input_of):
-        mine = stretches.input_of == number
-        f, y, w = force[mine, None], motion[mine], weight[mine]
-        frf = np.sum(w * y * f.conj(), 0) / np.maximum(np.sum(w * np.abs(f) ** 2, 0), 1e-300)
-        cost += float(np.sum(w * np.abs(y - frf * f) ** 2))
-    return 0.5 * (linear_cost - cost)

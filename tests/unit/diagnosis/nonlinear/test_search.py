@@ -1,6 +1,7 @@
 import pytest
 
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -35,9 +36,9 @@ def test_law_place_and_numbers_are_found(solved):
         assert abs(first.parameters[key].value / value - 1) < PARAMETERS, key
 
 
-def test_nothing_linear_could_gain_as_much(solved):
+def test_blows_disagree_as_the_law_makes_them(solved):
     found = solved[-1]
-    assert found.findings[0].log_evidence_gain > found.linear_limit
+    assert found.beyond_linear > 1e4  # nats
 
 
 def test_blows_that_were_held_out_are_predicted(solved):
@@ -55,7 +56,7 @@ def test_whole_records_of_all_levels_are_simulated(solved):
 
 def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, strike, monkeypatch):
     law, where, *_ = CASES["cubic_stiffness"]
-    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search._linear_limit", lambda *_: 1e12)
+    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search.agreement_with", lambda *_: Agreement(3.0, 1.0))
     found = diagnose(chain.model, strike(law, where), DiagnoseOptions())
     assert found.verdict == "unexplained"
     assert found.findings == ()
@@ -73,3 +74,4 @@ def test_a_law_outside_the_catalogue_is_not_explained(chain, strike):
     found = search_laws(chain.model, strike(lambda w, _: 3e7 * w * abs(w), (0, 0, 1, 0)), DiagnoseOptions())
     assert found.verdict == "unexplained"
     assert "disagree" in found.statement
+    assert dict(found.place) == {"nodes": [3]}

@@ -28,7 +28,7 @@ OF_ALL = 5
 SIMULATED = 2  # places of each law that are simulated on short stretches
 TURNS = 6  # of the refinement
 FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
-HOPELESS = 30.0  # times the smallest cost
+HOPELESS = 10.0  # times the smallest cost
 FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
@@ -116,7 +116,7 @@ def _simulated(track: Track, fits: Sequence[LawFit]) -> list[LawFit]:
     """Fit by simulation; those that stay hopeless after a few steps only so far."""
     found = [track.shoot(fit, FIRST) for fit in fits]
     least = min((fit.cost for fit in found), default=np.inf)
-    return [track.shoot(fit, MORE) if fit.cost < HOPELESS * least else fit for fit in found]
+    return [fit if fit.settled or fit.cost > HOPELESS * least else track.shoot(fit, MORE) for fit in found]
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:

@@ -55,6 +55,8 @@ class LawFit:
         Of the law against the structure, N s.
     misfit : (n_rows,) array
         Weighted, what is left.
+    settled : bool
+        Further steps would not make it better.
     """
 
     law: Law
@@ -69,6 +71,7 @@ class LawFit:
     velocity: FloatArray
     force: ComplexArray
     misfit: FloatArray
+    settled: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,13 +134,35 @@ def refine(stretches: Stretches, freedom: Freedom, start: Start, *, n_turns: int
 
 def _first_force(stretches: Stretches, freedom: Freedom, start: Start, clock: Clock) -> ComplexArray:
     """Force of the law in the motion that follows without knowing it."""
-    _, w, v = _motion(stretches, freedom, start, clock, None)
+    _, w, v = motion_at(stretches, freedom, start, clock, None)
     return clock.at_lines(start.strength * start.law.unit_force(w, v, start.shape))
 
 
-def _motion(
+def motion_at(
     stretches: Stretches, freedom: Freedom, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[PlantResponse, FloatArray, FloatArray]:
+    """Estimate how the place of a law moves.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    freedom : Freedom
+        Unknowns of the linear model.
+    start : Start
+        The place, and the values of the unknowns.
+    clock : Clock
+        Times.
+    force : (n_blows, n_lines) complex array, optional
+        Of the law as far as it is known, N s.
+
+    Returns
+    -------
+    response : PlantResponse
+        With these unknowns.
+    w, v : (n_blows, n_times) array
+        Motion and velocity, m and m/s.
+    """
     plant = freedom.plant
     response = respond(plant, stretches.s, freedom.deviations(start.unknowns))
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
@@ -154,7 +179,7 @@ def _turn(
     stretches: Stretches, freedom: Freedom, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[LawFit, Start, ComplexArray]:
     law = start.law
-    response, w, v = _motion(stretches, freedom, start, clock, force)
+    response, w, v = motion_at(stretches, freedom, start, clock, force)
     rows, misfit = _rows(stretches, freedom, start, response, _unit_forces(start, clock, w, v))
     step, covariance = _solve(rows, misfit, start.unknowns)
     n = freedom.n_unknowns
@@ -197,7 +222,7 @@ def _rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Give derivatives by unknowns, strength and shape, and the misfit without the law; weighted, (.., n_rows)."""
     used = stretches.used
-    on_used = replace(response, s=stretches.s[used], modes=response.modes[:, used])
+    on_used = response.on(used)
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     to_sensors = response.to_sensors(start.place)[:, used]
     linear = linear_motion(stretches, freedom, response)

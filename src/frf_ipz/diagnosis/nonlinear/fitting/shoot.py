@@ -75,7 +75,7 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
     shot, damping = _fire(stretches, freedom, start), FIRST_DAMPING
     while not np.isfinite(shot.cost):  # a softening spring that is too strong runs away
         shot = _fire(stretches, freedom, replace(shot.start, strength=TAMER * shot.start.strength))
-    rows = _slopes(stretches, freedom, shot)
+    rows, settled = _slopes(stretches, freedom, shot), False
     for _ in range(iterations):
         before = shot.cost
         while damping < MOST_DAMPING:
@@ -84,12 +84,14 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
                 break
             damping *= SLOWER
         else:
+            settled = True
             break
         shot, damping = trial, damping * FASTER
         rows = _slopes(stretches, freedom, shot)
-        if shot.cost > (1 - SETTLED) * before:
+        settled = bool(shot.cost > (1 - SETTLED) * before)
+        if settled:
             break
-    return _finish(shot, rows)
+    return _finish(shot, rows, settled=settled)
 
 
 def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
@@ -123,7 +125,7 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
     seen = -to_sensors * lines[:, :, None] * weight
-    on_used = replace(shot.response, s=stretches.s[used], modes=shot.response.modes[:, used])
+    on_used = shot.response.on(used)
     shapes = freedom.plant.at_places.shapes[start.place]
     rows = freedom.columns(stretches, on_used, -shot.force[:, used], shapes, start.unknowns)
     rows[: 2 * n_free] += seen[: 2 * n_free]
@@ -169,7 +171,7 @@ def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
     )
 
 
-def _finish(shot: _Shot, rows: FloatArray) -> LawFit:
+def _finish(shot: _Shot, rows: FloatArray, *, settled: bool) -> LawFit:
     start, n = shot.start, len(shot.start.unknowns)
     normal, _ = _normal(shot, rows)
     inverse = _solve(normal, np.eye(len(rows))[:, n:])[n:]
@@ -189,4 +191,5 @@ def _finish(shot: _Shot, rows: FloatArray) -> LawFit:
         velocity=shot.done.velocity,
         force=shot.force,
         misfit=shot.misfit,
+        settled=settled,
     )

@@ -8,12 +8,12 @@ frequencies, damping and the shapes at sensors and blows.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import apply
@@ -305,6 +305,10 @@ class PlantResponse:
     def input_shapes(self) -> FloatArray:
         """(n_inputs, n_modes) shapes at the blows as they are."""
         return self.plant.at_inputs.shapes + self.deviations.inputs
+
+    def on(self, lines: IntArray) -> PlantResponse:
+        """Keep some of the lines."""
+        return replace(self, s=self.s[lines], modes=self.modes[:, lines])
 
     def from_inputs(self, first_mode: int = 0) -> ComplexArray:
         """(n_inputs, n_sensors, n_lines) receptance from blows to sensors, of the modes from one on."""

@@ -1,0 +1,170 @@
+"""Where a force sits whose law is not known: a sum of many simple laws at one place, free in all their strengths.
+
+Powers of the motion and of the velocity, dead zones on either side and friction bend into nearly any law that has no
+memory. Such a sum says nothing about the law, but only at the right place does it reach all sensors as it should.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, neighbours
+from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
+from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+
+DEAD_ZONES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # parts of the largest motion
+YIELDS = (0.02, 0.06, 0.2)  # parts of the largest motion: a spring slips beyond
+STEEP = 3e-3  # of the largest velocity: below, friction grows with it
+FEW_TURNS, MANY_TURNS = 3, 8
+FINALISTS = 4  # places that are fitted on long stretches
+NEIGHBOURS = 2
+CLIMBS = 6  # steps to better neighbours
+RIDGE = 1e-6  # of a column's own square: many of the laws are nearly alike
+LEAST_COLUMN = 1e-100  # norm of a column: nothing is touched
+SETTLED = 1e-3  # relative change of the cost between turns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AnyForce:
+    """The best sum of simple laws at a place.
+
+    Parameters
+    ----------
+    place : int
+        Index in `Plant.places`.
+    cost : float
+        Weighted sum of squared misfits, and of squared unknowns.
+    """
+
+    place: int
+    cost: float
+
+
+def find_place(short: Track, long: Track) -> list[AnyForce]:
+    """Find the place of a force whose law is not known.
+
+    Parameters
+    ----------
+    short, long : Track
+        The data.
+
+    Returns
+    -------
+    list of AnyForce
+        The best places, fitted to the long stretches, the smallest cost first.
+    """
+    n_places = len(short.linear.freedom.plant.places)
+    rough = sorted((fit_anything(short, place, FEW_TURNS) for place in range(n_places)), key=lambda one: one.cost)
+    fits = [fit_anything(long, one.place, MANY_TURNS) for one in rough[:FINALISTS]]
+    done = {one.place for one in fits}
+    for _ in range(CLIMBS):
+        best = min(fits, key=lambda one: one.cost)
+        near = [place for place in neighbours(short.linear.freedom.plant, best.place, NEIGHBOURS) if place not in done]
+        if not near:
+            break
+        done.update(near)
+        fits += [fit_anything(long, place, MANY_TURNS) for place in near]
+    return sorted(fits, key=lambda one: one.cost)
+
+
+def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
+    """Fit a sum of simple laws at a place.
+
+    Parameters
+    ----------
+    track : Track
+        The data, and the linear model.
+    place : int
+        Index in `Plant.places`.
+    n_turns : int
+        At most: motion, force and linear model are found in turns.
+
+    Returns
+    -------
+    AnyForce
+        The best turn.
+    """
+    stretches, linear = track.stretches, track.linear
+    clock, freedom = Clock(stretches), linear.freedom
+    unknowns = linear.unknowns.copy()
+    unknowns[: sum(freedom.sizes[:4])] = 0.0
+    force: ComplexArray | None = None
+    best = np.inf
+    for _ in range(n_turns):
+        start = Start(law=CubicStiffness(), place=place, strength=0.0, shape=0.0, unknowns=unknowns)
+        response, w, v = motion_at(stretches, freedom, start, clock, force)
+        forces = clock.at_lines(_simple_forces(w, v))
+        rows, misfit = _rows(stretches, linear, response, start, forces, force)
+        step = _solve(rows, misfit, unknowns)
+        left = misfit - step @ rows
+        n = len(unknowns)
+        unknowns = unknowns + step[:n]
+        force = np.tensordot(step[n:], forces, 1)
+        before, best = best, min(best, float(left @ left + unknowns @ unknowns))
+        if best > (1 - SETTLED) * before:
+            break
+    return AnyForce(place=place, cost=best)
+
+
+def _simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:
+    """(n_laws, n_blows, n_times) forces of size one."""
+    x, y = w / max(float(np.abs(w).max()), 1e-300), v / max(float(np.abs(v).max()), 1e-300)
+    forces = [x * x, x**3, x**5, x * np.abs(x), y * np.abs(y), y**3, x * x * y, np.tanh(y / STEEP)]
+    for part in DEAD_ZONES:
+        forces += [np.maximum(sign * x - part, 0.0) for sign in (1, -1)]
+    return np.array(forces + [_slipping(x, part) for part in YIELDS])
+
+
+def _slipping(x: FloatArray, limit: float) -> FloatArray:
+    """Stretch of a spring in series with friction, which slips beyond a limit."""
+    steps = np.diff(x, axis=-1, prepend=0.0)
+    found, stretch = np.zeros(x.shape), np.zeros(len(x))
+    for k, step in enumerate(steps.T):
+        stretch = np.clip(stretch + step, -limit, limit)
+        found[:, k] = stretch
+    return found / limit
+
+
+def _rows(
+    stretches: Stretches,
+    linear: LinearFit,
+    response: PlantResponse,
+    start: Start,
+    forces: ComplexArray,
+    force: ComplexArray | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Derive by unknowns and strengths, and give the misfit without any force; weighted, (.., n_rows)."""
+    freedom, used = linear.freedom, stretches.used
+    weight = 1 / np.sqrt(stretches.variance[:, :, used])
+    shown = linear_motion(stretches, freedom, response)
+    shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+    misfit = as_real((stretches.motion - shown)[:, :, used] * weight)
+    on_place = np.zeros((stretches.n_blows, len(used)), complex) if force is None else -force[:, used]
+    shapes = freedom.plant.at_places.shapes[start.place]
+    by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, shapes))
+    to_sensors = response.to_sensors(start.place)[:, used]
+    return np.concatenate([by_unknowns, as_real(-to_sensors * forces[:, :, None, used] * weight)]), misfit
+
+
+def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> FloatArray:
+    """Step of the unknowns, and the strengths."""
+    n = len(unknowns)
+    sizes = np.ones(len(rows))
+    sizes[n:] = np.maximum(np.linalg.norm(rows[n:], axis=1), LEAST_COLUMN)
+    scaled = rows / sizes[:, None]
+    prior, right = np.ones(len(rows)), scaled @ misfit
+    prior[n:] = RIDGE
+    right[:n] -= unknowns
+    factor = linalg.cho_factor(scaled @ scaled.T + np.diag(prior), lower=True)
+    return np.asarray(linalg.cho_solve(factor, right)) / sizes

@@ -1,0 +1,302 @@
+"""How frequency and damping of modes depend on amplitude, from responses that ring down on their own.
+
+Within a short window a mode decays as exp(lambda t) with the pole lambda of its amplitude there; from window to window
+the amplitude falls and the pole moves. No force, no model and no level of blows is needed. Each window is fitted by a
+sum of damped sinusoids (Gauss-Newton steps on the poles; amplitudes are linear), the noise is what is left.
+
+What the poles do with amplitude A tells families of laws apart: a cubic spring moves the frequency with A^2 and leaves
+damping alone; Coulomb friction adds damping with 1/A; slip in joints lowers the frequency and raises the damping; drag
+raises damping with A [WordenTomlinson2001].
+
+[WordenTomlinson2001] K. Worden and G. R. Tomlinson, Nonlinearity in Structural Dynamics, IoP Publishing 2001,
+doi:10.1887/0750303565.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.errors import InputError
+
+WINDOWS_APART = 0.5  # of a window: from one to the next
+STEPS = 12
+SETTLED = 1e-9  # relative change of the poles
+SLOWEST, FASTEST = 1e-5, 0.2  # damping ratios that are believed
+FARTHEST = 0.03  # relative: a frequency that runs away from its mode
+STANDS_OUT = 5.0  # standard deviations: a weaker amplitude is noise
+MOST_LEFT = 0.1  # of the signal: a window that is left so much of shows something else
+ROUNDS = 3  # of weights
+HOLDS = 0.33  # of the scatter about a constant: what a law by amplitude may leave
+POWERS = np.concatenate([np.arange(-1.0, -0.2, 0.05), np.arange(0.25, 3.05, 0.05)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RingdownTrack:
+    """A mode along one ring-down.
+
+    Parameters
+    ----------
+    time_s : (n_windows,) array
+        Middle of each window.
+    amplitude : (n_windows,) array
+        Of the mode in the middle of the window, in the unit of the signal.
+    frequency_hz, damping_ratio : (n_windows,) array
+        Undamped natural frequency, and decay rate over it.
+    frequency_std_hz, damping_ratio_std : (n_windows,) array
+        Standard deviations by what the fit leaves.
+    """
+
+    time_s: FloatArray
+    amplitude: FloatArray
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    frequency_std_hz: FloatArray
+    damping_ratio_std: FloatArray
+
+    def above(self, amplitude: float) -> RingdownTrack:
+        """Keep the windows from the first one on until the mode falls to an amplitude."""
+        low = np.flatnonzero(self.amplitude <= amplitude)
+        kept = slice(0, int(low[0]) if len(low) else len(self.amplitude))
+        return RingdownTrack(**{part.name: getattr(self, part.name)[kept] for part in fields(self)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AmplitudeLaw:
+    """A quantity as offset + change A^power, over all ring-downs.
+
+    Parameters
+    ----------
+    offset : float
+        At vanishing amplitude, or, for a negative power, at a large one.
+    change : float
+        Times A^power.
+    power, power_low, power_high : float
+        Best one and its 95 % interval, by leaving out one ring-down at a time.
+    left : float
+        Median of what is left, times 1.48: the standard deviation of a normal distribution.
+    left_by_constant : float
+        The same for a quantity that does not depend on amplitude.
+    """
+
+    offset: float
+    change: float
+    power: float
+    power_low: float
+    power_high: float
+    left: float
+    left_by_constant: float
+
+    @property
+    def holds(self) -> bool:
+        """The quantity depends on the amplitude of this mode, and on little else."""
+        return self.left < HOLDS * self.left_by_constant
+
+    def at(self, amplitude: FloatArray) -> FloatArray:
+        """Evaluate at amplitudes."""
+        return np.asarray(self.offset + self.change * amplitude**self.power)
+
+
+def track_ringdown(
+    signal: FloatArray, step_s: float, frequencies_hz: Sequence[float], window_s: float
+) -> list[RingdownTrack]:
+    """Follow modes along a ring-down.
+
+    Parameters
+    ----------
+    signal : (n_samples,) array
+        Displacement, velocity or acceleration.
+    step_s : float
+        s.
+    frequencies_hz : sequence of float
+        About where the modes are: all those that the signal shows.
+    window_s : float
+        Length of a window: a few periods of the distances between the modes.
+
+    Returns
+    -------
+    list of RingdownTrack
+        One for each mode; windows where the mode drowns in noise are left out.
+
+    Raises
+    ------
+    InputError
+        If the window is longer than the signal, or too short to tell the modes apart.
+    """
+    n = round(window_s / step_s)
+    start = np.array([-1e-3 + 1j]) * 2 * np.pi * np.asarray(frequencies_hz, float)[:, None]
+    poles = start[:, 0]
+    if n > len(signal):
+        raise InputError(f"a window of {window_s:g} s is longer than the ring-down of {len(signal) * step_s:g} s")
+    if n < 8 * len(poles) or window_s * np.min(np.diff(np.sort([0.0, *frequencies_hz]))) < 2:
+        raise InputError(f"a window of {window_s:g} s is too short to tell the modes apart; take a longer one")
+    rows = []
+    for first in range(0, len(signal) - n + 1, max(round(WINDOWS_APART * n), 1)):
+        fit = _fit(np.asarray(signal[first : first + n], float), step_s, poles)
+        near = np.abs(fit.poles.imag / start[:, 0].imag - 1) < FARTHEST
+        poles = np.where(near, fit.poles, start[:, 0])
+        rows.append(((first + (n - 1) / 2) * step_s, fit, near))
+    return [_track(rows, mode) for mode in range(len(poles))]
+
+
+def fit_amplitude_law(tracks: Sequence[RingdownTrack], quantity: str) -> AmplitudeLaw:
+    """Fit how frequency or damping depends on amplitude, over all ring-downs of a mode.
+
+    Parameters
+    ----------
+    tracks : sequence of RingdownTrack
+        One mode in ring-downs of the same structure, two at least.
+    quantity : str
+        ``frequency_hz`` or ``damping_ratio``.
+
+    Returns
+    -------
+    AmplitudeLaw
+        Its interval is that of the ring-downs' scatter, which is wider than what single windows say.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two ring-downs.
+    """
+    if len(tracks) < 2:
+        raise InputError("how a mode depends on amplitude needs two ring-downs at least, to see how far they agree")
+    std = {"frequency_hz": "frequency_std_hz", "damping_ratio": "damping_ratio_std"}[quantity]
+    sets = [(track.amplitude, getattr(track, quantity), getattr(track, std)) for track in tracks]
+    offset, change, power, left, constant = _power_law(sets)
+    others = np.array([_power_law(sets[:i] + sets[i + 1 :])[2] for i in range(len(sets))])
+    spread = 1.96 * np.sqrt((len(sets) - 1) * np.mean((others - others.mean()) ** 2))  # jackknife
+    return AmplitudeLaw(
+        offset=offset,
+        change=change,
+        power=power,
+        power_low=power - spread,
+        power_high=power + spread,
+        left=left,
+        left_by_constant=constant,
+    )
+
+
+def name_family(frequency: AmplitudeLaw, damping: AmplitudeLaw) -> str:
+    """Say which family of laws moves a mode like that.
+
+    Parameters
+    ----------
+    frequency, damping : AmplitudeLaw
+        Of one mode.
+
+    Returns
+    -------
+    str
+        A few words; what is consistent with a family is no proof of it.
+    """
+    moves = np.sign(frequency.change * frequency.power) if frequency.holds else 0.0
+    damps = np.sign(damping.change * damping.power) if damping.holds else 0.0
+    families = {
+        (0.0, 0.0): "neither follows the amplitude of this mode alone",
+        (1.0, 0.0): "hardening as of a cubic spring or a closing gap",
+        (-1.0, 0.0): "softening without damping, as of a preload or a softening spring",
+        (-1.0, 1.0): "softening with more damping, as of slip in a joint",
+        (0.0, 1.0): "damping that grows, as of drag",
+        (0.0, -1.0): "damping that falls, as of Coulomb friction",
+        (1.0, -1.0): "sticking less the more it moves, as of Coulomb friction beside a hardening spring",
+    }
+    return families.get((float(moves), float(damps)), "none of the simple families alone")
+
+
+def _power_law(sets: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> tuple[float, float, float, float, float]:
+    """Offset, change, power, and what is left with it and without; what fits leave counts beside their own errors."""
+    amplitude, values, std = (np.concatenate(parts) for parts in zip(*sets, strict=True))
+    constant = _size(values - np.median(values))
+    best, left = (float(np.median(values)), 0.0, 1.0), constant
+    for _ in range(ROUNDS):
+        weight = 1 / np.hypot(std, left)
+        costs = []
+        for power in POWERS:
+            columns = np.stack([np.ones_like(amplitude), amplitude**power], 1) * weight[:, None]
+            found, *_ = np.linalg.lstsq(columns, values * weight, rcond=None)
+            costs.append((float(np.sum((values * weight - columns @ found) ** 2)), *found.tolist(), float(power)))
+        _, *numbers = min(costs)
+        best = (numbers[0], numbers[1], numbers[2])
+        left = _size(values - best[0] - best[1] * amplitude ** best[2])
+    return (*best, left, constant)
+
+
+def _size(values: FloatArray) -> float:
+    return float(1.48 * np.median(np.abs(values)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Window:
+    poles: ComplexArray
+    amplitude: FloatArray
+    amplitude_std: float
+    covariance: FloatArray
+    misfit: float
+
+
+def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
+    """Fit damped sinusoids, whose amplitudes are those in the middle of the window."""
+    time = np.asarray(step_s * (np.arange(len(signal)) - (len(signal) - 1) / 2), float)
+    for _ in range(STEPS):
+        columns, found = _amplitudes(signal, time, poles)
+        slopes = _slopes(time, poles, found)
+        left = signal - columns @ found
+        step = np.linalg.lstsq(np.hstack([columns, slopes]), left, rcond=1e-13)[0][columns.shape[1] :]
+        change = step[: len(poles)] + 1j * step[len(poles) :]
+        decay = np.clip(-(poles + change).real / np.abs(poles), SLOWEST, FASTEST) * np.abs(poles)
+        poles = -decay + 1j * (poles + change).imag
+        if np.abs(change).max() < SETTLED * np.abs(poles).max():
+            break
+    columns, found = _amplitudes(signal, time, poles)
+    all_columns = np.hstack([columns, _slopes(time, poles, found)])
+    left = signal - columns @ found
+    variance = float(left @ left) / max(len(signal) - all_columns.shape[1], 1)
+    covariance = variance * np.linalg.pinv(all_columns.T @ all_columns, hermitian=True)
+    return _Window(
+        poles=poles,
+        amplitude=np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
+        amplitude_std=float(np.sqrt(2 * variance / len(signal))),
+        covariance=covariance[columns.shape[1] :, columns.shape[1] :],
+        misfit=float(np.sqrt(variance) / max(signal.std(), 1e-300)),
+    )
+
+
+def _amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Columns of cosines, sines and a constant, and how much of each is in a signal."""
+    turning = np.exp(np.outer(time, poles))
+    columns = np.hstack([turning.real, turning.imag, np.ones((len(time), 1))])
+    found, *_ = np.linalg.lstsq(columns, signal, rcond=1e-13)
+    return columns, np.asarray(found)
+
+
+def _slopes(time: FloatArray, poles: ComplexArray, found: FloatArray) -> FloatArray:
+    """Change of the signal by real and imaginary parts of the poles."""
+    n = len(poles)
+    moved = np.exp(np.outer(time, poles)) * (found[:n] - 1j * found[n : 2 * n]) * time[:, None]
+    return np.hstack([moved.real, -moved.imag])
+
+
+def _track(rows: list[tuple[float, _Window, FloatArray]], mode: int) -> RingdownTrack:
+    kept = [
+        (time, fit)
+        for time, fit, near in rows
+        if near[mode] and fit.amplitude[mode] > STANDS_OUT * fit.amplitude_std and fit.misfit < MOST_LEFT
+    ]
+    poles = np.array([fit.poles[mode] for _, fit in kept])
+    n = len(rows[0][1].poles)
+    size = np.abs(poles)
+    decay_std, turn_std = (
+        np.sqrt([fit.covariance[row, row] for _, fit in kept]) if kept else np.zeros(0) for row in (mode, n + mode)
+    )
+    return RingdownTrack(
+        time_s=np.array([time for time, _ in kept]),
+        amplitude=np.array([fit.amplitude[mode] for _, fit in kept]),
+        frequency_hz=size / (2 * np.pi),
+        damping_ratio=-poles.real / size,
+        frequency_std_hz=turn_std / (2 * np.pi),
+        damping_ratio_std=decay_std / size,
+    )
