@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
-from frf_ipz.diagnosis.measured.transfer import points_of
+from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def divide(observations: Observations) -> Source:
     near = _looked_at(measure(found, s), observations)
     if not kept:
         return _by_points(coarse, near, found, observations.kind)
-    held = measure(like(found, replace(observations, blows=kept)), near.s)
+    held = without_faint(measure(like(found, replace(observations, blows=kept)), near.s))
     return Source(
         coarse=coarse,
         training=near,
@@ -126,7 +126,7 @@ def _looked_at(measured: Measured, observations: Observations) -> Measured:
         kept &= (frequency < low - width) | (frequency > high + width)
     if not kept.any():
         raise InputError("[fit] exclude_hz leaves nothing of the band to diagnose; exclude narrower stretches")
-    return points_of(measured, np.flatnonzero(kept))
+    return without_faint(points_of(measured, np.flatnonzero(kept)))
 
 
 def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:

@@ -14,6 +14,7 @@ SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that v
 SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
 ROUGH_PART = 0.15  # of the tolerance: the same from point to point
 NOISY = 25.0  # points whose noise is a fifth of the FRF tell nothing of gains
+FAINT = 0.01  # of the largest FRF of a quantity: transverse sensitivity and asymmetry make smaller ones
 NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
 
 
@@ -84,6 +85,31 @@ def points_of(measured: Measured, kept: IntArray) -> Measured:
         covariance=measured.covariance[:, kept[:, None], kept],
         common=tuple(shared[kept] for shared in measured.common),
     )
+
+
+def without_faint(measured: Measured) -> Measured:
+    """Let errors of a model refer to FRFs that are large enough to be known.
+
+    A sensor on a node line of all modes sees what nobody knows: how it is turned, and how asymmetric the structure is.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions.
+
+    Returns
+    -------
+    Measured
+        The same, with sizes that are not far below that of the largest FRF of the same quantity and blow.
+    """
+    size = measured.size.copy()
+    quantities = np.array([label.quantity.power for label in measured.labels])
+    for quantity in np.unique(quantities):
+        for place in np.unique(measured.input_of):
+            frfs = np.flatnonzero((quantities == quantity) & (measured.input_of == place))
+            if len(frfs):
+                size[:, frfs] = np.maximum(size[:, frfs], FAINT * size[:, frfs].max(axis=1, keepdims=True))
+    return replace(measured, size=size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
