@@ -113,7 +113,7 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
             f'<div class="tools">{page_tools(run)}</div></div>',
             f'<header class="head"><h1>{escape(name)}</h1></header><main>{body}</main>',
             f"<footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to go "
-            "back; with the keyboard: Tab, then arrow keys, + and −, 0.</footer>",
+            "back; with the keyboard: Tab, then arrow keys, + and −, 0; Enter on a name of the legend.</footer>",
             f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
             f"<script>{get_plotlyjs()}</script><script>{_asset('page.js')}</script></body></html>",
         ]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Geometry
 
 MOST_LABELS = 24  # DOFs of a kind that are labelled; more would cover each other
-BESIDE_MARK = 0.09  # from a mark to its label, on a structure that is a line
+ABOVE_MARK, BELOW_MARK = 0.1, 0.16  # from a mark to its label, on a structure that is a line
 MOST_JOINED = 4  # labels in a row; of more the first and the last
 CHARACTER = 0.0085  # of the structure's length: width of a character on a page of the usual width
 SHELF = {"sensor": 0.2, "blow": 0.62, "point": -0.34, "missing": 0.0}  # above and below a structure that is a line
@@ -152,7 +152,7 @@ def _dofs(
     labels = _side_by_side([(float(positions[place[dof.node], 0]), str(dof)) for dof in known], extent)
     words: Trace = {"mode": "text", "text": [text for _, text in labels], "textposition": where, "textfont": font}
     quiet: Trace = {**words, "showlegend": False, "legendgroup": name}
-    height = heights[0] + (BESIDE_MARK if where.startswith("top") else -BESIDE_MARK)
+    height = heights[0] + (ABOVE_MARK if where.startswith("top") else -BELOW_MARK)
     at = markers([x for x, _ in labels], np.full(len(labels), height), name, colour, **quiet)
     return [{**points, "legendgroup": name}, at]
 
