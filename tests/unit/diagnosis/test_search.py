@@ -1,5 +1,6 @@
 """What the search rests on: bounds of tolerances, exact modes, steps to places, several causes."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
 from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.diagnosis.physics.response import modify
@@ -123,6 +125,24 @@ def test_three_causes_are_found_at_once(nominal):
     assert found.verdict == "explained"
     assert {finding.effect for finding in found.findings} == set(FEW)
     assert all(finding.log_evidence_gain > 50 for finding in found.findings)
+
+
+def test_both_ends_of_a_spring_move_at_once(nominal):
+    bench = bench_of(nominal, measured(nominal), ("coupling_spring",))
+    effect = bench.effects["coupling_spring"]
+    place = next(place for place in effect.places(bench.specimen) if place.key == (5, 12, "z"))
+    beside = {other.key[:2] for other in effect.neighbours(bench.specimen, place)}
+    assert {(4, 13), (6, 11), (4, 11), (6, 13)} <= beside
+    at_the_end = next(place for place in effect.places(bench.specimen) if place.key == (5, 17, "z"))
+    assert all(max(other.key[:2]) <= 17 for other in effect.neighbours(bench.specimen, at_the_end))
+
+
+def test_faint_frfs_are_known_no_better_than_the_large_ones(nominal):
+    data = divide(observed(measured(nominal))).training
+    faint = without_faint(replace(data, size=data.size * np.array([1.0, 1e-9])))
+    assert_allclose(faint.size[:, 0], data.size[:, 0], rtol=0)
+    assert_allclose(faint.size[:, 1], FAINT * data.size[:, 0], rtol=SAME)
+    assert_allclose(without_faint(data).size, data.size, rtol=0)
 
 
 def fit_of(name, evidence, value, std, place):
