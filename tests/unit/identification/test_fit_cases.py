@@ -58,6 +58,40 @@ def test_three_decades_of_residue():
     assert_calibrated(fit, truth)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_weak_modes_are_found_where_the_noise_lets_them(seed):
+    truth = random_modes(SPREAD, 0.005, seed=seed)
+    small = np.where(np.isin(np.arange(len(SPREAD)), [2, 5]), 10**-1.5, 1.0)
+    truth = replace(truth, outputs=truth.outputs * small, inputs=truth.inputs * small)
+    frfs = accelerances(truth, LINES_HZ, noise=0.01, seed=seed)
+    found = np.abs(np.abs(poles_of(fit_modes(frfs, FitOptions())))[:, None] / np.abs(truth.poles) - 1).min(axis=0)
+    s = frfs.s[:, None]
+    for weak in (2, 5):
+        alone = truth.residues()[weak] / (s - truth.poles[weak]) + truth.residues()[weak].conj() / (
+            s - truth.poles[weak].conj()
+        )
+        energy = np.sum(2 * np.abs(alone * s**2) ** 2 / frfs.variance, axis=0)
+        best = np.cumsum(np.sort(energy)[::-1])
+        count_of_frfs = np.arange(1, len(best) + 1)
+        demanded = (2 * count_of_frfs + 2) * np.log(2 * len(LINES_HZ))
+        demanded += 2 * count_of_frfs * np.log(len(best) / count_of_frfs)
+        assert (found[weak] < 1e-3) == (np.max(best / demanded) > 1)  # what the BIC asks of a mode
+
+
+def test_noise_that_all_frfs_share():
+    truth = random_modes(SPREAD, 0.005, seed=SEED)
+    values = exact(truth, 2j * np.pi * LINES_HZ)
+    errors = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        shared = 0.01 * (rng.standard_normal(len(LINES_HZ)) + 1j * rng.standard_normal(len(LINES_HZ)))
+        own = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2)) * rng.standard_normal(values.shape)
+        fit = fit_modes(frf_set(LINES_HZ, values * (1 + shared[:, None]) + own, labels_of(6, 2)), FitOptions())
+        assert_complete(fit, truth)
+        errors.append(normalised_errors(fit, truth.poles))
+    assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.4  # 2.7 if FRFs were taken for independent
+
+
 def test_pink_noise():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     values = exact(truth, 2j * np.pi * LINES_HZ)
@@ -201,6 +235,8 @@ def test_pinned_and_struck_poles():
     assert np.abs(np.abs(poles_of(fit)) / 2 / np.pi - 430.0).min() > 8.0
     assert all(np.abs(np.abs(poles_of(fit)) / 2 / np.pi - hz).min() < 1.0 for hz in rest)
     assert "the shaker's own resonance" in set(fit.decisions["reason"])
+    nowhere = fit_modes(frfs, FitOptions(strike=(StruckPole(hz=250.0, why="a lamp"),)))
+    assert list(nowhere.decisions.loc[nowhere.decisions["action"] == "struck", "reason"]) == ["a lamp"]
     pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0,)))
     assert "pinned" in set(pinned.decisions["action"])
     assert count(poles_of(pinned), truth.poles)[0] == len(SPREAD)
@@ -242,6 +278,7 @@ def test_model_error_is_said():
     fit = fit_modes(replace(frfs, variance=frfs.variance / 4), FitOptions())
     assert fit.noise_from == "misfit"
     assert "2 times the noise" in fit.warnings[0]
+    assert fit.misfit["ratio"].median() == pytest.approx(2.0, rel=0.05)  # over the noise as it was stated
     assert_calibrated(fit, truth)
 
 
