@@ -1,6 +1,7 @@
 """Six pieces on a cantilever, in 70 layouts and two states: what changed between the states, found by frf_ipz.compare.
 
-Run from the checkout: ``python pipelines/cantilever_masses.py ../shared/recordings/cantilever_masses OUT_FOLDER``.
+Run from the checkout: ``python pipelines/cantilever_masses.py ../shared/recordings/cantilever_masses OUT_FOLDER``; a
+number behind it takes every so many layouts only.
 
 Every other layout of the healthy state calibrates one model for all (length in the clamp, Young's modulus, mass of a
 piece and of the sensor, over that of the beam) and teaches how far tests are apart. The other healthy layouts were
@@ -22,6 +23,7 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
+from scipy import stats
 from scipy.optimize import least_squares
 
 import frf_ipz
@@ -160,7 +162,7 @@ def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
     )
 
 
-def compare_all(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame, Common]:
+def compare_all(folder: Path, step: int) -> tuple[pd.DataFrame, pd.DataFrame, Common]:
     """Calibrate, learn, and judge every layout that was not used for it."""
     layouts = read_layouts(folder)
     every = range(len(layouts))
@@ -169,13 +171,18 @@ def compare_all(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame, Common]:
     models = [build(common, layout) for layout in layouts]
     healthy = [state_of(folder / "Beam_healthy" / f"P-{one + 1}.txt", *models[one]) for one in every]
     second = [state_of(folder / "Beam_damage_2.96" / f"P-{one + 1}-1.txt", *models[one]) for one in every]
-    learned = learn(healthy[::2], options)
-    print(f"learned from {len(healthy[::2])} healthy layouts: {learned.scatter}")
+    taught = healthy[:: 2 * step]
+    learned = learn(taught, options)
+    print(f"learned from {len(taught)} healthy layouts: {learned.scatter}")
     rows, together = [], []
-    for name, states, chosen in (("healthy", healthy, list(every)[1::2]), ("second", second, list(every))):
+    for name, states, chosen in (
+        ("healthy", healthy, list(every)[1 :: 2 * step]),
+        ("second", second, list(every)[1::step]),
+    ):
         for one in chosen:
             found = judge(learned, states[one], options)
             first = found.changes[0] if found.changes else None
+            print(name, one + 1, found.diagnosis.verdict, found.statement, flush=True)
             rows.append(
                 {
                     "state": name,
@@ -225,15 +232,44 @@ def weigh(found: frf_ipz.Comparison, pieces: list[int]) -> list[dict]:
     return rows
 
 
-def main(folder: Path, out: Path) -> None:
-    """Print the tables and draw the pictures."""
-    table, together, common = compare_all(folder)
+def main(folder: Path, out: Path, step: int) -> None:
+    """Print the tables and draw the picture."""
+    table, together, common = compare_all(folder, step)
     out.mkdir(parents=True, exist_ok=True)
     table.to_csv(out / "layouts.csv", index=False)
     together.to_csv(out / "hypotheses.csv", index=False)
     print(common)
+    for (state, seen), rows in table.groupby(["state", "seen"]):
+        count, n = int(rows.changed.sum()), len(rows)
+        low, high = stats.beta.interval(0.95, np.array([count, count + 1]), np.array([n + 1 - count, n - count]))
+        part = f"{np.nan_to_num(low[0]):.0%} to {np.nan_to_num(high[1], nan=1.0):.0%}"
+        print(f"{state}{', calibrated on' if seen else ''}: {count} of {n} changed ({part})")
+    summed = together.pivot_table(index="hypothesis", columns="state", values="nats", aggfunc="sum")
+    print("evidence of the same change in all layouts, nats\n", summed.sort_values("second").to_string())
+    best = together[(together.state == "second") & (together.hypothesis == summed.second.idxmax())]
+    part = 100 * np.array([best.low, best.value, best.high]) / best.total_kg.to_numpy()
+    weight = 1 / np.maximum(np.log(part[2] / part[0]) / 3.92, 0.05) ** 2
+    mean, std = np.exp(weight @ np.log(part[1]) / weight.sum()), 1 / np.sqrt(weight.sum())
+    print(f"{summed.second.idxmax()}: {mean:.2f} % of all mass (+- {mean * std:.2f} %)")
+    draw(table, summed, out / "cantilever_masses.png")
+
+
+def draw(table: pd.DataFrame, summed: pd.DataFrame, path: Path) -> None:
+    """Draw how far each layout is from what was learned, and what explains the second state."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13, 4))
+    for state, rows in table.groupby("state"):
+        left.plot(rows.layout, rows.pull, "o", label=f"{state} state")
+    left.set_xlabel("layout")
+    left.set_ylabel("squared deviations from what was learned")
+    left.set_yscale("log")
+    left.legend()
+    summed.sort_values("second").plot.barh(ax=right)
+    right.set_xlabel("evidence of the same change in all layouts, nats")
+    right.set_ylabel("")
+    figure.tight_layout()
+    figure.savefig(path, dpi=70)
 
 
 if __name__ == "__main__":
     mpl.use("Agg")
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 1)

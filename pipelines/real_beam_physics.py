@@ -30,7 +30,7 @@ from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import set_up
 
-MOST_CAUSES = 4
+MOST_CAUSES = 3
 
 
 @dataclass(frozen=True)
