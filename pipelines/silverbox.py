@@ -40,10 +40,12 @@ class CubicWithSquare(Law):
 
     def unit_force(self, w: np.ndarray, v: np.ndarray, shape: float) -> np.ndarray:
         """Cube and square."""
+        del v
         return w * w * (w + shape)
 
     def shapes(self, largest_w: float, largest_v: float) -> np.ndarray:
         """Parts of the largest motion."""
+        del largest_v
         return np.array([-0.1, -0.03, -0.01, 0.01, 0.03, 0.1]) * largest_w
 
 

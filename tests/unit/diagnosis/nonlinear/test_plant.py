@@ -27,3 +27,9 @@ def test_a_spring_feels_its_second_node_less_its_first(chain, strike):
     place = next(i for i, p in enumerate(plant.places) if p.location == {"springs": ["k3"]})
     own, _ = respond(plant, s, no_deviations(plant)).at_place(place)
     assert_allclose(own[0], across @ full @ across, rtol=EXACT, atol=0)
+
+
+def test_a_spring_from_the_ground_is_named_with_its_node(chain, strike):
+    locations = [dict(place.location) for place in make_plant(chain.model, strike()).places]
+    assert locations[:2] == [{"nodes": [1], "springs": ["k1"]}, {"nodes": [2]}]
+    assert [one["springs"] for one in locations if "nodes" not in one] == [["k2"], ["k3"], ["k4"]]

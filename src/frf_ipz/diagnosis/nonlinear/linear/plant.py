@@ -49,7 +49,7 @@ class Place:
     @property
     def words(self) -> str:
         """The place for a sentence."""
-        if "springs" in self.location:
+        if len(self.ends) > 1:
             return f"spring {self.ends[0].node}-{self.ends[1].node}"
         return f"node {self.ends[0].node}"
 
@@ -215,7 +215,7 @@ def find_places(model: StructuralModel, directions: set[str]) -> tuple[Place, ..
     Returns
     -------
     tuple of Place
-        Nodes first. A spring to the ground is its node.
+        Nodes first. A spring from the ground is its node, and named besides: what sits on either acts alike.
 
     Raises
     ------
@@ -226,7 +226,16 @@ def find_places(model: StructuralModel, directions: set[str]) -> tuple[Place, ..
     moving = sorted(dof for dof in free if dof.direction in directions & set(TRANSLATIONS))
     if not moving:
         raise InputError(f"no node of the model '{model.name}' moves in {', '.join(sorted(directions))}")
-    places = [Place(location={"nodes": [dof.node]}, ends=(dof,)) for dof in moving]
+    grounded = {
+        part.nodes[1]: part.name for part in model.parts if part.kind == "spring" and tuple(part.nodes[:1]) == (0,)
+    }
+    places = [
+        Place(
+            location={"nodes": [dof.node]} | ({"springs": [grounded[dof.node]]} if dof.node in grounded else {}),
+            ends=(dof,),
+        )
+        for dof in moving
+    ]
     for part in model.parts:
         if part.kind == "spring" and len(part.nodes) == 2 and 0 not in part.nodes:
             for direction in sorted(directions):
