@@ -92,7 +92,8 @@ def decide(bench: Bench, progress: Progress) -> Decision:
 def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
     """Take a further cause, if it explains much."""
     good, before = goodness(bench, ranking.best), goodness(bench, found.final)
-    if not ranking.fits or gain_over(ranking.best, found.final) <= SECOND_NATS or good.score >= before.score:
+    gain = min(gain_over(ranking.best, found.final), gain_over(ranking.best, found.null))
+    if not ranking.fits or gain <= SECOND_NATS or good.score >= before.score:
         return None
     verdict = EXPLAINED if good.is_good else UNEXPLAINED
     return replace(found, verdict=verdict, final=ranking.best, further=(*found.further, ranking), good=good)

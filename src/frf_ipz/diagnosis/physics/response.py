@@ -166,7 +166,7 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
     Modes
         By ascending frequency.
     """
-    squares, vectors = _solved(basis, change)
+    squares, vectors = solved(basis, change)
     largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
     vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
     n_rigid = basis.modes.n_rigid
@@ -199,11 +199,25 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
     )
 
 
-def _solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
-    """Squared frequencies and modes, mass-normalised.
+def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
+    """Solve for the modes of a modified structure.
 
     The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
     times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    change : Change
+        What is different in mass and stiffness.
+
+    Returns
+    -------
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2.
+    vectors : (q, q) array
+        Columns are modes in terms of the basis, mass-normalised.
     """
     stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
     mass = np.eye(len(stiffness))
@@ -215,8 +229,8 @@ def _solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
     except linalg.LinAlgError:
         squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
         return squares, vectors
-    inverses = np.maximum(inverses[::-1], np.finfo(float).tiny)
-    return 1 / inverses - shift, vectors[:, ::-1] / np.sqrt(inverses)
+    inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
+    return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
 
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
