@@ -162,6 +162,40 @@ def enrich(basis: Basis, change: Change) -> Basis:
     return _joined(basis, np.hstack(shapes))
 
 
+def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
+    """Solve for the modes of a modified structure.
+
+    The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
+    times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    change : Change
+        What is different in mass and stiffness.
+
+    Returns
+    -------
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2.
+    vectors : (q, q) array
+        Columns are modes in terms of the basis, mass-normalised.
+    """
+    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
+    mass = np.eye(len(stiffness))
+    if change.mass is not None:
+        mass = mass + basis.project(change.mass)
+    shift = basis.modes.shift
+    try:
+        inverses, vectors = linalg.eigh(mass, stiffness + shift * mass, check_finite=False)
+    except linalg.LinAlgError:
+        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
+        return squares, vectors
+    inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
+    return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
+
+
 def sensor_rows(model: StructuralModel, nodes: Sequence[int], directions: Sequence[str]) -> IntArray:
     """Rows of all DOFs of some nodes in given directions.
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.layout import motion_row
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
@@ -197,40 +198,6 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
         vectors=turned,
         viscous=viscous,
     )
-
-
-def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
-    """Solve for the modes of a modified structure.
-
-    The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
-    times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
-
-    Parameters
-    ----------
-    basis : Basis
-        Coordinates.
-    change : Change
-        What is different in mass and stiffness.
-
-    Returns
-    -------
-    squares : (q,) array
-        Squared frequencies, ascending, (rad/s)^2.
-    vectors : (q, q) array
-        Columns are modes in terms of the basis, mass-normalised.
-    """
-    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
-    mass = np.eye(len(stiffness))
-    if change.mass is not None:
-        mass = mass + basis.project(change.mass)
-    shift = basis.modes.shift
-    try:
-        inverses, vectors = linalg.eigh(mass, stiffness + shift * mass, check_finite=False)
-    except linalg.LinAlgError:
-        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
-        return squares, vectors
-    inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
-    return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
 
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
