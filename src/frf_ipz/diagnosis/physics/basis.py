@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.arrays import FloatArray
 from frf_ipz.fe.assembly import apply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
 from frf_ipz.fe.factorization import DENSE_ORDER
@@ -194,25 +194,6 @@ def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
         return squares, vectors
     inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
     return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
-
-
-def sensor_rows(model: StructuralModel, nodes: Sequence[int], directions: Sequence[str]) -> IntArray:
-    """Rows of all DOFs of some nodes in given directions.
-
-    Parameters
-    ----------
-    model : StructuralModel
-        The model.
-    nodes, directions : sequence
-        Of the same length.
-
-    Returns
-    -------
-    (n,) int array
-        Rows.
-    """
-    places = {(dof.node, dof.direction): row for dof, row in model.places.items()}
-    return np.array([places[key] for key in zip(nodes, directions, strict=True)], dtype=np.int64)
 
 
 def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:
