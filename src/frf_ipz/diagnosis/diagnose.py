@@ -29,7 +29,7 @@ from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
-from frf_ipz.diagnosis.judging.verdict import FOUND_NATS
+from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
@@ -124,7 +124,7 @@ def diagnose(
         held=source.held,
         ambiguity=_ambiguity(bench, found, weighed),
         gates=gates,
-        detectability=detectable_sizes(bench, found.null, FOUND_NATS),
+        detectability=detectable_sizes(bench, found.null, LIMITS[bench.kind].found_nats),
         curves=proof.curves,
         numbers=_numbers(found),
         warnings=tuple(gate.statement for gate in gates if not gate.passed),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
-from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, SECOND_NATS, STRONG_NATS, Goodness, goodness
+from frf_ipz.diagnosis.judging.verdict import LIMITS, SECOND_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.search import NEARLY_RIGHT, Ranking, fit_nothing, search
 
@@ -72,7 +72,8 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     one = Decision(
         verdict=EXPLAINED, null=null, final=best, ranking=ranking, further=(), good=good, null_good=null_good
     )
-    if null_good.is_good and (gain_over(best, null) < FOUND_NATS or not is_significant(best, -1)):
+    needed = LIMITS[bench.kind].found_nats
+    if null_good.is_good and (gain_over(best, null) < needed or not is_significant(best, -1)):
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
     if good.is_good:
         return one
@@ -80,7 +81,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     second = search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good)
     two = _beside(bench, one, second)
     if two is None:
-        return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > FOUND_NATS else null)
+        return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > needed else null)
     is_far = two.good.misfit > NEARLY_RIGHT
     if two.verdict == EXPLAINED or is_far or gain_over(second.best, second.base) < STRONG_NATS:
         return two

@@ -32,15 +32,20 @@ class Limits:
         Sum of squares over the number of values.
     piece : float
         The same of an FRF over a piece of the band.
+    found_nats : float
+        Evidence over the nominal model's that a first finding needs.
     """
 
     misfit: float
     piece: float
+    found_nats: float = FOUND_NATS
 
 
-LIMITS = {  # by what was looked at: the coarser its noise is known, the wider
+# By what was looked at: the coarser its noise is known, the wider. With nothing missing, 50 tests with a hammer reached
+# 0.8, 1.8 and 19 nats, 16 with a shaker 1.95, 5.2 and 54 nats; pulls reached 43 (seeds 30101 to 30120, 40001 to 40047).
+LIMITS = {
     "hammer": Limits(misfit=1.1, piece=3.0),
-    "random": Limits(misfit=2.2, piece=6.5),  # the noise of a shaker's force is known as white only
+    "random": Limits(misfit=2.2, piece=6.5, found_nats=80.0),  # the noise of a shaker's force is known as white only
     "frf": Limits(misfit=1.6, piece=4.5),
 }
 
