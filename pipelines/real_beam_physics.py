@@ -8,8 +8,8 @@ nothing is left to explain. What `CASES` states of a test is not searched for: h
 which scales nobody knows, and how far resonances drift from file to file, as a variance of the FRFs.
 
 What to expect of the free beam: its model, within these tolerances, lies on the measured FRFs; the gain of the driving
-point, 99 / 99, is 15 % below those of the other eight, and what is left beside the drift is largest below 100 Hz, where the
-beam moves in its cords.
+point, 99 / 99, is 15 % below those of the other eight, and what is left beside the drift is largest below 100 Hz,
+where the beam moves in its cords.
 """
 
 from __future__ import annotations
