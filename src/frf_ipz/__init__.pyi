@@ -31,6 +31,7 @@ from .frf import FrfSet as FrfSet
 from .identification.fit import fit_modes as fit_modes
 from .identification.fit import fit_residues as fit_residues
 from .identification.options import FitOptions as FitOptions
+from .identification.results.gains import gains_against as gains_against
 from .ingest.estimate import estimate_frfs as estimate_frfs
 from .ingest.options import IngestOptions as IngestOptions
 from .ingest.test_file import read_test as read_test

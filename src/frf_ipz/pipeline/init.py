@@ -174,12 +174,16 @@ test = "test.toml"
 [fit]
 # band_hz = [10.0, 700.0]       # the band that carries signal where it is left out
 # exclude_hz = [[49.5, 50.5]]   # mains
+# delay = true                  # channels may be late
 
 # [diagnose]                    # say what the model left out
 # apply = true                  # and let it flow on into updating and prediction
 
 [predict]
 points = []                     # points of interest, never measured, e.g. ["49:+z"]
+
+# [export]
+# ensemble = 50                 # members of the posterior, for robust design
 """
 
 
