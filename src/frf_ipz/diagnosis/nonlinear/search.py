@@ -56,6 +56,7 @@ MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains t
 CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
 MOST_APART = 2.0  # mean square of what blows disagree in besides the law, over the expected one
 NEARLY = 0.02  # or so much of the response is left
+MOST_LEFT = 0.05  # of the response, whatever the noise is: with more, laws and places were taken for each other
 FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
@@ -254,6 +255,8 @@ def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) ->
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
+    if part > MOST_LEFT:
+        return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
     return ""
 
 
