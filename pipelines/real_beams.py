@@ -1,6 +1,6 @@
 """Predict what was left out of real measurements, and compare.
 
-python pipelines/real_beams.py TEST.toml MODEL.toml LOW_HZ HIGH_HZ [output|input] [NODE ...]
+python pipelines/real_beams.py TEST.toml MODEL.toml LOW_HZ HIGH_HZ {output,input} [NODE ...]
 
 Every FRF with one of the nodes as its output (or input) is kept from the fit and the update, and predicted. Without
 nodes each one is left out in turn. Scales of real channels are rarely known, so X_A and dB are given after one real
@@ -9,6 +9,7 @@ factor for what was left out, which is stated; X_S needs none.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -23,7 +24,10 @@ from frf_ipz.updating.parameters import structural_basis
 def main(test: Path, model: Path, band_hz: tuple[float, float], side: str, nodes: list[int]) -> None:
     frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(test), frf_ipz.IngestOptions()).frfs
     full = frf_ipz.read_model(model)
-    for node in nodes or sorted({_node(label, side) for label in frfs.labels}):
+    there = sorted({_node(label, side) for label in frfs.labels})
+    if set(nodes) - set(there):
+        sys.exit(f"no FRF has its {side} at node {min(set(nodes) - set(there))}; there are nodes {there}")
+    for node in nodes or there:
         table = leave_out(frfs, full, band_hz, side, node)
         print(f"\n{side} at node {node} left out\n", table.to_string(float_format="{:.4g}".format))
 
@@ -67,6 +71,17 @@ def _node(label: frf_ipz.FrfLabel, side: str) -> int:
     return label.output_dof.node if side == "output" else label.input_dof.node
 
 
+def read_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("test", type=Path, help="test.toml of the measurement")
+    parser.add_argument("model", type=Path, help="model.toml of its FE model")
+    parser.add_argument("low_hz", type=float)
+    parser.add_argument("high_hz", type=float)
+    parser.add_argument("side", choices=["output", "input"], help="leave out sensors or struck points")
+    parser.add_argument("nodes", type=int, nargs="*", help="each in turn where none is given")
+    return parser.parse_args()
+
+
 if __name__ == "__main__":
-    test, model, low, high, side, *nodes = sys.argv[1:]
-    main(Path(test), Path(model), (float(low), float(high)), side, [int(node) for node in nodes])
+    given = read_arguments()
+    main(given.test, given.model, (given.low_hz, given.high_hz), given.side, given.nodes)
