@@ -6,6 +6,7 @@ checks them here and nowhere else. A dataclass refuses unknown keys by ``__pydan
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
 
+CLASS_NAME = re.compile(r"(?:[A-Z][a-z]+){2,}")  # a dataclass that is a branch of a union
 FIRST_TO_SAY = ("unexpected_keyword_argument", "missing")
 
 Options = TypeVar("Options")
@@ -129,7 +131,8 @@ def _key_text(part: int | str) -> str:
 
 def _is_type_tag(part: int | str) -> bool:
     """Pydantic names the branch of a union in the location, which is no key of the user's."""
-    return isinstance(part, str) and ("[" in part or part in {"str", "float", "int", "bool", "constrained-str"})
+    plain = {"str", "float", "int", "bool", "constrained-str"}
+    return isinstance(part, str) and ("[" in part or part in plain or bool(CLASS_NAME.fullmatch(part)))
 
 
 def _explain(error: Any, options_type: type) -> str:

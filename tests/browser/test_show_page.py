@@ -3,12 +3,14 @@
 import pyarrow.parquet as pq
 import pytest
 
+from frf_ipz.identification.options import PinnedPole
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.pipeline.run import run_pipeline
 from served_page import PLACE_OF_NODE, Page
 
 pytestmark = pytest.mark.browser
 STRUCK_HZ = 284.95  # the third mode of the demo
+ADDED_HZ = 150.0  # between two modes
 NEAR = 0.02  # relative: a pole within this of a struck one is the struck one
 
 PLACE_OF_POLE = """
@@ -77,6 +79,21 @@ def test_a_pole_struck_in_the_diagram_is_gone_and_stays_gone_on_the_command_line
     page.click("#choices [aria-label*='a cable that rings']")
     page.wait_for_results(before)
     assert is_there(demo / "out", STRUCK_HZ)
+
+
+def test_a_pole_is_added_with_its_reason(page, demo):
+    page.write("#pole-form", hz=f"{ADDED_HZ:g}", why="seen by eye")
+    before = page.stamp()
+    page.click("#pole-form [value=pin]")
+    page.wait_for_results(before)
+    assert read_pipeline(demo / "pipeline.toml").file.fit.pinned == (PinnedPole(hz=ADDED_HZ, why="seen by eye"),)
+    assert "pinned at 150 Hz: seen by eye" in page.find("#choices").text
+    (row,) = page.browser.find_elements("xpath", "//tr[td='seen by eye']")
+    assert "pinned" in row.text
+    before = page.stamp()
+    page.click("#choices [aria-label*='seen by eye']")
+    page.wait_for_results(before)
+    assert read_pipeline(demo / "pipeline.toml").file.fit.pin_hz == ()
 
 
 def test_every_mode_of_the_fit_has_a_handle_to_click(page, demo):

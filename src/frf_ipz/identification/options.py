@@ -28,6 +28,24 @@ class StruckPole:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PinnedPole:
+    """A frequency at which the user says that a mode is.
+
+    Parameters
+    ----------
+    hz : float
+        The frequency.
+    why : str
+        The reason, kept with the results; may be empty.
+    """
+
+    __pydantic_config__ = STRICT
+
+    hz: float
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FitOptions:
     """How poles, residues and zeros are fitted.
 
@@ -37,8 +55,8 @@ class FitOptions:
         Band to fit; where it is left out, the whole of the measured band that carries signal.
     exclude_hz : tuple of pairs of float
         Stretches to leave out: mains lines, a band of low coherence.
-    pin_hz : tuple of float
-        Frequencies at which a mode must be: never dropped.
+    pin_hz : tuple of float or PinnedPole
+        Frequencies at which a mode must be, with or without the reason: never dropped.
     strike : tuple of StruckPole
         Poles that are no modes, and why.
     modes : str
@@ -61,7 +79,7 @@ class FitOptions:
 
     band_hz: tuple[float, float] | None = None
     exclude_hz: tuple[tuple[float, float], ...] = ()
-    pin_hz: tuple[float, ...] = ()
+    pin_hz: tuple[float | PinnedPole, ...] = ()
     strike: tuple[StruckPole, ...] = ()
     modes: Literal["complex", "real"] = "complex"
     max_order: int | None = None
@@ -76,3 +94,8 @@ class FitOptions:
         for name in self.gain:
             if self.gain.count(name) > 1:
                 raise InputError(f"gain names the channel '{name}' twice; name it once")
+
+    @property
+    def pinned(self) -> tuple[PinnedPole, ...]:
+        """Every pin with its reason, which is empty for a plain number."""
+        return tuple(one if isinstance(one, PinnedPole) else PinnedPole(hz=one) for one in self.pin_hz)

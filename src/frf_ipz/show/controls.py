@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 USES = {"checks": "as the checks say", "keep": "keep", "drop": "drop"}
-REASON = (
-    '<label>because <input name="why" type="text" size="26" maxlength="200" placeholder="mains, a cable …"></label>'
-)
+REASON = '<label>because <input name="why" type="text" size="26" maxlength="200" placeholder="seen, a cable …"></label>'
 
 
 def choices_panel(
@@ -98,9 +96,9 @@ def pole_controls(fit: ModalFit) -> str:
     poles = fit.model.poles[: fit.n_modes]
     rows = "".join(
         f'<tr><th scope="row">{place + 1}</th><td class="n">{number(hertz, 6)}</td><td class="n">{percent(ratio)}</td>'
-        f"<td>{_button('Pin', {'kind': 'pin', 'hz': hertz})} "
-        f'<button type="button" data-fill="{hertz:.8g}" aria-label="Strike the mode at {number(hertz, 5)} Hz">Strike …'
-        f'</button> <button type="button" data-mode="{place}">Show shape</button></td></tr>'
+        f'<td><button type="button" data-fill="{hertz:.8g}" '
+        f'aria-label="Pin or strike the mode at {number(hertz, 5)} Hz">Pin or strike …</button> '
+        f'<button type="button" data-mode="{place}">Show shape</button></td></tr>'
         for place, (hertz, ratio) in enumerate(zip(natural_frequency_hz(poles), damping_ratio(poles), strict=True))
     )
     return (
@@ -108,9 +106,10 @@ def pole_controls(fit: ModalFit) -> str:
         '<button type="button" data-drag="zoom" aria-pressed="true">Drag: zoom</button> '
         '<button type="button" data-drag="select" aria-pressed="false">Drag: choose a stretch</button></p>'
         '<form id="pole-form"><h3>A pole</h3>'
-        "<p>Click one in the diagram (triangles: the modes of the fit), or write its frequency.</p>"
+        "<p>Click one in the diagram (triangles: the modes of the fit), or write its frequency. A pin where there is "
+        "no pole adds one.</p>"
         '<p><label>at <input name="hz" type="number" step="any" min="0" required> Hz</label> '
-        f'<button name="kind" value="pin">Pin: a mode is here</button></p><p>{REASON} '
+        f'{REASON}</p><p><button name="kind" value="pin">Pin: a mode is here</button> '
         '<button name="kind" value="strike">Strike: no mode</button></p></form>'
         '<form id="band-form"><h3>A stretch of lines</h3><p>Drag over it in the diagram, or write its ends.</p>'
         '<p><label>from <input name="low_hz" type="number" step="any" min="0" required></label> '
@@ -242,7 +241,10 @@ def _fit_entries(choices: PipelineFile) -> list[tuple[str, dict[str, object]]]:
     if fit.band_hz is not None:
         low, high = fit.band_hz
         entries.append((f"fit {low:g} to {high:g} Hz only", {"kind": "band", "on": False}))
-    entries += [(f"a mode pinned at {hz:g} Hz", {"kind": "pin", "hz": hz, "on": False}) for hz in fit.pin_hz]
+    entries += [
+        (f"a mode pinned at {one.hz:g} Hz{one.why and ': '}{one.why}", {"kind": "pin", "hz": one.hz, "on": False})
+        for one in fit.pinned
+    ]
     entries += [
         (f"the pole at {one.hz:g} Hz struck: {one.why}", {"kind": "strike", "hz": one.hz, "on": False})
         for one in fit.strike

@@ -7,7 +7,7 @@ import pytest
 
 from frf_ipz.errors import InputError, NumericalError
 from frf_ipz.identification.fit import fit_modes, fit_residues
-from frf_ipz.identification.options import FitOptions, StruckPole
+from frf_ipz.identification.options import FitOptions, PinnedPole, StruckPole
 from frf_ipz.quantities import FrfQuantity
 from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
 
@@ -237,8 +237,9 @@ def test_pinned_and_struck_poles():
     assert "the shaker's own resonance" in set(fit.decisions["reason"])
     nowhere = fit_modes(frfs, FitOptions(strike=(StruckPole(hz=250.0, why="a lamp"),)))
     assert list(nowhere.decisions.loc[nowhere.decisions["action"] == "struck", "reason"]) == ["a lamp"]
-    pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0,)))
-    assert "pinned" in set(pinned.decisions["action"])
+    pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0, PinnedPole(hz=430.0, why="seen by eye"))))
+    is_pinned = pinned.decisions["action"] == "pinned"
+    assert list(pinned.decisions.loc[is_pinned, "reason"]) == ["the user says that a mode is here", "seen by eye"]
     assert count(poles_of(pinned), truth.poles)[0] == len(SPREAD)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from frf_ipz.errors import InputError
+from frf_ipz.identification.options import PinnedPole
 from frf_ipz.show.changes.registry import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 
@@ -56,6 +57,43 @@ def test_a_strike_takes_the_pin_beside_it_away_and_a_pin_the_strike():
 
 def test_a_pin_replaces_the_one_beside_it():
     assert fit_of(after({"kind": "pin", "hz": 101.0}, {"kind": "pin", "hz": 250.0})).pin_hz == (101.0, 250.0)
+
+
+def test_a_pin_keeps_its_reason_and_needs_none():
+    text = after({"kind": "pin", "hz": 250.0, "why": " seen  by eye "}, {"kind": "pin", "hz": 400.0})
+    assert tomllib.loads(text)["fit"]["pin_hz"] == [100.0, {"hz": 250.0, "why": "seen by eye"}, 400.0]
+    assert fit_of(text).pinned == (
+        PinnedPole(hz=100.0),
+        PinnedPole(hz=250.0, why="seen by eye"),
+        PinnedPole(hz=400.0),
+    )
+    assert "# sure of it" in text
+
+
+@pytest.mark.parametrize(
+    "wish", [{"kind": "pin", "hz": 250.0, "on": False}, {"kind": "strike", "hz": 251.0, "why": "no"}]
+)
+def test_a_pin_with_a_reason_is_taken_away_as_any_other(wish):
+    assert fit_of(after({"kind": "pin", "hz": 250.0, "why": "seen"}, wish)).pin_hz == (100.0,)
+
+
+def test_pins_written_as_tables_are_kept_as_tables():
+    text = '[pipeline]\ntest = "t.toml"\n[[fit.pin_hz]]\nhz = 60.0 # loud\n'
+    changed = after({"kind": "pin", "hz": 143.2}, text=text)
+    assert fit_of(changed).pinned == (PinnedPole(hz=60.0), PinnedPole(hz=143.2))
+    assert "# loud" in changed
+
+
+@pytest.mark.parametrize(
+    ("pin", "said"),
+    [
+        ('{ hz = 1.0, wy = "x" }', r"'fit\.pin_hz\.\[1\]\.wy'.*unknown key 'wy'; did you mean 'why'"),
+        ('"high"', r"'fit\.pin_hz\.\[1\]'.*number"),
+    ],
+)
+def test_a_pin_that_is_none_is_named(pin, said):
+    with pytest.raises(InputError, match=said):
+        parse(f'[pipeline]\ntest = "t.toml"\n[fit]\npin_hz = [{pin}]\n', PATH)
 
 
 def test_taking_back_takes_only_that_entry():

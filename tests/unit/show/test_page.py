@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.identification.options import FitOptions, StruckPole
+from frf_ipz.identification.options import FitOptions, PinnedPole, StruckPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.prediction.options import PredictOptions
@@ -20,7 +20,10 @@ CHOICES = PipelineFile(
     pipeline=PipelineSection(test="test.toml"),
     ingest=IngestOptions(keep=("hits/p_02.csv",), drop=("hits/p_04.csv",), hide=("9:+z",)),
     fit=FitOptions(
-        band_hz=(5.0, 500.0), pin_hz=(20.0,), strike=(StruckPole(hz=50.0, why="mains"),), exclude_hz=((49.0, 51.0),)
+        band_hz=(5.0, 500.0),
+        pin_hz=(20.0, PinnedPole(hz=33.0, why="seen by eye")),
+        strike=(StruckPole(hz=50.0, why="mains"),),
+        exclude_hz=((49.0, 51.0),),
     ),
     reduce=ReduceOptions(dofs=("3:z", "5:z")),
     predict=PredictOptions(points=("3:+z",)),
@@ -40,7 +43,8 @@ def test_all_that_is_chosen_is_listed_with_a_button_each():
     panel = choices_panel(CHOICES, "", "", "")
     for text in (
         "5 to 500 Hz",
-        "pinned at 20",
+        "pinned at 20 Hz ",
+        "pinned at 33 Hz: seen by eye",
         "at 50 Hz struck: mains",
         "49 to 51 Hz left out",
         "p_02",
@@ -50,7 +54,7 @@ def test_all_that_is_chosen_is_listed_with_a_button_each():
         "reduced to 3:z 5:z",
     ):
         assert text in panel
-    assert panel.count("data-change=") == 9
+    assert panel.count("data-change=") == 10
 
 
 def test_forms_stand_beside_the_pictures(run):
@@ -90,7 +94,8 @@ def test_choices_and_handles_are_drawn_into_the_diagram(run):
     diagram = next(one for one in pictures_of(page_sections(run, None)) if one.name == "stabilisation")
     marked = with_choices(diagram, run.fit, CHOICES.fit)
     names = {trace["name"]: trace for trace in marked.traces}
-    assert np.nanmax(names["pinned"]["x"]) == np.nanmin(names["pinned"]["x"]) == 20.0
+    assert sorted(set(names["pinned"]["x"][np.isfinite(names["pinned"]["x"])])) == [20.0, 33.0]
+    assert names["pinned"]["text"][::3] == ["pinned", "pinned: seen by eye"]
     assert names["struck"]["text"][0] == "struck: mains"
     assert [(shape["x0"], shape["x1"]) for shape in marked.layout["shapes"]] == [(49.0, 51.0)]
     handles = names["handles of the modes"]
@@ -98,7 +103,7 @@ def test_choices_and_handles_are_drawn_into_the_diagram(run):
     low, high = marked.layout["yaxis"]["range"]
     assert all(low < place < diagram.layout["yaxis"]["range"][0] for place in handles["y"])
     assert high == diagram.layout["yaxis"]["range"][1]
-    assert "1 pinned, 1 struck, 1 stretch left out" in marked.note
+    assert "2 pinned, 1 struck, 1 stretch left out" in marked.note
 
 
 def test_without_a_pipeline_file_there_is_the_report_alone(run):

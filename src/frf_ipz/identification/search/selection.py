@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray
 from frf_ipz.identification.likelihood.compression import Weighted
 from frf_ipz.identification.likelihood.refinement import Refined, refine
 from frf_ipz.identification.search.artefacts import find_artefacts
@@ -26,6 +26,7 @@ UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole s
 SURE = 6.0  # times what the BIC demands: such a pole stays even where its damping is uncertain
 NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or struck
 MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
+SAID = "the user says that a mode is here"  # of a pin without a reason
 NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
 
 
@@ -60,7 +61,7 @@ class _Search:
 
     data: Weighted
     terms: SmoothTerms
-    pinned: FloatArray
+    pinned: tuple[tuple[float, str], ...]
     struck: tuple[tuple[float, str], ...]
     trusted: bool
     drift: Drift | None = None
@@ -97,9 +98,8 @@ def select_modes(
         The fit.
     """
     struck = tuple((one.hz, one.why) for one in options.strike)
-    search = _Search(
-        data=data, terms=terms, pinned=np.array(options.pin_hz, float), struck=struck, trusted=noise_is_known
-    )
+    pinned = tuple((one.hz, one.why) for one in options.pinned)
+    search = _Search(data=data, terms=terms, pinned=pinned, struck=struck, trusted=noise_is_known)
     poles = _pin(search, _strike(search, poles))
     search.trusted = True  # first poles are not many, and errors of strong modes are not told yet
     fit, judgement = _skim(search, refine(data, poles, terms, iterations=ROUGH_ITERATIONS))
@@ -143,18 +143,18 @@ def _is_near(pole: complex, hz: float) -> bool:
 
 
 def _pin(search: _Search, poles: ComplexArray) -> ComplexArray:
-    for hz in search.pinned:
+    for hz, why in search.pinned:
         omega = 2 * np.pi * hz
         if not any(_is_near(pole, hz) for pole in poles):
             poles = np.append(poles, omega * complex(-0.01, 1.0))
-        search.note(np.array([omega * 1j]), "pinned", ["the user says that a mode is here"])
+        search.note(np.array([omega * 1j]), "pinned", [why or SAID])
     return poles
 
 
 def _protected(search: _Search, poles: ComplexArray) -> BoolArray:
     """Mark the pole nearest to each pinned frequency."""
     kept = np.zeros(len(poles), bool)
-    for hz in search.pinned:
+    for hz, _ in search.pinned:
         if len(poles):
             kept[np.argmin(np.abs(natural_frequency_hz(poles) - hz))] = True
     return kept

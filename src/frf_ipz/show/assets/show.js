@@ -2,7 +2,7 @@
 // What the user does on the page becomes a change of pipeline.toml; the server runs what depends on it, and the page follows.
 (() => {
   const FIELDS = {
-    pin: ["hz"], strike: ["hz", "why"], leave: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
+    pin: ["hz", "why"], strike: ["hz", "why"], leave: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
     sensor: ["dof"], retain: ["dofs"],
   };
   const MEMORY = "frf-ipz-show";

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import tomlkit
+from tomlkit.items import AoT
 
 from frf_ipz.errors import InputError
 from frf_ipz.show.changes.change import append_entry, remove_entries, section_of
@@ -14,6 +16,7 @@ from frf_ipz.toml_files import STRICT
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
+    from tomlkit.items import InlineTable
 
 SAME = 1e-5  # relative: frequencies closer than this are one and the same entry
 NEAR = 0.02  # relative: a pin and a strike closer than this are about the same pole
@@ -28,6 +31,8 @@ class Pin:
     ----------
     hz : float
         Hz.
+    why : str
+        The reason, kept with the results; a plain number is written where it is empty.
     on : bool
         False to take the wish back.
     """
@@ -35,6 +40,7 @@ class Pin:
     __pydantic_config__ = STRICT
 
     hz: float
+    why: str = ""
     on: bool = True
 
     def apply(self, document: TOMLDocument) -> None:
@@ -45,12 +51,13 @@ class Pin:
         document : TOMLDocument
             The file; changed in place.
         """
-        hz = _frequency("hz", self.hz)
+        hz, why = _frequency("hz", self.hz), " ".join(self.why.split())
         fit = section_of(document, "fit")
-        remove_entries(fit, "pin_hz", lambda entry: math.isclose(entry, hz, rel_tol=NEAR if self.on else SAME))
+        near = NEAR if self.on else SAME
+        remove_entries(fit, "pin_hz", lambda entry: math.isclose(_pinned_hz(entry), hz, rel_tol=near))
         if self.on:
             remove_entries(fit, "strike", lambda entry: math.isclose(entry["hz"], hz, rel_tol=NEAR))
-            append_entry(fit, "pin_hz", hz)
+            append_entry(fit, "pin_hz", _with_reason(hz, why) if why or isinstance(fit.get("pin_hz"), AoT) else hz)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,10 +99,8 @@ class Strike:
         fit = section_of(document, "fit")
         remove_entries(fit, "strike", lambda entry: math.isclose(entry["hz"], hz, rel_tol=SAME))
         if self.on:
-            remove_entries(fit, "pin_hz", lambda entry: math.isclose(entry, hz, rel_tol=NEAR))
-            entry = tomlkit.inline_table()
-            entry.update({"hz": hz, "why": why})
-            append_entry(fit, "strike", entry)
+            remove_entries(fit, "pin_hz", lambda entry: math.isclose(_pinned_hz(entry), hz, rel_tol=NEAR))
+            append_entry(fit, "strike", _with_reason(hz, why))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,6 +171,16 @@ class Band:
             fit["band_hz"] = [_frequency("low_hz", self.low_hz, least=0.0), _frequency("high_hz", self.high_hz)]
         else:
             fit.pop("band_hz", None)
+
+
+def _with_reason(hz: float, why: str) -> InlineTable:
+    entry = tomlkit.inline_table()
+    entry.update({"hz": hz, "why": why})
+    return entry
+
+
+def _pinned_hz(entry: float | Mapping[str, float]) -> float:
+    return entry["hz"] if isinstance(entry, Mapping) else entry
 
 
 def _frequency(name: str, value: float, *, least: float | None = None) -> float:

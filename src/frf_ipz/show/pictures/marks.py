@@ -45,16 +45,17 @@ def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Pictur
     low, high = picture.layout["yaxis"]["range"]
     strikes = [struck.hz for struck in options.strike]
     reasons = [f"struck: {struck.why}" for struck in options.strike]
+    pins = [f"pinned: {one.why}" if one.why else "pinned" for one in options.pinned]
     hertz = natural_frequency_hz(fit.model.poles[: fit.n_modes])
     strip = STRIP * (high - low)
     place, hover = np.full(len(hertz), low - strip / 2), "%{x:.6g} Hz: click to pin or strike"
     traces = [
         markers(hertz, place, "handles of the modes", "@ink", hover=hover, symbol="triangle-up", size=12),
-        *_uprights("pinned", "@good", options.pin_hz, ["pinned"] * len(options.pin_hz), (low, high)),
+        *_uprights("pinned", "@good", [one.hz for one in options.pinned], pins, (low, high)),
         *_uprights("struck", "@bad", strikes, reasons, (low, high)),
     ]
     shapes = [outline(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
-    words = [f"{len(options.pin_hz)} pinned"] if options.pin_hz else []
+    words = [f"{len(pins)} pinned"] if pins else []
     words += [f"{len(strikes)} struck"] if strikes else []
     left_out = counted(len(options.exclude_hz), "stretch", "stretches")
     words += [f"{left_out} left out (shaded)"] if options.exclude_hz else []
