@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,6 +11,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.frf import FrfSet
 
+ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and short when written out
 SENTENCES = {
     "consistent": "Nothing significant is missing from the model.",
     "unexplained": "Something is missing from the model that nothing in the catalogue explains.",
@@ -33,24 +35,43 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     statements = [plain_signs(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
-    part = "A part of it is explained: " if statements else ""
-    return SENTENCES.get(diagnosis.verdict, ""), part + " ".join(statements)
+    more = [f"A part of it is explained: {' '.join(statements)}"] if statements else []
+    return SENTENCES.get(diagnosis.verdict, ""), " ".join([*more, *place_of_mismatch(diagnosis)])
+
+
+def place_of_mismatch(diagnosis: Diagnosis) -> list[str]:
+    """Say where the cause of what nothing explains seems to sit.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The result of the diagnosis.
+
+    Returns
+    -------
+    list of str
+        A sentence; empty where there is no such place.
+    """
+    if diagnosis.verdict != "unexplained" or not diagnosis.mismatch_location:
+        return []
+    named = [f"{key.removesuffix('s')} {items}" for key, items in _in_words(diagnosis.mismatch_location)]
+    return [f"An unknown force at {' and '.join(named)} would explain most of the mismatch."]
 
 
 def plain_signs(text: str) -> str:
-    """Set typographic signs in a text that was made for a terminal.
+    """Set signs and numbers as people write them in a text that was made for a terminal.
 
     Parameters
     ----------
     text : str
-        With ``+-``.
+        With ``+-`` and numbers such as ``1.2e+02``.
 
     Returns
     -------
     str
-        With the sign for plus or minus.
+        With the sign for plus or minus, and 120.
     """
-    return text.replace("+-", "±")
+    return ROUNDED.sub(lambda found: f"{float(found[0]):.0f}", text.replace("+-", "±"))
 
 
 def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -101,6 +122,33 @@ def marked_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, 
         for node in _nodes(finding.location, frfs):
             marked[node] = text
     return marked
+
+
+def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
+    """Give the nodes at which the cause of what nothing explains seems to sit.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis, optional
+        The result of the diagnosis.
+    frfs : FrfSet, optional
+        Says where channels sit.
+
+    Returns
+    -------
+    dict of int to str
+        What is known of each node.
+    """
+    if diagnosis is None or diagnosis.verdict != "unexplained":
+        return {}
+    return dict.fromkeys(_nodes(diagnosis.mismatch_location, frfs), "place of the mismatch: the cause is unknown")
+
+
+def _in_words(location: Mapping[str, object]) -> list[tuple[str, str]]:
+    return [
+        (key, ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value))
+        for key, value in location.items()
+    ]
 
 
 def _nodes(location: Mapping[str, object], frfs: FrfSet | None) -> list[int]:

@@ -35,6 +35,8 @@ class Marks:
         DOFs of the test, and points of interest.
     missing : mapping of int to str
         Nodes at which something is missing in the model, and what.
+    mismatch : mapping of int to str
+        Nodes at which the cause of what nothing explains seems to sit, and what is said of them.
     across : str
         Title of the axis under a structure that is a line.
     """
@@ -43,6 +45,7 @@ class Marks:
     blows: Sequence[Dof] = ()
     points: Sequence[Dof] = ()
     missing: Mapping[int, str] = field(default_factory=dict)
+    mismatch: Mapping[int, str] = field(default_factory=dict)
     across: str = "Position, m"
 
 
@@ -71,7 +74,8 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
     traces += _dofs("sensor", marks.sensors, positions, place, is_line=is_line)
     traces += _dofs("blow", marks.blows, positions, place, is_line=is_line)
     traces += _dofs("point", marks.points, positions, place, is_line=is_line)
-    traces += _missing(marks.missing, positions, place)
+    traces += _rings("missing in the model", marks.missing, positions, place)
+    traces += _rings("place of the mismatch", marks.mismatch, positions, place)
     note = "" if geometry is not None else "No model gives positions: the nodes stand in a row by their numbers."
     return Picture(
         name="structure",
@@ -188,13 +192,16 @@ def _joined(group: Sequence[tuple[float, str]]) -> tuple[float, str]:
     return (group[0][0] + group[-1][0]) / 2, " ".join(shown)
 
 
-def _missing(missing: Mapping[int, str], positions: FloatArray, place: Mapping[int, int]) -> list[Trace]:
-    known = {place[node]: text for node, text in missing.items() if node in place}
+RINGS = {"missing in the model": "circle-open", "place of the mismatch": "diamond-open"}
+
+
+def _rings(name: str, nodes: Mapping[int, str], positions: FloatArray, place: Mapping[int, int]) -> list[Trace]:
+    known = {place[node]: text for node, text in nodes.items() if node in place}
     if not known:
         return []
     rows, texts = list(known), list(known.values())
-    style: Trace = {"symbol": "circle-open", "size": 30, "text": texts, "hover": "%{text}"}
-    return [markers(positions[rows, 0], positions[rows, 1], "missing in the model", "@bad", **style)]
+    style: Trace = {"symbol": RINGS[name], "size": 30, "text": texts, "hover": "%{text}"}
+    return [markers(positions[rows, 0], positions[rows, 1], name, "@bad", **style)]
 
 
 def _layout(across_title: str, positions: FloatArray, *, is_line: bool) -> dict[str, Any]:
@@ -217,4 +224,5 @@ def _in_words(geometry: Geometry | None, marks: Marks) -> str:
     for name, dofs in (("sensors", marks.sensors), ("blows", marks.blows), ("points of interest", marks.points)):
         parts += [f"{name} at {listed([str(dof) for dof in dofs])}"] if dofs else []
     parts += [f"{text} at node {node}" for node, text in list(marks.missing.items())[:4]]
+    parts += [f"{text} (node {node})" for node, text in list(marks.mismatch.items())[:4]]
     return "; ".join(parts)

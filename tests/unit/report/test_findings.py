@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from frf_ipz.report.contents import read_contents
-from frf_ipz.report.findings import marked_nodes, said_in_short, verdict_of
+from frf_ipz.report.findings import marked_nodes, mismatch_nodes, plain_signs, said_in_short, verdict_of
 from frf_ipz.report.picture import Picture
 from frf_ipz.report.sections.diagnosis.section import build
+from frf_ipz.report.sections.overview import build as overview
 from frf_ipz.report.table import Table
 from synthetic_run import synthetic_folder
 
@@ -55,6 +57,26 @@ def test_places_of_findings_are_marked_on_the_structure(run):
     assert marked_nodes(run.diagnosis, run.frfs) == {nodes[1]: "added mass", sensor: "sensor gain"}
 
 
+def test_the_place_of_what_nothing_explains_is_told_and_marked(run):
+    diagnosis = replace(run.diagnosis, verdict="unexplained", findings=(), mismatch_location={"nodes": [4]})
+    sentence = "An unknown force at node 4 would explain most of the mismatch."
+    assert verdict_of(diagnosis)[1] == sentence
+    assert sentence in build(replace(run, diagnosis=diagnosis)).notes
+    assert list(mismatch_nodes(diagnosis, run.frfs)) == [4]
+    drawn = next(one for one in overview(replace(run, diagnosis=diagnosis)).blocks if isinstance(one, Picture))
+    (ring,) = [one for one in drawn.traces if one["name"] == "place of the mismatch"]
+    assert "(node 4)" in drawn.alt
+    at = run.geometry.coordinates_m[run.geometry.nodes == 4, 0]
+    np.testing.assert_array_equal(ring["x"], at)
+
+
+@pytest.mark.parametrize(("verdict", "location"), [("explained", {"nodes": [4]}), ("unexplained", {})])
+def test_no_place_is_marked_where_there_is_none(run, verdict, location):
+    diagnosis = replace(run.diagnosis, verdict=verdict, mismatch_location=location)
+    assert mismatch_nodes(diagnosis, run.frfs) == {}
+    assert "unknown force" not in verdict_of(diagnosis)[1]
+
+
 def test_elements_are_marked_at_all_their_nodes(run):
     finding = replace(run.diagnosis.findings[0], location={"elements": (3, 5)})
     assert sorted(marked_nodes(replace(run.diagnosis, findings=(finding,)), run.frfs)) == [3, 4, 5, 6]
@@ -65,6 +87,17 @@ def test_the_map_holds_misfits_before_and_after(run):
     assert before["z"].shape == (len(run.labels), 3)
     assert 10 ** before["z"][1, 0] == pytest.approx(15.0, rel=1e-12)
     assert (after["z"] == 0).all()
+
+
+def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
+    worse = replace(run.diagnosis.alternatives[0], log_evidence_gain=-5.0)
+    bars = block(replace(run, diagnosis=replace(run.diagnosis, alternatives=(worse,))), Picture, "ranking").traces[0]
+    assert bars["text"][-1] == "worse than without"
+    assert bars["text"][0].startswith("p = ")
+
+
+def test_numbers_of_a_few_digits_are_written_out():
+    assert plain_signs("658.1 N/m (+- 1.2e+02) and 4.2e+09 N/m") == "658.1 N/m (± 120) and 4.2e+09 N/m"
 
 
 def test_findings_come_before_alternatives(run):

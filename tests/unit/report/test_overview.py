@@ -59,3 +59,13 @@ def test_unknown_gains_are_fitted_before_errors_are_stated(run):
     refit = html(scaled).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
     assert float(refit) <= 1.5 * float(figure)
     assert "unknown gains are fitted" in html(scaled)
+
+
+def test_a_worst_target_that_came_no_closer_stands_apart_from_the_others(run):
+    assert "right within" in verdict(run)[0]
+    assert "worst" not in verdict(run)[0]
+    worse = run.updated.after.copy()
+    worse[0] *= 1.5
+    said = verdict(replace(run, updated=replace(run.updated, after=worse)))[0]
+    assert "in the median (before: " in said
+    assert ", but the worst 50 %" in said

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 MOST_POLES = 40
+AT_REST = 1e-6  # of the highest frequency: a double pole at 0 is found to about the root of machine precision
 
 
 def build(run: RunContents) -> Section | None:
@@ -57,9 +58,10 @@ def _poles(model: StateSpaceModel) -> Table:
         with np.errstate(divide="ignore"):  # a pole at 0 of a sampled model is a pure delay
             values = np.log(values) / model.dt
     values = values[(values.imag >= 0) & np.isfinite(values)]
+    top = float(natural_frequency_hz(values).max(initial=0.0))
     values = values[np.argsort(np.abs(values))][:MOST_POLES]
     rows = [
-        [number(float(hertz), 6), f"{number(100 * float(ratio), 4)}"]
+        ["0 (rigid body)", ""] if hertz < AT_REST * top else [number(float(hertz), 6), number(100 * float(ratio), 4)]
         for hertz, ratio in zip(natural_frequency_hz(values), damping_ratio(values), strict=True)
     ]
     return Table(caption="Poles of the state space", columns=("frequency, Hz", "damping ratio, %"), rows=rows)

@@ -65,7 +65,8 @@ def build(run: RunContents) -> Section | None:
 
 def _notable(parts: pd.DataFrame) -> list[str]:
     stretches = notable_changes(parts) if len(parts) else ()
-    more = [f"{len(stretches) - MOST_STRETCHES} more stretches differ"] if len(stretches) > MOST_STRETCHES else []
+    others = len(stretches) - MOST_STRETCHES
+    more = [f"and {counted(others, 'further stretch', 'further stretches')}"] if others > 0 else []
     return [*stretches[:MOST_STRETCHES], *more]
 
 

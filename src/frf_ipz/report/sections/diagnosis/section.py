@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate
-from frf_ipz.report.findings import plain_signs, verdict_of
+from frf_ipz.report.findings import place_of_mismatch, plain_signs, verdict_of
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
 from frf_ipz.report.sections.diagnosis.levels import level_pictures
@@ -56,7 +56,11 @@ def build(run: RunContents) -> Section | None:
         blocks.append(_curves(diagnosis.curves, run.band_hz, _explained(diagnosis)))
     blocks += _gates(diagnosis) + level_pictures(run.levels, run.labels, run.band_hz) + _detectability(diagnosis)
     lead = plain_signs(diagnosis.statement) or verdict_of(diagnosis)[0]
-    notes = (*[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity], *diagnosis.warnings)
+    notes = (
+        *place_of_mismatch(diagnosis),
+        *[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity],
+        *diagnosis.warnings,
+    )
     return Section(anchor="diagnosis", title="Diagnosis", lead=lead, blocks=tuple(blocks), notes=notes)
 
 
@@ -133,7 +137,7 @@ def _ranking(diagnosis: Diagnosis) -> Picture:
         "customdata": gains,
         "y": names,
         "marker": {"color": ["@updated"] * found + ["@muted/0.7"] * (len(ranked) - found)},
-        "text": [f"p {_chance(one)}" for one in ranked],
+        "text": [f"p {_chance(one)}" if one.log_evidence_gain > 0 else "worse than without" for one in ranked],
         "textposition": "auto",
         "insidetextfont": {"color": "@paper"},
         "hovertemplate": "%{y}: gains %{customdata:.6g} nats, %{text}<extra></extra>",
