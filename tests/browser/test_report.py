@@ -13,6 +13,10 @@ pytestmark = pytest.mark.browser
 
 PATIENCE_S = 60.0  # on a machine that does much else
 ARROW_RIGHT, TAB, ENTER, SPACE = "\ue014", "\ue004", "\ue007", " "  # as WebDriver writes them
+LONG = f"<details><table>{'<tr><td>1</td></tr>' * 50}</table></details>"
+ROWS_AND_STATE = (
+    "return [...document.querySelectorAll('main details')].map((d) => [d.querySelectorAll('tr').length, d.open])"
+)
 DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm"
 
 
@@ -169,6 +173,18 @@ def test_printing_gives_pages_with_every_picture(page):
     assert pdf.startswith(b"%PDF")
     assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page /") >= 5
     assert errors(page) == []
+
+
+def test_short_tables_are_printed_and_long_ones_stay_with_the_screen(page):
+    page.execute_script("document.querySelector('main details').insertAdjacentHTML('afterend', arguments[0])", LONG)
+    page.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    printed = page.execute_script(ROWS_AND_STATE)
+    page.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert [50, False] in printed
+    short = [is_open for count, is_open in printed if count < 10]
+    assert short
+    assert all(short)
+    assert not any(is_open for _, is_open in page.execute_script(ROWS_AND_STATE))
 
 
 def test_no_picture_is_wider_than_the_paper_when_printed(page):

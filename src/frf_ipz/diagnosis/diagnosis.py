@@ -131,9 +131,9 @@ class Linearised:
         """For which motions a linear model may stand for the law."""
         low, high = (f"{self.stiffness_each[end]:.3g} N/m and {self.damping_each[end]:.3g} N s/m" for end in (0, -1))
         return (
-            f"About the blows of this test it acts as {self.stiffness:.3g} N/m and {self.damping:.3g} N s/m, which is "
-            f"what a linear model has. It holds between {low} (weakest blow, {self.motion_rms_m[0]:.3g} m "
-            f"rms) and {high} (strongest, {self.motion_rms_m[-1]:.3g} m rms)."
+            f"At the level of this test, a spring of {self.stiffness:.3g} N/m and a damper of {self.damping:.3g} N s/m "
+            f"stand for it in a linear model; with the level they go from {low} (weakest blow, "
+            f"{self.motion_rms_m[0]:.3g} m rms) to {high} (strongest, {self.motion_rms_m[-1]:.3g} m rms)."
         )
 
 

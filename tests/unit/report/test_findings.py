@@ -96,7 +96,9 @@ def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
     assert bars["text"][0].startswith("p = ")
 
 
-def test_numbers_of_a_few_digits_are_written_out():
+def test_numbers_of_a_few_digits_are_written_out(run):
+    diagnosis = replace(run.diagnosis, warnings=("Blows differ, 3.28e+03 times more than noise.",))
+    assert "Blows differ, 3280 times more than noise." in build(replace(run, diagnosis=diagnosis)).notes
     assert plain_signs("658.1 N/m (+- 1.2e+02) and 4.2e+09 N/m") == "658.1 N/m (± 120) and 4.2e+09 N/m"
 
 

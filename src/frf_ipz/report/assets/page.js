@@ -16,6 +16,7 @@
     },
   };
   const PRINT_WIDTH = 680;
+  const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
   const decoded = [];
   const drawn = new Map();
   let theme = "light";
@@ -205,7 +206,10 @@
     screenTheme = theme;
     theme = "light";
     root.dataset.theme = "light";
-    document.querySelectorAll("main details").forEach((list) => { list.dataset.was = list.open; list.open = true; });
+    document.querySelectorAll("main details").forEach((list) => {
+      list.dataset.was = list.open;
+      list.open = list.open || list.querySelectorAll("tr").length <= MOST_ROWS_TO_OPEN;
+    });
     Object.keys(page.pictures).forEach(draw);
   }
 

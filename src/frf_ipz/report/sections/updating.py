@@ -12,7 +12,7 @@ from frf_ipz.report.along_structure import LEAST_EIGENVALUE, picture_of_parts, p
 from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
 from frf_ipz.report.section import Section
 from frf_ipz.report.table import Table
-from frf_ipz.report.wording import counted, number, percent
+from frf_ipz.report.wording import counted, number, percent, small_percent
 from frf_ipz.updating.along_structure import notable_changes
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def _target_table(rows: Sequence[Target]) -> Table:
             number(row.before_hz, 6),
             number(row.after_hz, 6),
             percent(row.before),
-            percent(row.after),
+            small_percent(row.after),
             *[number(100 * value, 3) for value in (row.measured_damping, row.before_damping, row.after_damping)],
         ]
         for row in rows

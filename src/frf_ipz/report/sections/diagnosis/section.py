@@ -59,7 +59,7 @@ def build(run: RunContents) -> Section | None:
     notes = (
         *place_of_mismatch(diagnosis),
         *[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity],
-        *diagnosis.warnings,
+        *map(plain_signs, diagnosis.warnings),
     )
     return Section(anchor="diagnosis", title="Diagnosis", lead=lead, blocks=tuple(blocks), notes=notes)
 
@@ -294,7 +294,13 @@ def _gates(diagnosis: Diagnosis) -> list[Block]:
         [gate.limit for gate in gates], names, "limit", "@bad", symbol="line-ns-open", size=22, hover="limit %{x}"
     )
     rows = [
-        [gate.name, number(gate.value, 3), number(gate.limit, 3), "passed" if gate.passed else "failed", gate.statement]
+        [
+            gate.name,
+            number(gate.value, 3),
+            number(gate.limit, 3),
+            "passed" if gate.passed else "failed",
+            plain_signs(gate.statement),
+        ]
         for gate in diagnosis.gates
     ]
     return [
