@@ -128,7 +128,7 @@ def _ranking(diagnosis: Diagnosis) -> Picture:
     found = len(diagnosis.findings)
     gains = np.array([one.log_evidence_gain for one in ranked])
     close = len(gains) > 1 and gains.min() > CLOSE * gains.max()
-    sizes = gains.max() - gains if close else gains
+    sizes = gains.max() - gains if close else np.maximum(gains, 0.0)  # of losses, however large, there is no bar
     wide = close or bool(gains.max() > WIDE * max(float(np.median(gains)), 1.0))
     bars: Trace = {
         "type": "bar",
