@@ -112,7 +112,7 @@ def _target_table(rows: Sequence[Target]) -> Table:
             number(row.before_hz, 6),
             number(row.after_hz, 6),
             percent(row.before),
-            small_percent(row.after),
+            small_percent(row.after).replace(" ", "\u00a0"),
             *[number(100 * value, 3) for value in (row.measured_damping, row.before_damping, row.after_damping)],
         ]
         for row in rows

@@ -25,6 +25,7 @@ MOST_ALTERNATIVES = 15
 POWERS = {"exponentformat": "power", "dtick": 1}
 SURELY_NOT = 1e-6  # a probability below is written as being below
 CLOSE = 0.8  # of the best evidence: where all explanations gain more, their differences are drawn
+SLIVER = 1e-4  # of the longest bar: all that is drawn of a loss, so that its text still shows
 WIDE = 30.0  # ratio of evidences from which their axis is logarithmic
 
 
@@ -128,7 +129,7 @@ def _ranking(diagnosis: Diagnosis) -> Picture:
     found = len(diagnosis.findings)
     gains = np.array([one.log_evidence_gain for one in ranked])
     close = len(gains) > 1 and gains.min() > CLOSE * gains.max()
-    sizes = gains.max() - gains if close else np.maximum(gains, 0.0)  # of losses, however large, there is no bar
+    sizes = gains.max() - gains if close else np.maximum(gains, SLIVER * gains.max())
     wide = close or bool(gains.max() > WIDE * max(float(np.median(gains)), 1.0))
     bars: Trace = {
         "type": "bar",
