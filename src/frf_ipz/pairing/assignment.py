@@ -15,7 +15,10 @@ from frf_ipz.pairing.poles import PolePairing, pair_poles
 from frf_ipz.pairing.zeros import ZeroPairing, in_band, pair_zeros
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.arrays import FloatArray
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.matching import Matching
     from frf_ipz.structure import ReducedModel
@@ -49,7 +52,7 @@ def pair(fit: ModalFit, model: ReducedModel) -> Pairs:
         zeros = model_zeros(model, fit.labels[frf])
         matched = pair_zeros(fit, frf, zeros, known, float(found.gains[frf]))
         rows += _zero_rows(fit, frf, zeros, matched, known)
-    return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, found)))
+    return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, found, fit.labels)))
 
 
 def _pole_rows(fit: ModalFit, model: ModelPoles, found: PolePairing) -> list[Pair]:
@@ -164,7 +167,7 @@ def _paired_logs(rows: list[Pair]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _warnings(rows: list[Pair], found: PolePairing) -> list[str]:
+def _warnings(rows: list[Pair], found: PolePairing, labels: Sequence[FrfLabel]) -> list[str]:
     texts = []
     poles = [row for row in rows if row.kind == "pole"]
     lonely = [row for row in poles if row.verdict is Verdict.MISSING_IN_MODEL]
@@ -177,5 +180,6 @@ def _warnings(rows: list[Pair], found: PolePairing) -> list[str]:
         texts.append("no measured mode could be paired: check units, materials and supports of the FE model")
     flipped = np.flatnonzero(found.gains < 0)
     if len(flipped):
-        texts.append(f"the polarity of FRF {', '.join(str(frf + 1) for frf in flipped)} is opposite to the model's")
+        names = ", ".join(str(labels[frf]) for frf in flipped)
+        texts.append(f"the polarity of {names} is opposite to the model's")
     return texts

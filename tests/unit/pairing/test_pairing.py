@@ -116,7 +116,7 @@ def test_a_polarity_that_is_turned_is_found_and_said():
     turned = tuple(replace(one, output_dof=replace(one.output_dof, sign=-1)) for one in LABELS)
     fit = measured(model, LABELS)
     pairs = pair(replace(fit, labels=turned), model)
-    assert "polarity of FRF 1, 2" in pairs.warnings[-1]
+    assert f"polarity of {turned[0]}, {turned[1]} is opposite" in pairs.warnings[-1]
     assert all(row.verdict is Verdict.PAIRED for row in pairs.rows)
 
 

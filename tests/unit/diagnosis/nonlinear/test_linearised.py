@@ -44,6 +44,16 @@ def test_friction_is_the_damper_of_harmonic_balance():
     assert_allclose(found.damping_each, 4 * 0.5 / (np.pi * AMPLITUDES[::-1] * OMEGA), rtol=0.01)
 
 
+def test_a_spring_never_gives_energy():
+    dying = swinging(CubicStiffness(), 1e12)
+    time = np.arange(4000) * 2 * np.pi / OMEGA / 1000
+    dying.motion = AMPLITUDES[:, None] * np.exp(-20.0 * time) * np.cos(OMEGA * time)
+    dying.velocity = np.gradient(dying.motion, time, axis=1)
+    found = linearise(dying, SimpleNamespace(places=[NODE]))
+    assert (found.damping_each >= 0).all()
+    assert (found.stiffness_each > 0).all()
+
+
 def test_a_blow_that_did_not_move_the_place_says_nothing():
     still = swinging(CubicStiffness(), 1e12)
     still.motion[1], still.velocity[1] = 0.0, 0.0
