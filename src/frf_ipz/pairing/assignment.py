@@ -180,6 +180,6 @@ def _warnings(rows: list[Pair], found: PolePairing, labels: Sequence[FrfLabel]) 
         texts.append("no measured mode could be paired: check units, materials and supports of the FE model")
     flipped = np.flatnonzero(found.gains < 0)
     if len(flipped):
-        names = ", ".join(str(labels[frf]) for frf in flipped)
+        names = ", ".join(str(labels[int(frf)]) for frf in flipped)
         texts.append(f"the polarity of {names} is opposite to the model's")
     return texts
