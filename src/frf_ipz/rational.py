@@ -171,7 +171,7 @@ def damping_ratio(poles: ComplexArray) -> FloatArray:
         1 is critical.
     """
     modulus = np.abs(poles)
-    return -poles.real / np.where(modulus > 0, modulus, 1.0)
+    return -poles.real / np.where((modulus > 0) & np.isfinite(modulus), modulus, 1.0)
 
 
 def poles_from(natural_frequency: FloatArray, damping: FloatArray) -> ComplexArray:

@@ -111,7 +111,8 @@ def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effe
     for index, label in enumerate(frfs.labels):
         output, struck = _channels(label)
         if output in change.channels:
-            factors[:, index] /= change.channels[output](frfs.s)
+            shown = change.channels[output](frfs.s)
+            factors[:, index] /= np.where(shown == 0, 1.0, shown)  # a high-pass has nothing to show at 0 Hz
         if struck in change.channels:
             factors[:, index] *= change.channels[struck](frfs.s)
     return replace(

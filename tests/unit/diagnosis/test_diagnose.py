@@ -10,6 +10,7 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.finding import Finding
 from frf_ipz.diagnosis.judging.figures import prove
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -142,6 +143,16 @@ def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):
     assert np.allclose(right.values[:, 0], frfs.values[:, 0], rtol=0, atol=0)
     assert np.allclose(right.values[:, 1] * -1.2, frfs.values[:, 1], rtol=SEEN, atol=0)
     assert np.allclose(right.variance[:, 1] * 1.44, frfs.variance[:, 1], rtol=2 * SEEN, atol=0)
+
+
+def test_a_line_that_a_highpass_does_not_show_stays_as_it_is(nominal, with_mass):
+    frfs = measured(nominal)
+    from_zero = replace(frfs, frequency_hz=frfs.frequency_hz - frfs.frequency_hz[0])
+    highpass = Finding(effect="sensor_dynamics", key=("acc_2", "highpass"), values=(20.0,))
+    right = apply_to_frfs(from_zero, replace(with_mass, findings=(highpass,)))
+    s = from_zero.s[1:]
+    assert np.array_equal(right.values[0], from_zero.values[0])
+    assert np.allclose(right.values[1:, 1], from_zero.values[1:, 1] * (s + 40 * np.pi) / s, rtol=1e-9, atol=0)
 
 
 def test_gains_that_nobody_knows_are_not_diagnosed(nominal):

@@ -121,7 +121,7 @@ def coherence(measured: Measured) -> Gate:
     Gate
         Of the worst FRF.
     """
-    share = np.median(_noise(measured) / np.maximum(measured.size, np.finfo(float).tiny) ** 2, axis=0)
+    share = np.median(_noise(measured) / np.maximum(measured.size**2, np.finfo(float).tiny), axis=0)
     worst = int(np.argmax(share))
     value = float(share[worst])
     statement = (

@@ -247,7 +247,7 @@ def _resonances(line_sets: list[_Lines], decay: float) -> Resonances:
     level = np.zeros(len(lines.frequency_hz))
     for one in line_sets:
         size = np.abs(one.values) ** 2
-        summed = (size / np.median(size, axis=0)).sum(1)
+        summed = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
         level += np.interp(lines.frequency_hz, one.frequency_hz, summed)
     return find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
 

@@ -53,7 +53,9 @@ class Measured:
     def certain(self) -> ComplexArray:
         """The values without what may be noise: what multiplies relative errors, or these would follow the noise."""
         noise = np.array([np.diag(covariance).real for covariance in self.covariance]).T
-        return np.asarray(self.values * np.maximum(1 - NOISY * noise / np.maximum(self.size, 1e-300) ** 2, 0.0))
+        return np.asarray(
+            self.values * np.maximum(1 - NOISY * noise / np.maximum(self.size**2, np.finfo(float).tiny), 0.0)
+        )
 
     @property
     def frequency_hz(self) -> FloatArray:

@@ -34,6 +34,8 @@ FARTHEST = 0.1  # of a squared frequency: more is no small correction
 LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
 MATTERS = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
+ROUNDING = 1e-9  # of a diagonal entry: what a sum of squares of many lines is exact to
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fit:
@@ -358,7 +360,7 @@ def same_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArr
 def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: bool) -> Fit:
     n_parameters = len(hypothesis.parameters)
     curvature = slope.curvature(hypothesis)
-    lower = linalg.cholesky(curvature, lower=True, check_finite=False)
+    lower = _factor(curvature)
     log_volume = float(np.sum(np.log(np.diag(lower))))
     log_prior = -sum(np.log(cause.n_places) for cause in hypothesis.causes)
     log_prior -= float(np.sum(np.log(hypothesis.high - hypothesis.low)))
@@ -376,3 +378,14 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
         converged=converged,
         freedom=float(np.sum(1 - (rows[:, n_parameters:] ** 2).sum(0))),
     )
+
+
+def _factor(curvature: FloatArray) -> FloatArray:
+    """Lower Cholesky factor of the curvature, which rounding may have left without one."""
+    try:
+        return np.asarray(linalg.cholesky(curvature, lower=True, check_finite=False))
+    except linalg.LinAlgError:
+        size = np.sqrt(np.diag(curvature))
+        values, vectors = linalg.eigh(curvature / np.outer(size, size), check_finite=False)
+        mended = (vectors * np.maximum(values, ROUNDING)) @ vectors.T * np.outer(size, size)
+        return np.asarray(linalg.cholesky(mended + np.diag(ROUNDING * size**2), lower=True, check_finite=False))

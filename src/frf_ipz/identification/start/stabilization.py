@@ -106,7 +106,7 @@ class _Circle:
         return np.asarray(self.rate * (s.imag - self.origin))
 
     def poles(self, z: ComplexArray) -> ComplexArray:
-        with np.errstate(divide="ignore"):  # a root at z = 0 is a pole at infinity, which no band holds
+        with np.errstate(divide="ignore", invalid="ignore"):  # z = 0 is a pole at infinity, which no band holds
             return np.asarray(-np.log(z) / self.rate + 1j * self.origin + self.sigma)
 
 
