@@ -113,7 +113,8 @@ def _modes(modes: pd.DataFrame) -> Picture:
         traces=tuple(traces),
         layout=panels(x, Axis(title="Change of frequency, %"), Axis(title="Damping ratio, %", scale="log")),
         note="From the FRF of each single blow, in the sensor that shows the mode best; the change is that from the "
-        "strongest blow. A line that leaves the level by more than its bars is a mode that is not linear.",
+        "strongest blow. A line that leaves the level by more than its bars is a mode that is not linear. "
+        "A mode that a single blow shows on a few lines only, or not by itself, is left out.",
         table=_table(modes),
         height_px=460,
     )
