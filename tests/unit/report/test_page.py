@@ -164,6 +164,18 @@ def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
         np.testing.assert_allclose([magnitude.max(), magnitude.min()], [exact.max(), exact.min()], rtol=1e-6, atol=0)
 
 
+def test_the_regularisation_of_an_update_is_shown(tmp_path):
+    folder = synthetic_folder()
+    update = folder.results["update"]
+    history = update.history.assign(**{"std: a factor on the stiffness": 0.0525, "std: damping of each mode": np.nan})
+    folder.results["update"] = replace(update, history=history)
+    text = page_of(folder, tmp_path)
+    phase = history["phase"].iloc[0]
+    assert f"regularisation of the {phase}" in text
+    assert "a factor on the stiffness 0.0525" in text
+    assert "damping of each mode nan" not in text
+
+
 def test_a_fit_without_modes_and_an_update_without_targets_make_a_page(tmp_path):
     folder = synthetic_folder()
     results = folder.results

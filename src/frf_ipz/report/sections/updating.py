@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
     from frf_ipz.updating.updated_model import UpdatedModel
 
+SCALE = "std: "  # how columns of the history begin that say how wide a part of the prior is
 MOST_MODES = 30
 MOST_STRETCHES = 5  # named one by one
 FEW_STEPS = 20  # iterations that are each named on the axis
@@ -59,7 +60,7 @@ def build(run: RunContents) -> Section | None:
         lead=lead,
         blocks=tuple(pictures),
         notes=(*[f"Cannot be met: {text}" for text in updated.unmet], *_notable(parts), *updated.warnings),
-        choices=() if reduced is None else reduced.choices,
+        choices=(*(() if reduced is None else reduced.choices), *_regularisation(updated)),
     )
 
 
@@ -152,6 +153,22 @@ def _convergence(updated: UpdatedModel) -> Picture:
         ),
         height_px=320,
     )
+
+
+def _regularisation(updated: UpdatedModel) -> list[str]:
+    """How far each phase was free to go, as the data themselves ask for: one text a phase."""
+    texts = []
+    scales = [name for name in updated.history.columns if str(name).startswith(SCALE)]
+    for phase, rows in updated.history.groupby("phase", sort=False) if scales else ():
+        last = {str(name): float(rows[name].iloc[-1]) for name in scales}
+        said = ", ".join(
+            f"{name.removeprefix(SCALE)} {number(value)}" for name, value in last.items() if np.isfinite(value)
+        )
+        if said:
+            texts.append(
+                f"regularisation of the {phase} by likelihood and discrepancy principle, standard deviations: {said}"
+            )
+    return texts
 
 
 def _of_modes(updated: UpdatedModel) -> Picture:
