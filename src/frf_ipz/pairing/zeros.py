@@ -146,9 +146,8 @@ def measured_slope_sign(model: PoleResidueModel, frf: int, power: int, zeros: Co
         -1, 0 or 1.
     """
     residues = model.residues[:, frf]
-    poles = np.concatenate([model.poles, model.conjugates])
     residues = np.concatenate([residues, residues[model.poles.imag > 0].conj()])
-    slope = -(residues / (zeros[:, None] - poles) ** 2).sum(axis=1)
+    slope = -(residues / (zeros[:, None] - model.all_poles) ** 2).sum(axis=1)
     scaled = zeros / model.scale_rad_s
     for exponent, coefficient in zip(model.powers, model.coefficients[:, frf], strict=True):
         slope += coefficient * exponent * scaled ** (exponent - 1) / model.scale_rad_s

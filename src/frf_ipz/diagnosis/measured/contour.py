@@ -22,7 +22,6 @@ WIDEST = 0.02  # sigma over omega: lightly damped things that nobody knows of ar
 MOST_POINTS = 260
 COARSE_WIDTH = 0.06  # sigma over omega of the contour for searching: no peak is missed
 COARSE_STEP = 0.8
-LEAST_PROMINENCE = 1.5  # of a peak over the valleys beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

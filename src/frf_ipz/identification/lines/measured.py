@@ -21,7 +21,6 @@ LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a v
 MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: few structures are linear to less
 FEWEST_LINES = 16  # what the fit of a single mode needs
 SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
-DEAD = 1.3  # times the noise, in mean square: an FRF below carries none
 SHARED_SPREAD = 0.15  # rms relative deviation of weights from profile times gain that costs less than 3 % of efficiency
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.report.contents import RunContents
 
-NOISE_FROM = {"recordings": "the scatter between blows", "misfit": "the misfit of the fit"}
 MOST_ELLIPSES = 400  # drawn; more would make the page large
 
 
