@@ -16,10 +16,10 @@ from .export.design_files import load_ensemble as load_ensemble
 from .export.design_files import read_weights as read_weights
 from .export.measured_frd import measured_frd as measured_frd
 from .export.options import ExportOptions as ExportOptions
-from .export.state_space import load_state_space as load_state_space
-from .export.state_space import save_state_space as save_state_space
 from .export.state_space import to_ensemble as to_ensemble
 from .export.state_space import to_state_space as to_state_space
+from .export.state_space_files import load_state_space as load_state_space
+from .export.state_space_files import save_state_space as save_state_space
 from .export.uncertainty import uncertainty_weights as uncertainty_weights
 from .fe.eigen import solve_modes as solve_modes
 from .fe.model_file import read_model as read_model

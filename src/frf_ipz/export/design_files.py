@@ -13,7 +13,8 @@ import numpy as np
 from scipy.io import loadmat, savemat
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.export.state_space import ARRAYS, NAMES, UNREADABLE, StateSpaceModel, shapes, text_in, to_control
+from frf_ipz.export.state_space import ARRAYS, StateSpaceModel, shapes, to_control
+from frf_ipz.export.state_space_files import UNREADABLE, names_for_matlab, names_in
 from frf_ipz.export.uncertainty import UncertaintyWeights
 
 if TYPE_CHECKING:
@@ -47,8 +48,7 @@ def save_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
             "[export] ensemble = 0"
         )
     values: dict[str, Any] = {name: np.stack([getattr(model, name) for model in models], axis=-1) for name in ARRAYS}
-    texts = {name: np.array(getattr(models[0], name), dtype=object) for name in NAMES}
-    savemat(path, {**values, **texts, "dt": models[0].dt})
+    savemat(path, {**values, **names_for_matlab(models[0]), "dt": models[0].dt})
 
 
 def read_ensemble(path: Path) -> tuple[StateSpaceModel, ...]:
@@ -71,7 +71,7 @@ def read_ensemble(path: Path) -> tuple[StateSpaceModel, ...]:
     """
     try:
         values = loadmat(path)
-        fields: dict[str, Any] = {name: tuple(str(text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
+        fields: dict[str, Any] = {**names_in(values)}
         arrays = {
             name: np.moveaxis(np.array(values[name], float).reshape(*shape, -1), -1, 0)
             for name, shape in shapes(fields).items()

@@ -1,27 +1,22 @@
-"""The controller-ready model: a state space with named and dimensioned inputs and outputs, and its files.
+"""The controller-ready model: a state space with named and dimensioned inputs and outputs.
 
 Sits after updating. Actuators are inputs; sensors and points of interest are outputs.
 """
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.io import loadmat, savemat
-from scipy.io.matlab import MatReadError
 
 from frf_ipz.arrays import FloatArray, require_shape
-from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
 from frf_ipz.export.realization import condensed, first_order, in_modes, sampled, with_delays
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     import control
 
@@ -30,8 +25,6 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
-SUFFIXES = (".json", ".mat")
-UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
 ARRAYS = ("A", "B", "C", "D")
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
@@ -189,104 +182,6 @@ def to_control(model: StateSpaceModel) -> control.StateSpace:
     )
 
 
-def save_state_space(model: StateSpaceModel, path: Path) -> None:
-    """Write a state space as JSON or for MATLAB.
-
-    Parameters
-    ----------
-    model : StateSpaceModel
-        The state space.
-    path : Path
-        Ends in ``.json`` or ``.mat``.
-
-    Raises
-    ------
-    InputError
-        If it ends in something else.
-    OSError
-        If it cannot be written.
-    """
-    values: dict[str, Any] = asdict(model)
-    if _suffix(path) == ".json":
-        plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
-        path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
-    else:
-        texts = {name: np.array(values[name], dtype=object) for name in NAMES}
-        savemat(path, {**values, **texts})
-
-
-def read_state_space(path: Path) -> StateSpaceModel:
-    """Read what `save_state_space` wrote.
-
-    Parameters
-    ----------
-    path : Path
-        Ends in ``.json`` or ``.mat``.
-
-    Returns
-    -------
-    StateSpaceModel
-        Equal to what was written, to the last bit.
-
-    Raises
-    ------
-    InputError
-        If the file is no such state space.
-    """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
-        names = {name: tuple(str(text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
-        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in shapes(names).items()}
-        dt = float(np.squeeze(values["dt"]))
-    except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
-        raise FileFormatError(
-            path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
-        ) from error
-    fields: dict[str, Any] = {**arrays, **names, "dt": dt}
-    return StateSpaceModel(**fields)
-
-
-def load_state_space(path: Path) -> control.StateSpace:
-    """Read a state space for python-control.
-
-    Parameters
-    ----------
-    path : Path
-        Ends in ``.json`` or ``.mat``.
-
-    Returns
-    -------
-    control.StateSpace
-        With the names of inputs, outputs and states.
-
-    Raises
-    ------
-    InputError
-        If the file is no such state space.
-    """
-    return to_control(read_state_space(path))
-
-
-def save_reduced_model(model: ReducedModel, path: Path) -> None:
-    """Write the matrices of a reduced model.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The model.
-    path : Path
-        An ``.npz`` file: ``M``, ``B``, ``K`` and ``dofs`` (labels of the rows).
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-    names = np.array([dof.name for dof in model.dofs])
-    with path.open("wb") as stream:
-        np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
-
-
 def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
@@ -311,14 +206,3 @@ def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> State
         input_units=ports.input_units,
         output_units=tuple(output.unit for output in outputs),
     )
-
-
-def _suffix(path: Path) -> str:
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"{path}: a state space is written as .json or .mat; give one of these endings")
-    return path.suffix
-
-
-def text_in(text: object) -> object:
-    """Take a text out of the cell that MATLAB files keep it in."""
-    return text.item() if isinstance(text, np.ndarray) and text.size else ("" if isinstance(text, np.ndarray) else text)

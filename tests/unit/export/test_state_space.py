@@ -13,15 +13,8 @@ from chains import chain, label, updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.options import ExportOptions
-from frf_ipz.export.state_space import (
-    load_state_space,
-    read_state_space,
-    save_reduced_model,
-    save_state_space,
-    to_control,
-    to_ensemble,
-    to_state_space,
-)
+from frf_ipz.export.state_space import to_control, to_ensemble, to_state_space
+from frf_ipz.export.state_space_files import load_state_space, read_state_space, save_reduced_model, save_state_space
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of

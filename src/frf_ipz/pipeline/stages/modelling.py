@@ -12,7 +12,7 @@ from frf_ipz.arrays import ComplexArray
 from frf_ipz.diagnosis.parameters import diagnosed_basis
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
-from frf_ipz.export.state_space import save_reduced_model
+from frf_ipz.export.state_space_files import save_reduced_model
 from frf_ipz.export.tables import write_table
 from frf_ipz.fe.reduction import reduce_model
 from frf_ipz.pairing.assignment import pair as pair_roots

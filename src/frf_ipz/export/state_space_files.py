@@ -1,0 +1,173 @@
+"""Files of the controller-ready model: JSON, MATLAB, and the matrices of the reduced model.
+
+Nothing is lost on the way: what is read equals what was written, to the last bit.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.io import loadmat, savemat
+from scipy.io.matlab import MatReadError
+
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, shapes, to_control
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import control
+
+    from frf_ipz.structure import ReducedModel
+
+SUFFIXES = (".json", ".mat")
+UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
+
+
+def save_state_space(model: StateSpaceModel, path: Path) -> None:
+    """Write a state space as JSON or for MATLAB.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+        The state space.
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Raises
+    ------
+    InputError
+        If it ends in something else.
+    OSError
+        If it cannot be written.
+    """
+    values: dict[str, Any] = asdict(model)
+    if _suffix(path) == ".json":
+        plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
+        path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+    else:
+        savemat(path, {**values, **names_for_matlab(model)})
+
+
+def read_state_space(path: Path) -> StateSpaceModel:
+    """Read what `save_state_space` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Returns
+    -------
+    StateSpaceModel
+        Equal to what was written, to the last bit.
+
+    Raises
+    ------
+    InputError
+        If the file is no such state space.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
+        names = names_in(values)
+        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in shapes(names).items()}
+        dt = float(np.squeeze(values["dt"]))
+    except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
+        ) from error
+    fields: dict[str, Any] = {**arrays, **names, "dt": dt}
+    return StateSpaceModel(**fields)
+
+
+def load_state_space(path: Path) -> control.StateSpace:
+    """Read a state space for python-control.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.json`` or ``.mat``.
+
+    Returns
+    -------
+    control.StateSpace
+        With the names of inputs, outputs and states.
+
+    Raises
+    ------
+    InputError
+        If the file is no such state space.
+    """
+    return to_control(read_state_space(path))
+
+
+def save_reduced_model(model: ReducedModel, path: Path) -> None:
+    """Write the matrices of a reduced model.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    path : Path
+        An ``.npz`` file: ``M``, ``B``, ``K`` and ``dofs`` (labels of the rows).
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    names = np.array([dof.name for dof in model.dofs])
+    with path.open("wb") as stream:
+        np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
+
+
+def names_for_matlab(model: StateSpaceModel) -> dict[str, np.ndarray]:
+    """Give names and units as cells of MATLAB.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+        The state space.
+
+    Returns
+    -------
+    dict of str to array
+        One array of texts for each of `NAMES`.
+    """
+    return {name: np.array(getattr(model, name), dtype=object) for name in NAMES}
+
+
+def names_in(values: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Take names and units out of what was read from JSON or MATLAB.
+
+    Parameters
+    ----------
+    values : mapping of str to object
+        The content of the file.
+
+    Returns
+    -------
+    dict of str to tuple of str
+        Each of `NAMES`.
+
+    Raises
+    ------
+    KeyError
+        If one is missing.
+    """
+    return {name: tuple(str(_text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
+
+
+def _suffix(path: Path) -> str:
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"{path}: a state space is written as .json or .mat; give one of these endings")
+    return path.suffix
+
+
+def _text_in(text: object) -> object:
+    """Take a text out of the cell that MATLAB files keep it in."""
+    return text.item() if isinstance(text, np.ndarray) and text.size else ("" if isinstance(text, np.ndarray) else text)
