@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import inspect
 import pkgutil
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis import catalogue
 from frf_ipz.diagnosis.catalogue.effect import Effect
-from frf_ipz.diagnosis.catalogue.users_files import read_class
+from frf_ipz.diagnosis.catalogue.users_files import classes_in, read_class
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from types import ModuleType
 
     from frf_ipz.diagnosis.options import DiagnoseOptions
 
@@ -32,7 +30,7 @@ def shipped_effects() -> dict[str, Effect]:
     found: dict[str, Effect] = {}
     for folder in pkgutil.walk_packages(catalogue.__path__, f"{catalogue.__name__}."):
         if not folder.ispkg:
-            found |= {effect.name: effect for effect in _effects_in(import_module(folder.name))}
+            found |= {item.name: item() for item in classes_in(import_module(folder.name), Effect)}
     return found
 
 
@@ -67,8 +65,3 @@ def chosen_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
         if issubclass(found, Effect):
             chosen[found.name] = found()
     return chosen
-
-
-def _effects_in(module: ModuleType) -> list[Effect]:
-    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
-    return [item() for item in classes if issubclass(item, Effect) and not inspect.isabstract(item)]

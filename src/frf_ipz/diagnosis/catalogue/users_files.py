@@ -1,10 +1,10 @@
-"""Reads classes from users' own files: effects and force laws."""
+"""Finds classes in modules, shipped ones and users' own files: effects and force laws."""
 
 from __future__ import annotations
 
 import inspect
 from importlib import util
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import InputError, did_you_mean
 
@@ -43,12 +43,29 @@ def read_class(reference: str, folder: Path, kinds: tuple[type, ...]) -> type:
         raise InputError(f"{WHERE}: '{reference}' is not understood; write it as 'file.py:ClassName'")
     if not path.is_file():
         raise InputError(f"{WHERE}: there is no file {path}; paths are relative to the pipeline file")
-    module = _load(path)
-    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
-    found = {item.__name__: item for item in classes if issubclass(item, kinds) and not inspect.isabstract(item)}
+    found: dict[str, type] = {item.__name__: item for item in classes_in(_load(path), kinds)}
     if class_name not in found:
         raise InputError(f"{WHERE}: {path} has no effect '{class_name}'; {did_you_mean(class_name, found)}")
     return found[class_name]
+
+
+def classes_in(module: ModuleType, kinds: type | tuple[type, ...]) -> list[Any]:
+    """List the classes of some kinds that a module itself defines.
+
+    Parameters
+    ----------
+    module : module
+        Shipped, or a user's.
+    kinds : type or tuple of type
+        What they must derive from one of.
+
+    Returns
+    -------
+    list of type
+        Not abstract, by name.
+    """
+    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
+    return [item for item in classes if issubclass(item, kinds) and not inspect.isabstract(item)]
 
 
 def _load(path: Path) -> ModuleType:

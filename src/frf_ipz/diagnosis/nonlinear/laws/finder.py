@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 import pkgutil
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.catalogue.effect import Effect
-from frf_ipz.diagnosis.catalogue.users_files import read_class
+from frf_ipz.diagnosis.catalogue.users_files import classes_in, read_class
 from frf_ipz.diagnosis.nonlinear import laws
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from frf_ipz.diagnosis.options import DiagnoseOptions
 
 
@@ -29,25 +26,8 @@ def shipped_laws() -> dict[str, Law]:
     """
     found: dict[str, Law] = {}
     for module in pkgutil.iter_modules(laws.__path__, f"{laws.__name__}."):
-        found |= {law.name: law for law in laws_in(import_module(module.name))}
+        found |= {item.name: item() for item in classes_in(import_module(module.name), Law)}
     return found
-
-
-def laws_in(module: ModuleType) -> list[Law]:
-    """List the laws that a module defines.
-
-    Parameters
-    ----------
-    module : module
-        Of this folder, or a user's.
-
-    Returns
-    -------
-    list of Law
-        One of each class.
-    """
-    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
-    return [item() for item in classes if issubclass(item, Law) and not inspect.isabstract(item)]
 
 
 def chosen_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, ...]:
