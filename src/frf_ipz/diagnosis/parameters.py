@@ -11,6 +11,7 @@ from scipy import sparse
 from frf_ipz.diagnosis.apply import apply_to_model
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.eigen import stated_ratios
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.regions import motion_of_all
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel, StructuralModel
 
 STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly linear in it
+RIGID = 1e-9  # of the largest squared frequency: below it a mode is one of a rigid body
 PRIOR = 0.1  # standard deviation of a value, relative: an update refines a diagnosis, and does not begin anew
 
 
@@ -113,8 +115,8 @@ def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel)
 def _modal(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
     """Damping matrix of a model's modal damping ratios, N s/m."""
     poles = undamped_poles(reduced.mass, reduced.stiffness)
-    omega = np.sqrt(np.maximum(poles.values.real, 0.0))
-    given = model.modal_damping if model.modal_damping.size else np.zeros(1)
-    ratios = given[np.minimum(np.arange(len(omega)), len(given) - 1)]
+    squares = np.maximum(poles.values.real, 0.0)
+    n_rigid = int(np.count_nonzero(squares < RIGID * squares.max()))
+    ratios, omega = stated_ratios(model.modal_damping, len(squares), n_rigid), np.sqrt(squares)
     shapes = reduced.mass @ poles.right.real
     return np.asarray((shapes * (2 * ratios * omega)) @ shapes.T)

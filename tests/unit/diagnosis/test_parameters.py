@@ -9,7 +9,8 @@ from diagnosed import beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_model
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.parameters import diagnosed_basis
+from frf_ipz.diagnosis.parameters import _modal, diagnosed_basis
+from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.fe.options import ReduceOptions
@@ -21,6 +22,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.update import update_model
 
 MASS_KG, OFF = 0.02, 0.85  # the value that an update starts from, over the one that was found
+ROUNDING = 1e-8  # of the largest entry
 NEAR = 0.02  # relative: noise, and modes above the band that the reduction has left out
 
 
@@ -65,3 +67,12 @@ def test_nothing_in_the_structure_is_refused(case):
     nominal, wrong, _, reduced = case
     with pytest.raises(InputError, match="nothing in the structure"):
         diagnosed_basis(nominal, replace(wrong, findings=()), reduced)
+
+
+@pytest.mark.parametrize("left", ["clamped", "free"])
+def test_modal_damping_is_that_of_the_reduction(tmp_path, left):
+    model = replace(beam(tmp_path, left=left), modal_damping=np.array([0.01, 0.02, 0.03, 0.005]))
+    ends = {"actuators": (Dof(5, "z"),), "sensors": (Dof(12, "z"),), "points": ()}
+    reduced = reduce_model(model, ReduceOptions(), band_hz=(10.0, 700.0), **ends)
+    size = np.abs(reduced.damping).max()
+    np.testing.assert_allclose(_modal(model, reduced), reduced.damping, atol=ROUNDING * size)
