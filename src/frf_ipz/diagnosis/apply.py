@@ -62,10 +62,10 @@ def apply_to_model(
 
 def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
     """Put the spring and the damper that stand for a force law into a model."""
-    across = np.zeros(len(model.all_dofs))
-    for end, sign in zip(reversed(law.ends), (1.0, -1.0), strict=False):
-        across[model.place(end)] = sign
-    pair = sparse.csr_array(np.outer(across, across))
+    places = [model.place(end) for end in reversed(law.ends)]
+    signs = [1.0, -1.0][: len(places)]
+    across = sparse.csr_array((signs, ([0] * len(places), places)), shape=(1, len(model.all_dofs)))
+    pair = across.T @ across
     return replace(
         model,
         stiffness_all=sparse.csr_array(model.stiffness_all + law.stiffness * pair),
