@@ -19,7 +19,7 @@ from frf_ipz.diagnosis.physics.layout import lay_out
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis, Linearised
@@ -47,17 +47,45 @@ def apply_to_model(
     StructuralModel
         The model with what it lacked; the same model where findings are in the measuring chain only, or none.
     """
-    model = model if diagnosis.linearised is None else _with_law(model, diagnosis.linearised)
+    return corrector(model, diagnosis, effects)([finding.values for finding in diagnosis.findings])
+
+
+def corrector(
+    model: StructuralModel, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None
+) -> Callable[[Sequence[Sequence[float]]], StructuralModel]:
+    """Prepare to put the findings into the model, for any values of their parameters.
+
+    Parameters
+    ----------
+    model, diagnosis, effects
+        As for `apply_to_model`.
+
+    Returns
+    -------
+    callable
+        From the values of each finding to the model with what it lacked.
+    """
+    base = model if diagnosis.linearised is None else _with_law(model, diagnosis.linearised)
     known = effects or shipped_effects()
-    found = [(known[one.effect], one) for one in diagnosis.findings if one.effect in known]
-    structural = [(effect, one) for effect, one in found if effect.chain(_place(one)) is None]
+    structural = {
+        number: known[one.effect]
+        for number, one in enumerate(diagnosis.findings)
+        if one.effect in known and known[one.effect].chain(_place(one)) is None
+    }
     if not structural or diagnosis.curves is None:
-        return model
-    specimen = _specimen(model, diagnosis.curves)
-    total = NOTHING
-    for effect, finding in structural:
-        total = total + effect.build(specimen, _place(finding))(np.array(finding.values))
-    return with_change(model, total)
+        return lambda _: base
+    specimen = _specimen(base, diagnosis.curves)
+    builders = {
+        number: effect.build(specimen, _place(diagnosis.findings[number])) for number, effect in structural.items()
+    }
+
+    def correct(values: Sequence[Sequence[float]]) -> StructuralModel:
+        total = NOTHING
+        for number, build in builders.items():
+            total = total + build(np.array(values[number]))
+        return with_change(base, total)
+
+    return correct
 
 
 def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:

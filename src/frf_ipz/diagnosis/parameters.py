@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.diagnosis.apply import corrector
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import apply
 from frf_ipz.fe.eigen import stated_ratios
@@ -59,13 +58,10 @@ def diagnosed_basis(
     InputError
         If nothing was found that has a place in the structure.
     """
-    moving = []
+    moving, corrected = [], corrector(nominal, diagnosis, effects)
     for place, finding in enumerate(diagnosis.findings):
         for index, name in enumerate(_names(finding)):
-            low, high = (
-                apply_to_model(nominal, _with_value(diagnosis, place, index, factor), effects)
-                for factor in (1 - STEP, 1 + STEP)
-            )
+            low, high = (corrected(_values(diagnosis, place, index, factor)) for factor in (1 - STEP, 1 + STEP))
             slope = _reduced(low, high, reduced) / (2 * STEP)
             if np.abs(slope).max() > 0:
                 moving.append((f"{finding.effect} {name}", slope))
@@ -91,11 +87,11 @@ def _names(finding: Finding) -> list[str]:
     return named if len(named) == len(finding.values) else [str(number + 1) for number in range(len(finding.values))]
 
 
-def _with_value(diagnosis: Diagnosis, place: int, index: int, factor: float) -> Diagnosis:
-    finding = diagnosis.findings[place]
-    values = tuple(value * factor if number == index else value for number, value in enumerate(finding.values))
-    findings = (*diagnosis.findings[:place], replace(finding, values=values), *diagnosis.findings[place + 1 :])
-    return replace(diagnosis, findings=findings)
+def _values(diagnosis: Diagnosis, place: int, index: int, factor: float) -> list[list[float]]:
+    """Values of all findings, one of them times a factor."""
+    values = [list(finding.values) for finding in diagnosis.findings]
+    values[place][index] *= factor
+    return values
 
 
 def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel) -> FloatArray:
