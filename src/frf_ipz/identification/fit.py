@@ -6,22 +6,20 @@ demand. Then errors of everything, from the Fisher information at the optimum.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from scipy import sparse
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.errors import NumericalError
-from frf_ipz.identification.likelihood.alike import levels_of_poles
+from frf_ipz.arrays import ComplexArray, IntArray
+from frf_ipz.identification.fitting import FIXED_POLES, MODEL_ERROR, Fitted, excess_of, find_modes, levels
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
-from frf_ipz.identification.likelihood.delay import find_delays
-from frf_ipz.identification.likelihood.refinement import Refined, refine
-from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, all_terms
-from frf_ipz.identification.lines.measured import MeasuredLines, measured_lines, with_noise_of
+from frf_ipz.identification.likelihood.refinement import refine
+from frf_ipz.identification.likelihood.smooth_terms import all_terms
+from frf_ipz.identification.lines.measured import measured_lines, with_noise_of
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.identification.results.gains import find_gains
 from frf_ipz.identification.results.measured_model import measured_model, mode_order, residue_covariance
@@ -29,34 +27,16 @@ from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import FoundZeros, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.judgement import Judgement, judge, peak_levels
-from frf_ipz.identification.search.selection import Selected, select_modes
-from frf_ipz.identification.start.stabilization import start_poles
+from frf_ipz.identification.search.judgement import judge
+from frf_ipz.identification.support import Support, doubts, find_support
 from frf_ipz.progress import Progress, silent
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.options import FitOptions
 
-FIXED_POLES = 3  # beside the band, while modes are searched
-DELAY_ROUNDS = 2  # of finding delays and poles in turn
 HELD_ROUNDS = 3  # of fitting residues and finding the noise in turn
-MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, limits the fit
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fitted:
-    """Poles, and what they were fitted to; `noise` is the variance without what the model fails to follow."""
-
-    lines: MeasuredLines
-    terms: SmoothTerms
-    fit: Refined
-    judgement: Judgement
-    excess: FloatArray
-    noise: FloatArray
-    noise_from: str
-    drift: Drift | None
-    poles_are_held: bool = False
 
 
 def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent) -> ModalFit:
@@ -83,20 +63,13 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
     NumericalError
         If no mode is found.
     """
-    progress(0.0, "choosing lines")
-    lines = measured_lines(frfs, options)
-    progress(0.05, "looking for first poles")
-    start = start_poles(frfs, lines, max_order=options.max_order)
-    terms = all_terms(lines.band_hz, lines.line_hz).first(FIXED_POLES)
-    progress(0.2, "adding and dropping poles")
-    delay_s = np.zeros(frfs.n_frfs)
-    if options.delay:
-        lines, delay_s = _without_delays(frfs, lines, start.poles, terms, options)
-    selected = _selected(lines, start.poles, terms, options)
-    progress(0.7, "refining")
-    fitted = _refined(lines, selected, terms)
-    progress(0.8, "finding zeros and errors")
-    return _as_modal_fit(frfs, fitted, options, start=start.table, decisions=selected.decisions, delay_s=delay_s)
+    fitted = find_modes(frfs, options, progress=progress)
+    support = None
+    if fitted.noise_from == "misfit":
+        progress(0.7, "fitting each half of the lines")
+        support = find_support(frfs, fitted, options)
+    progress(0.9, "finding zeros and errors")
+    return _as_modal_fit(frfs, fitted, options, support)
 
 
 def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> ModalFit:
@@ -136,107 +109,30 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
         judgement = judge(data, fit, terms)
         lines = with_noise_of(lines, judgement.misfit / data.weight)
     lines = replace(lines, receptance=data.receptance)
-    fitted = _Fitted(
+    fitted = Fitted(
         lines=lines,
         terms=terms,
         fit=fit,
         judgement=judgement,
-        excess=_excess(judgement, fit),
+        excess=excess_of(judgement, fit),
         noise=lines.variance,
         noise_from="recordings" if lines.known.all() else "misfit",
         drift=drift,
+        start=pd.DataFrame(columns=["order", "frequency_hz", "damping_ratio"]),
+        decisions=(),
+        delay_s=np.zeros(frfs.n_frfs),
         poles_are_held=True,
     )
-    table = pd.DataFrame(columns=["order", "frequency_hz", "damping_ratio"])
-    return _as_modal_fit(frfs, fitted, options, start=table, decisions=(), delay_s=np.zeros(frfs.n_frfs))
+    return _as_modal_fit(frfs, fitted, options, None)
 
 
-def _selected(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
-    data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
-    selected = select_modes(data, poles, terms, options, noise_is_known=bool(lines.known.all()))
-    if not mode_order(selected.fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
-        raise NumericalError(
-            f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
-            "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
-        )
-    return selected
-
-
-def _without_delays(
-    frfs: FrfSet, lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions
-) -> tuple[MeasuredLines, FloatArray]:
-    """Find the delay of each channel that makes the modes look normal, and take it off.
-
-    Complex residues follow a short delay almost exactly: they give good poles, and say nothing of the delay.
-    """
-    channels = [label.output_channel or label.output_dof.name for label in frfs.labels]
-    numbers = np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
-    advanced, delays = lines, np.zeros(frfs.n_frfs)
-    for _ in range(DELAY_ROUNDS):
-        poles = _selected(advanced, poles, terms, replace(options, modes="complex")).fit.poles
-        data = replace(lines.weighted(shared=True), real_modes=True)
-        delays = find_delays(data, poles, terms, numbers)
-        advanced = replace(lines, receptance=lines.receptance * np.exp(lines.s[:, None] * delays))
-    return advanced, delays
-
-
-def _refined(lines: MeasuredLines, selected: Selected, terms: SmoothTerms) -> _Fitted:
-    """Fit once more with the best weights, and find out whether noise or model limits the fit."""
-    fit, data, judgement = selected.fit, selected.data, selected.judgement
-    lines = replace(lines, receptance=data.receptance)
-    if not lines.known.all():
-        lines = with_noise_of(lines, judgement.misfit / data.weight)
-    final = replace(lines.weighted(), real_modes=data.real_modes)
-    if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
-        fit = refine(final, fit.poles, terms)
-        judgement = judge(final, fit, terms)
-    excess, noise, noise_from = _excess(judgement, fit), lines.variance, "recordings"
-    if not lines.known.all() or np.median(excess) > MODEL_ERROR:
-        noise_from = "misfit"
-        lines = replace(lines, variance=lines.variance * judgement.level)
-        fit = refine(replace(lines.weighted(), real_modes=data.real_modes), fit.poles, terms)
-    return _Fitted(
-        lines=lines,
-        terms=terms,
-        fit=fit,
-        judgement=judgement,
-        excess=excess,
-        noise=noise,
-        noise_from=noise_from,
-        drift=selected.drift,
-    )
-
-
-def _levels(fitted: _Fitted) -> FloatArray:
-    """Factor on the variance of each pole's real and imaginary part: 1 where the noise is that of the recordings."""
-    poles = fitted.fit.poles
-    if fitted.noise_from == "recordings":
-        return np.ones(2 * len(poles))
-    data = fitted.lines.weighted()
-    left = (data.receptance - response(fitted.fit.system, fitted.terms, data.s)) * data.weight
-    at_peaks = np.maximum(fitted.judgement.missing[-1].level_at(poles), peak_levels(data, fitted.fit, left))
-    return np.asarray(np.maximum(np.tile(at_peaks, 2), levels_of_poles(data, fitted.fit, fitted.terms)))
-
-
-def _excess(judgement: Judgement, fit: Refined) -> FloatArray:
-    """Misfit over noise of each FRF, as roots of mean squares."""
-    free = 2 * len(judgement.misfit) - fit.system.n_linear
-    return np.asarray(np.sqrt(np.sum(np.abs(judgement.misfit) ** 2, axis=0) / free))
-
-
-def _as_modal_fit(
-    frfs: FrfSet,
-    fitted: _Fitted,
-    options: FitOptions,
-    *,
-    start: pd.DataFrame,
-    decisions: tuple[dict[str, object], ...],
-    delay_s: FloatArray,
-) -> ModalFit:
+def _as_modal_fit(frfs: FrfSet, fitted: Fitted, options: FitOptions, support: Support | None) -> ModalFit:
     lines, fit, terms = fitted.lines, fitted.fit, fitted.terms
     order, n_modes = mode_order(fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))
     modes = order[:n_modes]
-    errors = fit_errors(fit, terms, _levels(fitted))
+    doubted = doubts(support, modes)
+    scatter, shift = (support.scatter, support.shift) if support else (1.0, np.zeros(2 * len(fit.poles)))
+    errors = fit_errors(fit, terms, levels(fitted) * scatter**2, shift)
     own = replace(errors, pole_root=np.zeros_like(errors.pole_root))  # errors of poles move equal FRFs alike
     gains = find_gains(
         frfs.labels,
@@ -248,10 +144,10 @@ def _as_modal_fit(
     found = find_zeros(errors, lines.s)
     unit = np.abs(lines.s[:, None]) ** lines.powers
     left = lines.receptance - response(fit.system, terms, lines.s)
-    of_frfs = pd.DataFrame({"delay_s": delay_s, "gain": gains.of_frf, "gain_std": gains.of_frf_std})
+    of_frfs = pd.DataFrame({"delay_s": fitted.delay_s, "gain": gains.of_frf, "gain_std": gains.of_frf_std})
     misfit = misfit_table(lines.frequency_hz, left * unit, np.sqrt(fitted.noise) * unit, frfs.labels)
     return ModalFit(
-        model=measured_model(fit.system, terms, lines.powers, order, delay_s),
+        model=measured_model(fit.system, terms, lines.powers, order, fitted.delay_s),
         n_modes=n_modes,
         labels=frfs.labels,
         band_hz=lines.band_hz,
@@ -260,15 +156,25 @@ def _as_modal_fit(
         covariance=_covariance(errors, found, modes),
         residue_covariance=residue_covariance(errors, lines.powers, modes),
         value_std=value_std(errors, lines.s) * unit,
-        stabilization=start,
-        decisions=pd.DataFrame(decisions, columns=["frequency_hz", "damping_ratio", "action", "reason"]),
-        modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.judgement, modes),
+        stabilization=fitted.start,
+        decisions=_decisions(fitted, modes, doubted),
+        modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.judgement, modes, doubted),
         misfit=misfit.join(of_frfs, on="frf"),
         gain=gains.of_frf,
         channel_gains=gains.table,
         noise_from=fitted.noise_from,
-        warnings=(*_warnings(frfs, fitted), *gains.remarks),
+        warnings=(*_warnings(frfs, fitted, support, doubted), *gains.remarks),
     )
+
+
+def _decisions(fitted: Fitted, modes: IntArray, doubted: tuple[str, ...]) -> pd.DataFrame:
+    poles = fitted.fit.poles[modes]
+    rows = [
+        {"frequency_hz": hz, "damping_ratio": ratio, "action": "doubted", "reason": reason}
+        for hz, ratio, reason in zip(natural_frequency_hz(poles), damping_ratio(poles), doubted, strict=True)
+        if reason
+    ]
+    return pd.DataFrame([*fitted.decisions, *rows], columns=["frequency_hz", "damping_ratio", "action", "reason"])
 
 
 def _covariance(errors: FitErrors, found: FoundZeros, modes: IntArray) -> RootCovariance:
@@ -287,7 +193,7 @@ def _covariance(errors: FitErrors, found: FoundZeros, modes: IntArray) -> RootCo
     return RootCovariance(common=np.concatenate([poles, common]), own=sparse.csr_array(own + added))
 
 
-def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
+def _warnings(frfs: FrfSet, fitted: Fitted, support: Support | None, doubted: tuple[str, ...]) -> tuple[str, ...]:
     said = []
     excess = fitted.excess
     if np.median(excess) > MODEL_ERROR:
@@ -296,6 +202,16 @@ def _warnings(frfs: FrfSet, fitted: _Fitted) -> tuple[str, ...]:
             f"the misfit is {np.median(excess):.2g} times the noise {noise} (median FRF; {excess.max():.2g} at worst): "
             "the structure does what no linear model with these modes does, so standard deviations are taken from the "
             "misfit"
+        )
+    if support is not None and support.scatter > 1:
+        said.append(
+            f"even and odd lines, each fitted by themselves, differ by {support.scatter:.2g} of their standard "
+            "deviations (root of mean square): all standard deviations are raised by that"
+        )
+    if any(doubted):
+        said.append(
+            f"{sum(map(bool, doubted))} of {len(doubted)} modes do not come up in both halves of the lines: "
+            "their quality is poor, and the decisions name them"
         )
     if fitted.drift is not None:
         said.append(_about_drift(frfs, fitted.drift, against_poles=fitted.poles_are_held))

@@ -90,7 +90,7 @@ class FitErrors:
         return np.concatenate([a * real - b * imag, b * real + a * imag])
 
 
-def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors:
+def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray, shift: FloatArray) -> FitErrors:
     """Find where errors of a fit come from.
 
     Parameters
@@ -101,6 +101,8 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
         What lies out of band.
     level : (2 n_poles,) array
         Factor on the variance of each pole's real part, then imaginary part, where lines or FRFs err alike.
+    shift : (2 n_poles,) array
+        Standard deviation of the same that has nothing to do with noise, rad/s.
 
     Returns
     -------
@@ -108,10 +110,11 @@ def fit_errors(fit: Refined, terms: SmoothTerms, level: FloatArray) -> FitErrors
         Poles, residues, and the rest.
     """
     root = np.linalg.pinv(np.linalg.cholesky(_regular(fit.information))).T
+    stated = np.maximum(np.einsum("ij,ij->i", root, root), np.finfo(float).tiny)
     return FitErrors(
         system=fit.system,
         terms=terms,
-        pole_root=root * np.sqrt(level)[:, None],
+        pole_root=root * np.sqrt(level + shift**2 / stated)[:, None],
         level=float(np.sqrt(np.median(level))),
         residues=fit.system.scaled_residues(),
     )

@@ -24,7 +24,9 @@ FEWEST_FRFS = 3  # whose shapes can differ
 CLOSE = 0.02  # relative distance of two modes whose shapes are compared for it
 
 
-def mode_table(poles: ComplexArray, residues: ComplexArray, judgement: Judgement, modes: IntArray) -> pd.DataFrame:
+def mode_table(
+    poles: ComplexArray, residues: ComplexArray, judgement: Judgement, modes: IntArray, doubts: tuple[str, ...]
+) -> pd.DataFrame:
     """Table of the modes with a quality mark.
 
     Parameters
@@ -37,6 +39,8 @@ def mode_table(poles: ComplexArray, residues: ComplexArray, judgement: Judgement
         Of the fit.
     modes : (n_modes,) int array
         Places of the modes in the judgement.
+    doubts : tuple of str
+        Why a mode is not to be relied on, whatever else; empty where nothing says so.
 
     Returns
     -------
@@ -60,7 +64,11 @@ def mode_table(poles: ComplexArray, residues: ComplexArray, judgement: Judgement
         "misfit_level": _level_at(judgement, poles),
     }
     remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
-    quality = [_quality(rows, number, len(text)) for number, text in enumerate(remarks)]
+    quality = [
+        "poor" if doubt else _quality(rows, number, len(text))
+        for number, (text, doubt) in enumerate(zip(remarks, doubts, strict=True))
+    ]
+    remarks = [[*text, doubt] if doubt else text for text, doubt in zip(remarks, doubts, strict=True)]
     return pd.DataFrame({**rows, "quality": quality, "remarks": ["; ".join(text) for text in remarks]})
 
 
