@@ -11,6 +11,7 @@ from scipy import sparse
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.catalogue.together import build_together
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import make_basis
@@ -75,9 +76,8 @@ def corrector(
     if not structural or diagnosis.curves is None:
         return lambda _: base
     specimen = _specimen(base, diagnosis.curves)
-    builders = {
-        number: effect.build(specimen, _place(diagnosis.findings[number])) for number, effect in structural.items()
-    }
+    acting = [(effect, _place(diagnosis.findings[number])) for number, effect in structural.items()]
+    builders = dict(zip(structural, build_together(specimen, acting), strict=True))
 
     def correct(values: Sequence[Sequence[float]]) -> StructuralModel:
         total = NOTHING

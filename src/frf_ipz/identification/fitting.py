@@ -7,6 +7,7 @@ demand.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,14 +116,51 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     delay_s = np.zeros(frfs.n_frfs)
     if options.delay:
         lines, delay_s = _without_delays(frfs, lines, start.poles, terms, options)
-    selected = _selected(lines, start.poles, terms, options)
-    progress(0.6, "refining")
-    return _refined(lines, selected, terms, start=start.table, delay_s=delay_s)
+    selected = _selected(lines, start.poles, terms, options, noise_is_known=bool(lines.known.all()))
+    progress(0.5, "refining")
+    fitted = _refined(lines, selected, terms, start=start.table, delay_s=delay_s)
+    if np.median(fitted.excess) > MODEL_ERROR:
+        progress(0.55, "adding and dropping poles by what no model follows")
+        fitted = _against_model_error(fitted, options)
+    return fitted
 
 
-def _selected(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions) -> Selected:
+def _against_model_error(fitted: Fitted, options: FitOptions) -> Fitted:
+    """Choose the modes anew, with an error that follows each FRF added to the noise.
+
+    Weighed by the noise alone, the quietest lines decide, and which poles stand for what no model follows there is
+    chance.
+    """
+    left = np.abs(fitted.lines.receptance - response(fitted.fit.system, fitted.terms, fitted.lines.s)) ** 2
+    power = np.abs(fitted.lines.receptance) ** 2
+    # an exponential distribution has ln 2 times its mean at the median
+    error = np.median(np.maximum(left - fitted.noise, 0.0) / np.maximum(power, np.finfo(float).tiny), axis=0) / log(2)
+    lines = replace(fitted.lines, variance=fitted.noise + error * power)
+    selected = _selected(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False)
+    lines = replace(lines, known=np.ones_like(lines.known))  # the model error is part of it: not to be found again
+    second = _refined(lines, selected, fitted.terms, start=fitted.start, delay_s=fitted.delay_s, model_limits=True)
+    left = np.abs(second.lines.receptance - response(second.fit.system, second.terms, second.lines.s)) ** 2
+    free = len(left) - second.fit.system.n_linear / 2
+    return replace(
+        second,
+        lines=replace(second.lines, known=fitted.lines.known),
+        excess=np.sqrt(np.sum(left / fitted.noise, axis=0) / free),
+        noise=fitted.noise,
+        drift=second.drift or fitted.drift,
+        decisions=(*fitted.decisions, *(one for one in second.decisions if one["action"] in ("added", "dropped"))),
+    )
+
+
+def _selected(
+    lines: MeasuredLines,
+    poles: ComplexArray,
+    terms: SmoothTerms,
+    options: FitOptions,
+    *,
+    noise_is_known: bool,
+) -> Selected:
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
-    selected = select_modes(data, poles, terms, options, noise_is_known=bool(lines.known.all()))
+    selected = select_modes(data, poles, terms, options, noise_is_known=noise_is_known)
     if not mode_order(selected.fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
         raise NumericalError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
@@ -142,7 +180,8 @@ def _without_delays(
     numbers = np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
     advanced, delays = lines, np.zeros(frfs.n_frfs)
     for _ in range(DELAY_ROUNDS):
-        poles = _selected(advanced, poles, terms, replace(options, modes="complex")).fit.poles
+        complex_modes = replace(options, modes="complex")
+        poles = _selected(advanced, poles, terms, complex_modes, noise_is_known=bool(lines.known.all())).fit.poles
         data = replace(lines.weighted(shared=True), real_modes=True)
         delays = find_delays(data, poles, terms, numbers)
         advanced = replace(lines, receptance=lines.receptance * np.exp(lines.s[:, None] * delays))
@@ -150,7 +189,13 @@ def _without_delays(
 
 
 def _refined(
-    lines: MeasuredLines, selected: Selected, terms: SmoothTerms, *, start: pd.DataFrame, delay_s: FloatArray
+    lines: MeasuredLines,
+    selected: Selected,
+    terms: SmoothTerms,
+    *,
+    start: pd.DataFrame,
+    delay_s: FloatArray,
+    model_limits: bool = False,
 ) -> Fitted:
     """Fit once more with the best weights, and find out whether noise or model limits the fit."""
     fit, data, judgement = selected.fit, selected.data, selected.judgement
@@ -162,7 +207,7 @@ def _refined(
         fit = refine(final, fit.poles, terms)
         judgement = judge(final, fit, terms)
     excess, noise, noise_from = excess_of(judgement, fit), lines.variance, "recordings"
-    if not lines.known.all() or np.median(excess) > MODEL_ERROR:
+    if model_limits or not lines.known.all() or np.median(excess) > MODEL_ERROR:
         noise_from = "misfit"
         lines = replace(lines, variance=lines.variance * judgement.level)
         fit = refine(replace(lines.weighted(), real_modes=data.real_modes), fit.poles, terms)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 HALVES = 2
 SAME = 0.5  # half widths of the narrower of two poles within which they are one mode
 CHANCE = 0.05  # that halves with true standard deviations differ so much that these are raised
+NARROW = 0.5  # half width, in lines of a half, below which a half may have no line on a peak: it tells nothing then
 FEW_ITERATIONS = 4  # of a fit without one of its poles: the others are near their places
 
 
@@ -42,7 +43,7 @@ class Support:
     Parameters
     ----------
     times : (n_poles,) int array
-        In how many of the halves each pole comes up.
+        In how many of the halves each pole comes up; both, where it is too narrow for the lines of a half.
     scatter : float
         Difference of the halves over its standard deviation, root of mean square; 1 where chance explains it.
     shift : (2 n_poles,) array
@@ -109,7 +110,8 @@ def find_support(frfs: FrfSet, fitted: Fitted, options: FitOptions) -> Support |
     poles = fitted.fit.poles
     partners = np.stack([_partners(poles, half.poles) for half in halves])
     both = (partners >= 0).all(axis=0)
-    times = np.sum(partners >= 0, axis=0)
+    line = 2 * np.pi * HALVES * fitted.lines.line_hz
+    times = np.where(-poles.real < NARROW * line, HALVES, np.sum(partners >= 0, axis=0))
     differences = [half.poles[partner[both]] for half, partner in zip(halves, partners, strict=True)]
     variance = sum(half.variance[:, partner[both]] for half, partner in zip(halves, partners, strict=True))
     difference = differences[0] - differences[1]

@@ -63,6 +63,14 @@ class Parameter:
     neutral: float = 0.0
     tolerance: float = 0.0
 
+    @property
+    def typical(self) -> float:
+        """A value at which the effect acts."""
+        if not self.is_log:
+            return 0.3 * self.high
+        middle = float(np.sqrt(self.low * self.high))
+        return middle if not np.isclose(middle, self.neutral, rtol=0.05) else 1.3 * middle
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:

@@ -22,6 +22,7 @@ WIDEST = 0.02  # sigma over omega: lightly damped things that nobody knows of ar
 MOST_POINTS = 260
 COARSE_WIDTH = 0.06  # sigma over omega of the contour for searching: no peak is missed
 COARSE_STEP = 0.8
+MIDDLE_WIDTH, MIDDLE_STEP = 0.015, 1.5  # the same on the way from there to the axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -122,6 +123,22 @@ def coarse_contour(band_hz: tuple[float, float], least_decay_1_s: float) -> Comp
         rad/s, by ascending frequency.
     """
     return _march(band_hz, COARSE_STEP, lambda omega: max(COARSE_WIDTH * omega, least_decay_1_s))
+
+
+def middle_contour(band_hz: tuple[float, float], least_decay_1_s: float) -> ComplexArray:
+    """Lay a contour on the way from the coarse one to the axis.
+
+    Parameters
+    ----------
+    band_hz, least_decay_1_s
+        As for `fine_contour`.
+
+    Returns
+    -------
+    (n_points,) complex array
+        rad/s, by ascending frequency.
+    """
+    return _march(band_hz, MIDDLE_STEP, lambda omega: max(MIDDLE_WIDTH * omega, least_decay_1_s))
 
 
 def _decay(omega: float, resonances: Resonances, least: float) -> float:

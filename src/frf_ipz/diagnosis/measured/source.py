@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour
+from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour, middle_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.observations import Blow, Observations
 
 ENOUGH_BLOWS = 3  # at a place: one of them can be kept for the check, the rest still tell the noise
+FAR = coarse_contour, middle_contour
 EVERY = 4  # points of the contour: one is kept for the check where blows are too few
 
 
@@ -27,8 +30,8 @@ class Source:
 
     Parameters
     ----------
-    coarse, training, held_out : Measured
-        Far from the axis; near it; near it and never fitted.
+    coarse, middle, training, held_out : Measured
+        Far from the axis; on the way; near it; near it and never fitted.
     survey : Survey or FrfSurvey
         Noise and resonances of what is fitted.
     kind : str
@@ -40,6 +43,7 @@ class Source:
     """
 
     coarse: Measured
+    middle: Measured
     training: Measured
     held_out: Measured
     survey: Survey | FrfSurvey
@@ -72,14 +76,18 @@ def divide(observations: Observations) -> Source:
     names = {blow.name for blow in kept}
     fitted = tuple(blow for blow in observations.blows if blow.name not in names)
     found = survey(replace(observations, blows=fitted))
-    coarse = _looked_at(measure(found, coarse_contour(observations.band_hz, found.least_decay_1_s)), observations)
+    far = [
+        _looked_at(measure(found, contour(observations.band_hz, found.least_decay_1_s)), observations)
+        for contour in FAR
+    ]
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
     near = _looked_at(measure(found, s), observations)
     if not kept:
-        return _by_points(coarse, near, found, observations.kind)
+        return _by_points(far, near, found, observations.kind)
     held = without_faint(measure(like(found, replace(observations, blows=kept)), near.s))
     return Source(
-        coarse=coarse,
+        coarse=far[0],
+        middle=far[1],
         training=near,
         held_out=held,
         survey=found,
@@ -105,9 +113,11 @@ def _of_frfs(observations: Observations) -> Source:
     if observations.frfs is None:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
     found = survey_frfs(observations.frfs, observations.band_hz)
-    coarse = measure_frfs(found, coarse_contour(observations.band_hz, found.least_decay_1_s))
-    coarse, near = _looked_at(coarse, observations), _looked_at(_near(found, observations), observations)
-    return _by_points(coarse, near, found, "frf")
+    far = [
+        _looked_at(measure_frfs(found, contour(observations.band_hz, found.least_decay_1_s)), observations)
+        for contour in FAR
+    ]
+    return _by_points(far, _looked_at(_near(found, observations), observations), found, "frf")
 
 
 def _near(found: FrfSurvey, observations: Observations) -> Measured:
@@ -129,11 +139,12 @@ def _looked_at(measured: Measured, observations: Observations) -> Measured:
     return without_faint(points_of(measured, np.flatnonzero(kept)))
 
 
-def _by_points(coarse: Measured, near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
+def _by_points(far: Sequence[Measured], near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
     number = np.arange(len(near.s))
     held = number % EVERY == EVERY // 2
     return Source(
-        coarse=coarse,
+        coarse=far[0],
+        middle=far[1],
         training=points_of(near, np.flatnonzero(~held)),
         held_out=points_of(near, np.flatnonzero(held)),
         survey=found,

@@ -19,9 +19,11 @@ import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
-from frf_ipz.diagnosis.nonlinear.fitting.anywhere import find_place
+from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
+from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
+from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import Misfit
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
-    from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
@@ -49,14 +50,18 @@ if TYPE_CHECKING:
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
-LONG_SHAKER = 640.0  # of a shaker, which takes time to shake up a structure
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
+USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains the recordings
 CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
-MOST_APART = 2.0  # mean square of what blows disagree in besides the law, over the expected one
+MOST_APART = 9.0  # mean square of what blows disagree in besides the law, over the expected one
+BENT_NATS, BENT_PART = 250.0, 0.1  # evidence, and part of what is left, that a force of another kind may gain
+BENT_PART_MOVING = 0.75  # the same where stretches start in motion: how they start is known in the first modes only
+NEAR, MOST_NEAR = 5.0, 4  # times the smallest cost: laws at whose places an unknown one may sit, and how many
+PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
-MOST_LEFT = 0.05  # of the response, whatever the noise is: with more, laws and places were taken for each other
+MOST_LEFT = 0.1  # of the response, whatever the noise is: with more, laws and places were taken for each other
 FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
@@ -158,22 +163,41 @@ def search_laws(
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
     plant, noise = make_plant(model, observations), read_noise(observations)
-    tracks = []
-    long = LONG if observations.kind == "hammer" else LONG_SHAKER
-    for periods, floor in ((SHORT, ROUGH), (long, FINE)):
+
+    def track_of(periods: float, floor: float) -> Track:
         window = Window(duration_s=periods / observations.band_hz[1], floor=floor)
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
-        tracks.append(Track(stretches=stretches, linear=fit_linear(stretches, freedom)))
-    found = _judge(tracks[1], linearity, plant, find_candidates(tracks[0], tracks[1], laws))
+        return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
+
+    short, long = track_of(SHORT, ROUGH), track_of(LONG, FINE)
+    missed = long.linear.cost / long.linear.n_rows
+    if missed < USUAL:
+        long = track_of(LONG, max(FINE * float(np.sqrt(missed / USUAL)), FINEST))
+    fits = find_candidates(short, long, laws)
+    found = _judge(long, linearity, plant, fits)
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
-        found = _with_place(found, plant, find_place(tracks[0], tracks[1])[0], tracks[1])
+        found = _with_place(found, plant, _anywhere(short, long, fits), long)
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
-    before, after = prove(tracks[1], _held_out(held_out, plant, noise, tracks[1]), found.fit)
-    return replace(found, freedom=tracks[1].linear.freedom, before=before, after=after)
+    before, after = prove(long, _held_out(held_out, plant, noise, long), found.fit)
+    return replace(found, freedom=long.linear.freedom, before=before, after=after)
+
+
+def _anywhere(short: Track, long: Track, fits: list[LawFit]) -> AnyForce:
+    """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
+    near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost][:MOST_NEAR]
+    bent = [AnyForce(place=fit.place, cost=fit.cost - _drop(long, fit)) for fit in near]
+    found = find_place(short, long)[0]
+    return min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
+
+
+def _drop(track: Track, fit: LawFit) -> float:
+    """Drop of the cost by forces of other kinds at the place of a law."""
+    start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=fit.unknowns)
+    return gain_of_further(track.stretches, track.linear.freedom, start, simple_forces)
 
 
 def _with_place(found: LawSearch, plant: Plant, best: AnyForce, track: Track) -> LawSearch:
@@ -255,6 +279,10 @@ def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) ->
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
+    bent = _drop(track, best)
+    most_bent = BENT_PART_MOVING if track.stretches.moving.any() else BENT_PART
+    if 0.5 * bent / max(1.0, left) > BENT_NATS and bent > most_bent * best.cost:
+        return f"is bent: a force of another kind at its place would gain {0.5 * bent:.0f} nats more"
     if part > MOST_LEFT:
         return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
     return ""

@@ -9,6 +9,7 @@ parameters at a place.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -140,7 +141,7 @@ def enrich(basis: Basis, change: Change) -> Basis:
         For this effect at this place.
     """
     if change.model is not None:
-        basis = make_basis(change.model, basis.highest_rad_s, basis.places)
+        basis = _exchanged(change.model, basis.highest_rad_s, basis.places)
     model, loads, shapes = basis.model, [], []
     if change.released:
         constraint = _constraint_shapes(basis, change.released)
@@ -160,6 +161,11 @@ def enrich(basis: Basis, change: Change) -> Basis:
         return basis
     shapes.append(_deflections(basis, np.hstack(loads)))
     return _joined(basis, np.hstack(shapes))
+
+
+@lru_cache(maxsize=2)  # a search asks for the same one again and again
+def _exchanged(model: StructuralModel, highest_rad_s: float, places: tuple[int, ...]) -> Basis:
+    return make_basis(model, highest_rad_s, places)
 
 
 def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:

@@ -31,8 +31,8 @@ class Bench:
         What cannot be known.
     effects : mapping of str to Effect
         What is looked for.
-    coarse : Measured
-        Transfer functions far from the axis.
+    coarse, middle : Measured
+        Transfer functions far from the axis, and on the way to it.
     data : Data
         Those near the axis, with their errors.
     early : Data
@@ -47,6 +47,7 @@ class Bench:
     nuisance: Nuisance
     effects: Mapping[str, Effect]
     coarse: Measured
+    middle: Measured
     data: Data
     early: Data
     thin: Data

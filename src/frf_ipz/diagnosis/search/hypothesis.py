@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.catalogue.together import build_together, typical_change
 from frf_ipz.diagnosis.physics.basis import Basis, enrich
 from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.nuisance import Nuisance
@@ -153,10 +154,13 @@ def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *
         To evaluate.
     """
     parameters = tuple(cause.effect.parameters(specimen, cause.place) for cause in causes)
-    builders = tuple(cause.effect.build(specimen, cause.place) for cause in causes)
+    builders = build_together(specimen, [(cause.effect, cause.place) for cause in causes])
     basis, moved = specimen.basis, NOTHING
-    for build, own in zip(builders, parameters, strict=True):
-        typical = build(np.array([_typical(parameter) for parameter in own]))
+    typicals = [
+        typical_change(specimen, cause.effect, cause.place, build)
+        for cause, build in zip(causes, builders, strict=True)
+    ]
+    for typical in sorted(typicals, key=lambda change: change.model is None):  # an exchanged model comes first
         moved = moved + Change(moved=typical.moved)
         if exact or typical.released or typical.model is not None:
             basis = enrich(basis, typical)
@@ -171,9 +175,3 @@ def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *
         nuisance=nuisance,
     )
 
-
-def _typical(parameter: Parameter) -> float:
-    if parameter.is_log:
-        middle = float(np.sqrt(parameter.low * parameter.high))
-        return middle if not np.isclose(middle, parameter.neutral, rtol=0.05) else 1.3 * middle
-    return 0.3 * parameter.high

@@ -19,10 +19,14 @@ from frf_ipz.diagnosis.search.search import (
     REFINED_ERROR,
     Fits,
     Ranking,
+    bring_closer,
     climb_all,
+    how_many,
+    is_hopeless,
     ranked,
     search,
     spread,
+    step_far,
 )
 from frf_ipz.diagnosis.search.sketches import Start
 from frf_ipz.diagnosis.search.wide import wide_search
@@ -32,9 +36,11 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
-FIRSTS = 5  # causes that get companions
-COMPANIONS = 4  # of each that are refined
-EARLY_PAIRS, EXACT_PAIRS = 6, 3  # that are fitted with large errors, and exactly
+FIRSTS, NOT_FAR = 8, 3.0  # causes that get companions, and times the best cost
+COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
+STEPPED, NOT_MUCH = 8, 2.0  # pairs whose neighbours are looked at far from the axis, and times the best cost
+CLOSER_PAIRS, EARLY_PAIRS, EXACT_PAIRS = 16, 8, 4  # that come half-way to the axis, to it, and are fitted exactly
+FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such pairs are not fitted exactly
 GAIN = 0.5  # nats
 
 
@@ -48,7 +54,7 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     first : Ranking
         Of one cause.
     is_good : callable
-        Tells whether a fit leaves nothing to explain: then the first cause needs no second look.
+        Tells whether a fit leaves nothing to explain: then nothing further is tried.
 
     Returns
     -------
@@ -56,13 +62,19 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
         Its base has one cause, its fits have two.
     """
     size = 2 * bench.data.measured.values.size
-    if first.best.misfit > NEARLY_RIGHT * size and first.refined:
-        return _of_pairs(bench, first)
-    beside = search(bench, first.best)
-    if not beside.fits or is_good(beside.best):
-        return beside
-    exchanged = search(bench, _newest_alone(bench, beside.best))
-    return exchanged if exchanged.best.log_evidence > beside.best.log_evidence + GAIN else beside
+    found: list[Ranking] = []
+    if first.best.misfit < NEARLY_RIGHT * size or not first.refined:
+        beside = search(bench, first.best)
+        found.append(beside)
+        if beside.fits and not is_good(beside.best):
+            found.append(search(bench, _newest_alone(bench, beside.best)))
+    if first.refined and not any(ranking.fits and is_good(ranking.best) for ranking in found):
+        found.append(_of_pairs(bench, first))
+    best = found[0]
+    for ranking in found[1:]:
+        if ranking.best.log_evidence > best.best.log_evidence + GAIN:
+            best = ranking
+    return best
 
 
 def _newest_alone(bench: Bench, fit: Fit) -> Fit:
@@ -71,28 +83,59 @@ def _newest_alone(bench: Bench, fit: Fit) -> Fit:
 
 
 def _of_pairs(bench: Bench, first: Ranking) -> Ranking:
+    starts = spread(first.refined, 1)[:FIRSTS]
     pairs: list[tuple[Cause, Start]] = []
-    for start in spread(first.refined, 1)[:FIRSTS]:
-        pairs += [(start.cause, both) for both in _companions(bench, start)]
-    pairs.sort(key=lambda pair: pair[1].cost)
-    early = [bench.fit_early((cause, both.cause), both.values) for cause, both in pairs[:EARLY_PAIRS]]
-    early.sort(key=lambda fit: fit.cost)
-    exact = [bench.fit_from(fit) for fit in early[:EXACT_PAIRS]]
+    for start in starts:
+        if start.cost < NOT_FAR * starts[0].cost:
+            pairs += [(start.cause, both) for both in _companions(bench, start)]
+    exact = [bench.fit_from(fit) for fit in _early(bench, pairs)]
     best = max(exact, key=lambda fit: fit.log_evidence)
-    best = _climbed(bench, _climbed(bench, best))
+    if not is_hopeless(best):
+        best = _climbed(bench, _climbed(bench, best))
     base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
     fits: Fits = {best.hypothesis.causes[-1].key: best}
     climb_all(bench, base, fits)
-    return Ranking(base=base, fits=ranked(bench, fits), n_tried=first.n_tried * FIRSTS)
+    return Ranking(base=base, fits=ranked(bench, fits), n_tried=first.n_tried * len(starts))
+
+
+def _early(bench: Bench, pairs: list[tuple[Cause, Start]]) -> list[Fit]:
+    """Fit the best pairs with large errors, each one once whichever of its causes came first."""
+    pairs = _once(pairs)
+    limit = NOT_MUCH * pairs[0][1].cost
+    near = [_stepped(bench, *pair) if pair[1].cost < limit else pair for pair in pairs[:STEPPED]]
+    pairs = _once([*near, *pairs[STEPPED:]])
+    closer = bring_closer(bench, [((cause,), both) for cause, both in pairs[:CLOSER_PAIRS]])
+    early = [bench.fit_early((*known, both.cause), both.values) for known, both in closer[:EARLY_PAIRS]]
+    early.sort(key=lambda fit: fit.cost)
+    exact = early[: how_many(early, EXACT_PAIRS)]
+    return [fit for fit in exact if fit.cost <= FAR_BEHIND * early[0].cost + SLACK]
+
+
+def _once(pairs: list[tuple[Cause, Start]]) -> list[tuple[Cause, Start]]:
+    """Take each pair once, the best first."""
+    once: dict[frozenset[tuple[object, ...]], tuple[Cause, Start]] = {}
+    for pair in sorted(pairs, key=lambda pair: pair[1].cost):
+        once.setdefault(frozenset((pair[0].key, pair[1].cause.key)), pair)
+    return list(once.values())
+
+
+def _stepped(bench: Bench, cause: Cause, both: Start) -> tuple[Cause, Start]:
+    """Step one cause of a pair to better places, and then the other."""
+    for _ in range(2):
+        both = step_far(bench, (cause,), both)
+        count = len(bench.suppose((cause,)).parameters)
+        turned = np.concatenate([both.values[count:], both.values[:count]])
+        cause, both = both.cause, Start(cause=cause, values=turned, cost=both.cost)
+    return cause, both
 
 
 def _companions(bench: Bench, start: Start) -> list[Start]:
     """Find what explains most beside a cause, far from the axis."""
-    base = polish(bench.suppose((start.cause,)), bench.early, start.values, iterations=1)
+    base = polish(bench.suppose((start.cause,)), bench.early, start.values, iterations=0)
     starts = [one for one in wide_search(bench, base) if one.cause.key != start.cause.key]
     weights = weights_of(bench.coarse, REFINED_ERROR)
     found = []
-    for one in sorted(spread(starts, 1), key=lambda one: one.cost)[:COMPANIONS]:
+    for one in sorted(spread(starts, PLACES_EACH), key=lambda one: one.cost)[:COMPANIONS]:
         hypothesis = bench.suppose((start.cause, one.cause))
         values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, one.values]))
         found.append(Start(cause=one.cause, values=values, cost=cost))

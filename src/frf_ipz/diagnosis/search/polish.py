@@ -61,6 +61,8 @@ class Fit:
         The last step was small.
     freedom : float
         How many of what cannot be known the data determine: what `pull` is expected to be at most.
+    n_values : int
+        Real numbers that it was fitted to.
     """
 
     hypothesis: Hypothesis
@@ -72,6 +74,7 @@ class Fit:
     covariance: FloatArray
     converged: bool
     freedom: float
+    n_values: int
 
     @property
     def cost(self) -> float:
@@ -376,6 +379,7 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
         log_evidence=-0.5 * (misfit + pull) - log_volume + 0.5 * n_parameters * np.log(2 * np.pi) + log_prior,
         covariance=np.asarray(inverse[:n_parameters]),
         converged=converged,
+        n_values=len(point.misfit),
         freedom=float(np.sum(1 - (rows[:, n_parameters:] ** 2).sum(0))),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -14,8 +14,13 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
 from frf_ipz.diagnosis.search.refine import refine
 from frf_ipz.diagnosis.search.sketches import Start
-from frf_ipz.diagnosis.search.wide import best_start, wide_search
+from frf_ipz.diagnosis.search.wide import best_start, causes_of, wide_search
 
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.measured.transfer import Measured
+
+Supposed: TypeAlias = tuple[tuple[Cause, ...], Start]
+"""What is supposed already, and one more cause with the values of all."""
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
 
@@ -25,12 +30,16 @@ VERY_NEARLY = 2.0  # the same: nothing large can be missing
 SMALL_PULL = 600.0  # and this little is explained by what cannot be known
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
+MOST_OF_IT = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
+KEPT_PROMISE = 0.5  # of what a linear step promises: a fit that reaches less begins anew
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 PLACES_EACH = 3  # of an effect that are refined
 STEPPED, NOT_FAR = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
 NEAR = 2  # nodes or elements: places so near count as one there
+STEPPED_CLOSER = 3  # the same half-way to the axis
 FITTED = 12  # hypotheses that are fitted with large errors
-FITTED_EXACTLY = 7
+FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
+FAR_OFF = 300.0  # sum of squares over the number of values
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
 CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS = 2000.0  # nats behind the best: not looked at any more
@@ -114,8 +123,9 @@ def search(bench: Bench, base: Fit) -> Ranking:
         n_tried += len(starts)
         refined = _refined(bench, base, starts)
         fits = _fitted(bench, base, refined)
-    if base.misfit < NEARLY_RIGHT * size:
-        n_tried += _add_close(bench, base, fits)
+    near = base.misfit < NEARLY_RIGHT * size
+    if near or not is_hopeless(base):
+        n_tried += _add_close(bench, base, fits, least=PROMISING if near else MOST_OF_IT * base.cost)
     climb_all(bench, base, fits)
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
 
@@ -136,19 +146,22 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
         The best first.
     """
     order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    settled = [fit if fit.converged else bench.go_on(fit) for fit in order[:SETTLED]]
+    settled = [fit if fit.converged or is_hopeless(fit) else bench.go_on(fit) for fit in order[:SETTLED]]
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
 
 
-def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
+def _add_close(bench: Bench, base: Fit, fits: Fits, *, least: float) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
     found = close_search(bench, base)
     starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
     for start in starts:
-        if -start.cost > max(PROMISING, -starts[0].cost - HOPELESS) or start is starts[0]:
+        if -start.cost > max(least, -starts[0].cost - HOPELESS) or (start is starts[0] and least <= PROMISING):
             hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
             values = np.concatenate([base.values, start.values])
-            _keep(fits, bench.fit_beside(hypothesis, values, base))
+            fit = bench.fit_beside(hypothesis, values, base)
+            _keep(fits, fit)
+            if fit.cost > base.cost + KEPT_PROMISE * start.cost:
+                _keep(fits, bench.fit((*base.hypothesis.causes, start.cause), values))
     return len(found)
 
 
@@ -166,26 +179,70 @@ def _refined(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
         values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
         found.append(Start(cause=start.cause, values=values, cost=cost))
     found.sort(key=lambda start: start.cost)
-    stepped = [_stepped(bench, base, start) for start in found[:STEPPED] if start.cost < NOT_FAR * found[0].cost]
+    stepped = [step_far(bench, base.hypothesis.causes, start) for start in found[:STEPPED] if start.cost < NOT_FAR * found[0].cost]
     best: dict[tuple[object, ...], Start] = {}
     for start in sorted([*stepped, *found[len(stepped) :]], key=lambda start: start.cost):
         best.setdefault(start.cause.key, start)
     return list(best.values())
 
 
-def _stepped(bench: Bench, base: Fit, start: Start) -> Start:
-    """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way."""
-    weights = weights_of(bench.coarse, REFINED_ERROR)
+def bring_closer(bench: Bench, starts: Sequence[Supposed]) -> list[Supposed]:
+    """Bring starts half the way to the axis: their values, and the places of the best.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    starts : sequence of (tuple of Cause, Start)
+        Each with what is supposed besides.
+
+    Returns
+    -------
+    list of (tuple of Cause, Start)
+        By rising cost half-way.
+    """
+    weights = weights_of(bench.middle, REFINED_ERROR)
+    closer = []
+    for known, start in starts:
+        values, cost = refine(bench.suppose((*known, start.cause)), bench.middle, weights, start.values)
+        closer.append((known, Start(cause=start.cause, values=values, cost=cost)))
+    closer.sort(key=lambda one: one[1].cost)
+    best = [(known, _step(bench, known, start, bench.middle)) for known, start in closer[:STEPPED_CLOSER]]
+    return sorted([*best, *closer[STEPPED_CLOSER:]], key=lambda one: one[1].cost)
+
+
+def step_far(bench: Bench, known: tuple[Cause, ...], start: Start) -> Start:
+    """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    known : tuple of Cause
+        What is supposed besides, at the same places.
+    start : Start
+        With the values of all.
+
+    Returns
+    -------
+    Start
+        The same cause at a better place.
+    """
+    return _step(bench, known, start, bench.coarse)
+
+
+def _step(bench: Bench, known: tuple[Cause, ...], start: Start, measured: Measured) -> Start:
+    weights = weights_of(measured, REFINED_ERROR)
     seen = {start.cause.key}
     for _ in range(MOST_STEPS):
         better = start
         for place in start.cause.effect.neighbours(bench.specimen, start.cause.place):
             cause = Cause(effect=start.cause.effect, place=place, n_places=start.cause.n_places)
-            hypothesis = bench.suppose((*base.hypothesis.causes, cause))
+            hypothesis = bench.suppose((*known, cause))
             if cause.key in seen or len(hypothesis.parameters) != len(start.values):
                 continue
             seen.add(cause.key)
-            values, cost = refine(hypothesis, bench.coarse, weights, start.values, iterations=3)
+            values, cost = refine(hypothesis, measured, weights, start.values, iterations=3)
             if cost < better.cost - GAIN:
                 better = Start(cause=cause, values=values, cost=cost)
         if better is start:
@@ -228,14 +285,51 @@ def _beside(first: Cause, second: Cause) -> bool:
 
 def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     """Fit with large errors first, and exactly what then is not far behind."""
-    early = [bench.fit_early((*base.hypothesis.causes, start.cause), start.values) for start in refined[:FITTED]]
-    limit = FAR_BEHIND * min((fit.cost for fit in early), default=0.0) + SLACK
+    known = base.hypothesis.causes
+    closer = bring_closer(bench, [(known, start) for start in refined[:FITTED]])
+    early = [bench.fit_early((*known, start.cause), start.values) for known, start in closer]
+    early.sort(key=lambda fit: fit.cost)
     fits: Fits = {}
-    for fit in sorted(early, key=lambda fit: fit.cost)[:FITTED_EXACTLY]:
-        if fit.cost < limit:
+    for fit in early[: how_many(early, FITTED_EXACTLY)]:
+        if fit.cost < FAR_BEHIND * early[0].cost + SLACK:
             _keep(fits, bench.fit_from(fit))
-    _fit_imitators(bench, early, fits)
+    if not is_hopeless(early[0]):
+        _fit_imitators(bench, early, fits)
     return fits
+
+
+def is_hopeless(fit: Fit) -> bool:
+    """Tell whether a fit is so far off that its causes are wrong, or some are missing.
+
+    Parameters
+    ----------
+    fit : Fit
+        With large errors, or exact.
+
+    Returns
+    -------
+    bool
+        Then no time is spent on its place.
+    """
+    return fit.misfit > FAR_OFF * fit.n_values
+
+
+def how_many(early: Sequence[Fit], usual: int) -> int:
+    """Say how many fits with large errors are worth an exact one.
+
+    Parameters
+    ----------
+    early : sequence of Fit
+        By rising cost.
+    usual : int
+        Where one of them is nearly right.
+
+    Returns
+    -------
+    int
+        Few where none is.
+    """
+    return FITTED_HOPELESS if early and is_hopeless(early[0]) else usual
 
 
 def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
@@ -263,13 +357,27 @@ def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
         By the key of their last cause, whose place is changed; new fits are added.
     """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
+    if ranked and not is_hopeless(ranked[0]):
+        _add_imitators(bench, base, ranked[0], fits)
+        ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     leaders: dict[str, Fit] = {}
     for fit in ranked:
         leaders.setdefault(fit.hypothesis.causes[-1].effect.name, fit)
     for leader in list(leaders.values())[:CLIMBED]:
         best = max(fit.log_evidence for fit in fits.values())
-        if leader.log_evidence > best - HOPELESS:
+        if leader.log_evidence > best - HOPELESS and not is_hopeless(leader):
             _climb(bench, base, leader, fits)
+
+
+def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
+    """Fit what looks like the best, at its place."""
+    cause = best.hypothesis.causes[-1]
+    for effect in bench.effects.values():
+        if effect.name not in cause.effect.imitators and cause.effect.name not in effect.imitators:
+            continue
+        for other in causes_of(effect, bench.specimen):
+            if other.place.location == cause.place.location and other.key not in fits:
+                fits[other.key] = _from_neighbour(bench, base, other, best)
 
 
 def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:

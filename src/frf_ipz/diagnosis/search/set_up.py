@@ -74,7 +74,9 @@ def set_up(
     places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     basis = make_basis(model, 2 * np.pi * band_hz[1], places)
     nuisance = make_nuisance(basis, layout, options)
-    coarse = source.coarse if free_gains == "none" else _scaled(source.coarse, basis, layout, nuisance, free_gains)
+    coarse, middle = source.coarse, source.middle
+    if free_gains != "none":
+        coarse, middle = (_scaled(one, basis, layout, nuisance, free_gains) for one in (coarse, middle))
     n_points = len(source.training.s)
     half = points_of(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
     few = points_of(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
@@ -85,6 +87,7 @@ def set_up(
         nuisance=nuisance,
         effects=effects,
         coarse=coarse,
+        middle=middle,
         data=with_errors(source.training, options, free_gains=free_gains),
         early=replace(early, is_bounded=False),
         thin=with_errors(few, options, free_gains=free_gains),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
@@ -13,6 +14,7 @@ from frf_ipz.fe.beams.variants import with_formulation
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.finding import Estimate
+    from frf_ipz.structure import StructuralModel
 
 
 class ShearRotaryInertia(Effect):
@@ -35,7 +37,7 @@ class ShearRotaryInertia(Effect):
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Exchange the elements."""
         del place
-        change = Change(model=with_formulation(specimen.model, "timoshenko"))
+        change = Change(model=_exchanged(specimen.model))
         return lambda _: change
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
@@ -45,3 +47,8 @@ class ShearRotaryInertia(Effect):
             "The beam is too thick for the Euler-Bernoulli theory of the model: it lacks shear flexibility and rotary "
             'inertia (formulation = "timoshenko").'
         )
+
+
+@lru_cache(maxsize=2)  # a search asks for the same one again and again
+def _exchanged(model: StructuralModel) -> StructuralModel:
+    return with_formulation(model, "timoshenko")

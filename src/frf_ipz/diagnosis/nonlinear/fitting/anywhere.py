@@ -104,7 +104,7 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
     for _ in range(n_turns):
         start = Start(law=CubicStiffness(), place=place, strength=0.0, shape=0.0, unknowns=unknowns)
         response, w, v = motion_at(stretches, freedom, start, clock, force)
-        forces = clock.at_lines(_simple_forces(w, v))
+        forces = clock.at_lines(simple_forces(w, v))
         rows, misfit = _rows(stretches, linear, response, start, forces, force)
         step = _solve(rows, misfit, unknowns)
         left = misfit - step @ rows
@@ -117,23 +117,35 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
     return AnyForce(place=place, cost=best)
 
 
-def _simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:
-    """(n_laws, n_blows, n_times) forces of size one."""
+def simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:
+    """Give forces of many kinds, none of them above one.
+
+    Parameters
+    ----------
+    w, v : (n_blows, n_times) array
+        Motion and velocity of a place, m and m/s.
+
+    Returns
+    -------
+    (n_kinds, n_blows, n_times) array
+        N.
+    """
     x, y = w / max(float(np.abs(w).max()), 1e-300), v / max(float(np.abs(v).max()), 1e-300)
     forces = [x * x, x**3, x**5, x * np.abs(x), y * np.abs(y), y**3, x * x * y, np.tanh(y / STEEP)]
     for part in DEAD_ZONES:
         forces += [np.maximum(sign * x - part, 0.0) for sign in (1, -1)]
-    return np.array(forces + [_slipping(x, part) for part in YIELDS])
+    return np.concatenate([np.array(forces), _slipping(x)])
 
 
-def _slipping(x: FloatArray, limit: float) -> FloatArray:
-    """Stretch of a spring in series with friction, which slips beyond a limit."""
-    steps = np.diff(x, axis=-1, prepend=0.0)
-    found, stretch = np.zeros(x.shape), np.zeros(len(x))
-    for k, step in enumerate(steps.T):
-        stretch = np.clip(stretch + step, -limit, limit)
-        found[:, k] = stretch
-    return found / limit
+def _slipping(x: FloatArray) -> FloatArray:
+    """(n_yields, n_blows, n_times) stretches of springs in series with friction, which slip beyond a limit."""
+    steps = np.ascontiguousarray(np.diff(x, axis=-1, prepend=0.0).T)
+    limits = np.array(YIELDS)[:, None]
+    lowest, found, stretch = -limits, np.zeros((len(steps), len(limits), len(x))), np.zeros((len(limits), len(x)))
+    for step, here in zip(steps, found, strict=True):
+        np.minimum(np.maximum(stretch + step, lowest), limits, out=here)
+        stretch = here
+    return np.asarray((found / limits).transpose(1, 2, 0))
 
 
 def _rows(

@@ -28,7 +28,7 @@ OF_ALL = 5
 SIMULATED = 2  # places of each law that are simulated on short stretches
 TURNS = 6  # of the refinement
 FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
-HOPELESS = 10.0  # times the smallest cost
+HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
 FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
@@ -80,7 +80,7 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
     _climb(short, early)
     early.sort(key=lambda fit: fit.cost)
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
-    fits = _simulated(long, _different(finalists))
+    fits = _simulated(long, _different(finalists), hopeless=HOPELESS_LATE)
     _climb(long, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
@@ -112,11 +112,11 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
     return sorted(fits, key=lambda fit: fit.cost)
 
 
-def _simulated(track: Track, fits: Sequence[LawFit]) -> list[LawFit]:
+def _simulated(track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS) -> list[LawFit]:
     """Fit by simulation; those that stay hopeless after a few steps only so far."""
     found = [track.shoot(fit, FIRST) for fit in fits]
     least = min((fit.cost for fit in found), default=np.inf)
-    return [fit if fit.settled or fit.cost > HOPELESS * least else track.shoot(fit, MORE) for fit in found]
+    return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:

@@ -166,20 +166,19 @@ def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: Float
     March
         Force and motion.
     """
-    readers, modes = place.readers, place.modes
-    per_force = place.compliance()
-    step = StepCompliance(float(per_force[0]), float(per_force[1]), *numbers)
+    readers, modes = place.readers.T, place.modes
+    per_unit = place.compliance()
+    step = StepCompliance(float(per_unit[0]), float(per_unit[1]), *numbers)
     n_blows, n_times = motion.shape
-    z = np.zeros((n_blows, len(modes.turn)), complex)
-    force = np.zeros(n_blows)
-    forces, free = np.zeros((n_times, n_blows)), np.zeros((n_times, 2, n_blows))
-    given = np.ascontiguousarray(np.stack([motion.T, velocity.T], 1))
+    turn, per_force = modes.turn[:, None], (modes.turn * modes.after + modes.before)[:, None]
+    z = np.zeros((len(turn), n_blows), complex)  # all that happened before the present step does
+    forces, free = np.zeros((n_times, n_blows)), np.ascontiguousarray(np.stack([motion.T, velocity.T], 1))
     for k in range(n_times):
-        z *= modes.turn
-        z -= force[:, None] * modes.before
-        free[k] = given[k] + (z @ readers).imag.T
-        force = law.solve(free[k, 0], free[k, 1], step)
-        z -= force[:, None] * modes.after
+        here = free[k]
+        here += (readers @ z).imag
+        force = law.solve(here[0], here[1], step)
+        z *= turn
+        z -= per_force * force
         forces[k] = force
     free_motion, free_velocity = free[:, 0].T, free[:, 1].T
     return March(
@@ -192,8 +191,8 @@ def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: Float
     )
 
 
-def follow(law: Law, place: Yielding, done: March, changes: FloatArray) -> FloatArray:
-    """Change of a law's force by small changes of the motion without it, and of the law's numbers.
+def follow(law: Law, place: Yielding, done: March, changes: FloatArray, added: FloatArray | None = None) -> FloatArray:
+    """Change of the force by small changes of the motion without it and of the law's numbers, and by further forces.
 
     Parameters
     ----------
@@ -205,13 +204,18 @@ def follow(law: Law, place: Yielding, done: March, changes: FloatArray) -> Float
         What the law did.
     changes : (n_changes, 2, n_blows, n_times) array
         Of motion and velocity.
+    added : (n_added, n_blows, n_times) array, optional
+        Forces besides the law, each a little of it, in the motion as it is, N.
 
     Returns
     -------
-    (n_changes + 1 or 2, n_blows, n_times) array
-        Of the force; the last ones for a strength, and a shape if the law has one, that grow by their own size.
+    (n_changes + 1 or 2 + n_added, n_blows, n_times) array
+        Of the force; after the changes for a strength, and a shape if the law has one, that grow by their own size.
     """
     by_motion, by_velocity, by_numbers = _slopes(law, done)
+    if added is not None:
+        yields = 1 - done.step.motion * by_motion - done.step.velocity * by_velocity
+        by_numbers = np.concatenate([by_numbers, added * yields])
     n_changes, n_numbers = len(changes), len(by_numbers)
     n_blows, n_times = done.force.shape
     given = np.zeros((n_changes + n_numbers, n_blows, n_times))

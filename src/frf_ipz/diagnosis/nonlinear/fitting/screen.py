@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
+STEPS, SETTLED = 6, 0.01  # of the linear model: at most, and the relative drop of the cost that is worth a step
 LEAST_MOTION = 1e-9  # of the largest motion of all places: nothing can be said of a place that rests
 
 
@@ -102,7 +103,7 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     Returns
     -------
     LinearFit
-        One step from the nominal model.
+        One step from the nominal model; its cost is what further steps come down to.
     """
     plant, used = freedom.plant, stretches.used
     response = respond(plant, stretches.s, no_deviations(plant))
@@ -115,6 +116,7 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     seen = linalg.solve_triangular(factor, columns @ misfit, lower=True)
     unknowns = linalg.solve_triangular(factor.T, seen, lower=False)
     beyond[freedom.moving] -= freedom.sensor_starts(unknowns, response)
+    cost = float(misfit @ misfit - seen @ seen)
     return LinearFit(
         response=response,
         freedom=freedom,
@@ -123,8 +125,27 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
         misfit=misfit,
         columns=columns,
         factor=factor,
-        cost=float(misfit @ misfit - seen @ seen),
+        cost=min(cost, _settled_cost(stretches, freedom, unknowns)),
     )
+
+
+def _settled_cost(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> float:
+    """Cost of the linear model after a few steps: a law must gain more than the first one has left."""
+    used, best = stretches.used, np.inf
+    nothing = np.zeros((stretches.n_blows, len(used)), complex)
+    for _ in range(STEPS):
+        response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
+        shown = linear_motion(stretches, freedom, response)
+        shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+        misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
+        cost = float(misfit @ misfit + unknowns @ unknowns)
+        if cost > (1 - SETTLED) * best:
+            return min(best, cost)
+        best, no_shapes = cost, np.zeros(freedom.plant.n_modes)
+        columns = as_real(freedom.columns(stretches, response.on(used), nothing, no_shapes, unknowns))
+        normal = columns @ columns.T + np.eye(len(columns))
+        unknowns = unknowns + linalg.solve(normal, columns @ misfit - unknowns, assume_a="pos")
+    return best
 
 
 def screen(

@@ -6,6 +6,7 @@ change by each unknown. Steps are damped as long as the simulation gets worse (L
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,7 @@ SETTLED = 3e-3  # relative drop of the cost
 ROUNDING = 1e-10  # added to normal equations of unit diagonal: they stay positive
 TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
 LONGEST = 0.5  # relative change of a law's number in one step
+Kinds = Callable[[FloatArray, FloatArray], FloatArray]
 WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
 
 
@@ -94,6 +96,36 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
     return _finish(shot, rows, settled=settled)
 
 
+def gain_of_further(stretches: Stretches, freedom: Freedom, start: Start, kinds: Kinds) -> float:
+    """Say how far forces of other kinds at a law's place, free in all their strengths, would lower the cost.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    freedom : Freedom
+        Unknowns of the linear model.
+    start : Start
+        The law as it was fitted.
+    kinds : callable
+        Gives the forces, (n_kinds, n_blows, n_times), for motion and velocity.
+
+    Returns
+    -------
+    float
+        Drop of the weighted sum of squares, as far as small strengths tell.
+    """
+    shot = _fire(stretches, freedom, start)
+    forces = kinds(shot.done.motion, shot.done.velocity)
+    rows = _slopes(stretches, freedom, shot, forces)
+    n_plain = len(rows) - len(forces)
+    sizes = np.linalg.norm(rows[n_plain:], axis=1)
+    rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
+    normal, right = _normal(shot, rows)
+    drops = [right[:n] @ _solve(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
+    return float(drops[1] - drops[0])
+
+
 def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
     yielding = place.yielding(constant=start.law.holds)
@@ -116,11 +148,11 @@ def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexAr
     return lines * np.exp(stretches.s * clock.step_s / 2) if holds else lines
 
 
-def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot) -> FloatArray:
-    """Derive the weighted responses by unknowns, strength and shape (times their size), (.., n_rows)."""
+def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
+    """Derive the weighted responses by unknowns, strength and shape (times their size), and further forces."""
     start, used, n_free = shot.start, stretches.used, len(freedom.modes)
     changes = shot.place.changes(shot.done.force)
-    by_force = follow(start.law, shot.yielding, shot.done, changes)
+    by_force = follow(start.law, shot.yielding, shot.done, changes, added)
     to_sensors = shot.response.to_sensors(start.place)[:, used]
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]

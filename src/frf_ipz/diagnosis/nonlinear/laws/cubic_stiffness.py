@@ -30,5 +30,5 @@ class CubicStiffness(Law):
         u, scale = w, step.motion * step.strength
         for _ in range(NEWTON_STEPS):
             square = scale * (u * u)
-            u = u - (u + square * u - w) / (1 + 3 * square)
+            u = (2 * square * u + w) / (1 + 3 * square)
         return np.asarray(step.strength * u * u * u)

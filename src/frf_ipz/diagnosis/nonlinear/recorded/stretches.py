@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len, prev_fast_len
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import resample
+from scipy.signal.windows import tukey
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
@@ -32,6 +33,11 @@ BEFORE = 4  # samples before the pulse
 FIRST_SAMPLES, FIRST_PART = 8, 1e-3  # of a record: what is looked at to see whether it starts at rest
 AT_REST = 0.05  # of a signal's size
 AROUND = 5  # lines over which a response's size is averaged
+EARLY = 0.08  # of a stretch: where its largest motion lies, after which it counts less and less
+ABOUT = 0.04  # of a stretch: over which the largest motion is taken
+FADED = 0.1  # of a record, both ends together
+QUIETER = 0.8  # of the largest motion of a record: with less in its first part, a louder stretch is looked at besides
+LOW = 0.5  # of the bottom of the band: slower drift is no motion of the structure
 OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
 
 
@@ -226,13 +232,34 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
         start = min(EDGE + round(window.start_s / step), shortest - n - EDGE)
         return [_Cut(i, isolate_pulse(blow).blow, start, is_moving=True) for i, blow in enumerate(blows)], n
     room, count, cuts = shortest - n - 2 * EDGE, window.per_record, []
-    for i, blow in enumerate(blows):
+    sizes = _sizes(observations, n)
+    for i, (blow, size) in enumerate(zip(blows, sizes, strict=True)):
+        loudest = EDGE + min(max(int(np.argmax(size[EDGE:])) - round(EARLY * n), 0), max(room, 0))
         if _starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
             cuts.append(_Cut(i, blow, 0, is_moving=False))
+            if size[: n // 4].max() < QUIETER * size.max():
+                cuts.append(_Cut(i, blow, loudest, is_moving=True))
             continue
         parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
+        nearest = int(np.argmin([abs(part - loudest) for part in parts]))
+        parts[nearest] = loudest
         cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
+
+
+def _sizes(observations: Observations, n: int) -> list[FloatArray]:
+    """How far the structure moves in each record at each time: what a stop or a stiffening spring answers to."""
+    low, found = observations.band_hz[0], []
+    for blow in observations.blows:
+        frequency = np.fft.rfftfreq(blow.n_samples, blow.step_s)
+        s = 2j * np.pi * np.maximum(frequency, low)
+        powers = np.array([sensor.quantity.power for sensor in blow.sensors])[:, None]
+        faded = blow.responses * tukey(blow.n_samples, FADED)  # what jumps from the end to the start would ring
+        lines = np.fft.rfft(faded) * (frequency >= LOW * low) / s**powers
+        motion = np.fft.irfft(lines, blow.n_samples)
+        motion /= np.maximum(motion.std(1, keepdims=True), 1e-300)
+        found.append(maximum_filter1d(np.abs(motion).max(0), max(round(ABOUT * n), 1)))
+    return found
 
 
 def _starts_at_rest(blow: Blow) -> bool:
