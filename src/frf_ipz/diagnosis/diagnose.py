@@ -6,6 +6,7 @@ Detection and naming rest on the evidence of each hypothesis; the verdict on wha
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ from frf_ipz.diagnosis.judging.decision import (
 from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
+from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
@@ -39,7 +41,7 @@ from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.finding import Finding
@@ -93,17 +95,18 @@ def diagnose(
     InputError
         If the model lacks a DOF that was measured, or an effect is not known.
     """
-    effects = chosen_effects(options, folder)
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.0, "measuring transfer functions")
     source = divide(observations)
-    bench = set_up(model, source, observations.band_hz, options, _identifiable(effects, scale), free_gains=scale)
+    kept = _identifiable(chosen_effects(options, folder), scale)
+    at_bench = partial(set_up, model, source, observations.band_hz, effects=kept, free_gains=scale)
+    bench = at_bench(options)
     laws = _laws(model, observations, options, folder, progress)
     gates = check(source, None if laws is None else laws.linearity)
     nonlinear = laws is not None and laws.is_nonlinear and bool(chosen_laws(options, folder))
     certain = nonlinear and laws is not None and laws.linearity.score > CERTAIN * laws.linearity.limit
-    found = decide(bench, progress) if effects and not certain else only_null(bench)
-    nonlinear &= certain or not effects or found.verdict == UNEXPLAINED
+    bench, found, complaint = _decide(bench, at_bench, options, progress, is_certain=certain)
+    nonlinear &= certain or not kept or found.verdict == UNEXPLAINED
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
@@ -131,7 +134,26 @@ def diagnose(
     )
     if laws is not None and nonlinear:
         return _with_law(linear, laws)
-    return replace(linear, statement=_statement(found, linear.findings))
+    return replace(linear, statement=_statement(found, linear.findings, complaint))
+
+
+def _decide(
+    bench: Bench,
+    at_bench: Callable[[DiagnoseOptions], Bench],
+    options: DiagnoseOptions,
+    progress: Progress,
+    *,
+    is_certain: bool,
+) -> tuple[Bench, Decision, str]:
+    """Decide what is missing, unless a law is; where damping alone has no explanation, once more with damping free."""
+    is_searched = bool(bench.effects) and not is_certain
+    found = decide(bench, progress) if is_searched else only_null(bench)
+    if is_searched and is_damping_alone(bench, found):
+        freed = at_bench(with_any_damping(options))
+        again = decide(freed, progress)
+        if again.good.is_good:
+            return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
+    return bench, found, found.good.complaint
 
 
 def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
@@ -241,17 +263,14 @@ def _ambiguity(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[A
     )
 
 
-def _statement(found: Decision, findings: tuple[Finding, ...]) -> str:
+def _statement(found: Decision, findings: tuple[Finding, ...], complaint: str) -> str:
     said = " ".join(finding.statement for finding in findings)
     if found.verdict == CONSISTENT:
         return "The nominal model explains the measurement within noise and its tolerances: nothing is missing."
     if found.verdict == EXPLAINED:
         return f"{said} With that, the model explains the measurement."
     partly = f" A part of it is explained: {said}" if said else ""
-    return (
-        "Something is missing that nothing in the catalogue explains: the best explanation "
-        f"{found.good.complaint}.{partly}"
-    )
+    return f"Something is missing that nothing in the catalogue explains: {complaint}.{partly}"
 
 
 def _numbers(found: Decision) -> dict[str, float]:

@@ -131,8 +131,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: Fitted, options: FitOptions, support: Su
     order, n_modes = mode_order(fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))
     modes = order[:n_modes]
     doubted = doubts(support, modes)
-    scatter, shift = (support.scatter, support.shift) if support else (1.0, np.zeros(2 * len(fit.poles)))
-    errors = fit_errors(fit, terms, levels(fitted) * scatter**2, shift)
+    raised, shift = (support.raised, support.shift) if support else (1.0, np.zeros(2 * len(fit.poles)))
+    errors = fit_errors(fit, terms, levels(fitted) * raised, shift)
     own = replace(errors, pole_root=np.zeros_like(errors.pole_root))  # errors of poles move equal FRFs alike
     gains = find_gains(
         frfs.labels,
@@ -205,8 +205,8 @@ def _warnings(frfs: FrfSet, fitted: Fitted, support: Support | None, doubted: tu
         )
     if support is not None and support.scatter > 1:
         said.append(
-            f"even and odd lines, each fitted by themselves, differ by {support.scatter:.2g} of their standard "
-            "deviations (root of mean square): all standard deviations are raised by that"
+            f"even and odd lines, each fitted by itself, differ by {support.scatter:.2g} of their standard "
+            "deviations (root of mean square): standard deviations are raised to cover that"
         )
     if any(doubted):
         said.append(

@@ -46,6 +46,9 @@ class Support:
         In how many of the halves each pole comes up; both, where it is too narrow for the lines of a half.
     scatter : float
         Difference of the halves over its standard deviation, root of mean square; 1 where chance explains it.
+    raised : (2 n_poles,) array
+        Factor on each pole's variance by which the stated one covers the halves' differences, at least 1: all real
+        parts, then all imaginary parts.
     shift : (2 n_poles,) array
         Standard deviation of each pole by modes near it that may be there or not: all real parts, then all imaginary
         parts, rad/s.
@@ -53,6 +56,7 @@ class Support:
 
     times: IntArray
     scatter: float
+    raised: FloatArray
     shift: FloatArray
 
 
@@ -112,11 +116,20 @@ def find_support(frfs: FrfSet, fitted: Fitted, options: FitOptions) -> Support |
     both = (partners >= 0).all(axis=0)
     line = 2 * np.pi * HALVES * fitted.lines.line_hz
     times = np.where(-poles.real < NARROW * line, HALVES, np.sum(partners >= 0, axis=0))
-    differences = [half.poles[partner[both]] for half, partner in zip(halves, partners, strict=True)]
-    variance = sum(half.variance[:, partner[both]] for half, partner in zip(halves, partners, strict=True))
-    difference = differences[0] - differences[1]
-    squares = np.stack([difference.real, difference.imag]) ** 2 / variance
-    return Support(times=times, scatter=_scatter(squares), shift=_shift(fitted, times))
+    found = [
+        (half.poles[partner[both]], half.variance[:, partner[both]])
+        for half, partner in zip(halves, partners, strict=True)
+    ]
+    difference = found[0][0] - found[1][0]
+    variance = found[0][1] + found[1][1]
+    scatter = _scatter(np.stack([difference.real, difference.imag]) ** 2 / variance)
+    raised = np.ones((2, len(poles)))
+    if scatter > 1:
+        # all lines have half the variance of one of the halves, that is a quarter of the difference's
+        covered = scatter**2 * variance / HALVES**2 / (levels(fitted) * _stated(fitted)).reshape(2, -1)[:, both]
+        raised[:, both] = covered
+        raised[:, ~both] = np.median(covered)
+    return Support(times=times, scatter=scatter, raised=np.maximum(raised, 1.0).ravel(), shift=_shift(fitted, times))
 
 
 def _half(frfs: FrfSet, options: FitOptions) -> _Half:

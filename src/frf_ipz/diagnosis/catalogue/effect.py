@@ -154,6 +154,11 @@ class Effect(ABC):
         """Give values to start from, (n_starts, n_parameters): a grid over the bounds unless it knows better."""
         return grid(self.parameters(specimen, place), 8)
 
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Say how likely values at a place are beside what is stated by bounds and the number of places, nats."""
+        del specimen, place, values
+        return 0.0
+
     def reported(self, place: Place, name: str, value: float) -> float:
         """Turn a value that was searched into the one that is reported: a sign, for one."""
         del place, name

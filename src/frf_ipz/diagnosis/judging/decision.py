@@ -82,12 +82,26 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     two = _beside(bench, one, second)
     if two is None:
         return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > needed else null)
+    alone = _one_is_enough(bench, one, two.final)
+    if alone is not None:
+        return alone
     is_far = two.good.misfit > NEARLY_RIGHT
     if two.verdict == EXPLAINED or is_far or gain_over(second.best, second.base) < STRONG_NATS:
         return two
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search(bench, second.best))
     return three if three is not None and three.verdict == EXPLAINED else two
+
+
+def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
+    """Leave out a cause beside which the other one explains as much: it only helped to find it."""
+    for number in range(2):
+        alone = fit_without(bench, both, number)
+        good = goodness(bench, alone)
+        if good.is_good and gain_over(both, alone) <= SECOND_NATS:
+            fits = tuple(sorted((alone, *one.ranking.fits), key=lambda fit: -fit.log_evidence))
+            return replace(one, final=alone, ranking=replace(one.ranking, fits=fits), good=good)
+    return None
 
 
 def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:

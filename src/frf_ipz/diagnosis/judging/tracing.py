@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.search.bench import weights_of
+from frf_ipz.diagnosis.search.far.sketches import receptances
 from frf_ipz.diagnosis.search.search import NEARLY_RIGHT
-from frf_ipz.diagnosis.search.sketches import receptances
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

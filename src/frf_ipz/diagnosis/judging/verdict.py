@@ -86,13 +86,14 @@ class Goodness:
 
     @property
     def complaint(self) -> str:
-        """What is worst about it, in words that follow "the best explanation"."""
-        return (
+        """What is worst about it, in words that begin with "the best explanation"."""
+        worst = (
             f"leaves {np.sqrt(self.misfit):.3g} times the expected misfit",
             "needs more than the tolerances of the nominal model allow "
             f"({self.pull:.0f} squared deviations, {self.most_pull:.0f} are likely)",
             f"leaves {np.sqrt(self.worst_piece):.3g} times the expected misfit in one FRF over a part of the band",
         )[int(np.argmax(self._over_limits))]
+        return f"the best explanation {worst}"
 
     @property
     def _over_limits(self) -> tuple[float, float, float]:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.search.far.sketches import AT_ONCE, Start, receptances
+from frf_ipz.diagnosis.search.far.wide import causes_of
 from frf_ipz.diagnosis.search.score import Score, score_on
-from frf_ipz.diagnosis.search.sketches import AT_ONCE, Start, receptances
-from frf_ipz.diagnosis.search.wide import causes_of
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray

@@ -117,11 +117,20 @@ class Hypothesis:
 
     def change(self, values: FloatArray) -> Change:
         """Everything that is changed for physical values of the parameters."""
-        total, start = NOTHING, 0
-        for build, count in zip(self.builders, self.counts, strict=True):
-            total = total + build(values[start : start + count])
-            start += count
+        total = NOTHING
+        for build, own in zip(self.builders, self._split(values), strict=True):
+            total = total + build(own)
         return total
+
+    def log_prior(self, values: FloatArray) -> float:
+        """How likely the places are, and the values beside their bounds, nats."""
+        return sum(
+            cause.effect.log_prior(self.specimen, cause.place, own) - float(np.log(cause.n_places))
+            for cause, own in zip(self.causes, self._split(values), strict=True)
+        )
+
+    def _split(self, values: FloatArray) -> list[FloatArray]:
+        return np.split(values, np.cumsum(self.counts)[:-1]) if self.counts else []
 
     def modes(self, values: FloatArray, unknown: FloatArray) -> Modes:
         """Modes for physical values of the parameters, and of what cannot be known in standard deviations."""
@@ -174,4 +183,3 @@ def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *
         specimen=specimen,
         nuisance=nuisance,
     )
-

@@ -12,24 +12,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.far.refine import refine
+from frf_ipz.diagnosis.search.far.sketches import Start
+from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spread, step_far
+from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.polish import Fit, polish
-from frf_ipz.diagnosis.search.refine import refine
 from frf_ipz.diagnosis.search.search import (
     NEARLY_RIGHT,
-    REFINED_ERROR,
     Fits,
     Ranking,
-    bring_closer,
     climb_all,
     how_many,
     is_hopeless,
     ranked,
     search,
-    spread,
-    step_far,
 )
-from frf_ipz.diagnosis.search.sketches import Start
-from frf_ipz.diagnosis.search.wide import wide_search
 
 if TYPE_CHECKING:
     from collections.abc import Callable

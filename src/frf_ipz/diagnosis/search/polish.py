@@ -365,14 +365,15 @@ def _finish(hypothesis: Hypothesis, point: _Point, slope: _Slope, *, converged: 
     curvature = slope.curvature(hypothesis)
     lower = _factor(curvature)
     log_volume = float(np.sum(np.log(np.diag(lower))))
-    log_prior = -sum(np.log(cause.n_places) for cause in hypothesis.causes)
+    values = hypothesis.physical(point.searched)
+    log_prior = hypothesis.log_prior(values)
     log_prior -= float(np.sum(np.log(hypothesis.high - hypothesis.low)))
     misfit, pull = float(point.misfit @ point.misfit), float(point.pulls @ point.pulls)
     rows = linalg.solve_triangular(lower, np.eye(len(curvature)), lower=True, check_finite=False)
     inverse = linalg.cho_solve((lower, True), np.eye(len(curvature))[:, :n_parameters])
     return Fit(
         hypothesis=hypothesis,
-        values=hypothesis.physical(point.searched),
+        values=values,
         unknown=point.unknown,
         misfit=misfit,
         pull=pull,

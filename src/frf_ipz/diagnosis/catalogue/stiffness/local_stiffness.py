@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BOUNDS = 0.02, 20.0
 TRIED = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.97, 1.03, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
 LENGTHS = (1, 2, 4, 8, 16)  # of stretches of elements that are searched; others are found from them
+USUAL_LENGTH, WITHIN = 0.04, 2.0  # of the whole: a crack takes away stiffness over about three heights; to a factor
+LEAST_CHANGE = 0.03  # of stiffness: below, all changes are as likely
 LONGEST = 4  # of the whole, as a divisor: longer stretches are not local
 KEYS = {"element": "elements", "spring": "springs", "group": "groups"}
 
@@ -81,6 +83,19 @@ class LocalStiffness(Effect):
         moves = {(a, b) for step in (1, wide) for a in (-step, 0, step) for b in (-step, 0, step)} - {(0, 0)}
         tried = [(first + a, last + b) for a, b in sorted(moves)]
         return [_stretch(a, b) for a, b in tried if 1 <= a <= b <= total and b - a < max(total // LONGEST, 1)]
+
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Expect some length, and the size of the change in flexibility to be known by its logarithm only.
+
+        A short stretch that changes much and a longer one that changes little look alike. Without this the short one
+        is preferred, whose change has the larger uncertainty.
+        """
+        by_size = -float(np.log(max(abs(values[0] - 1), LEAST_CHANGE)))
+        if place.key[0] != "element":
+            return by_size
+        usual = max(USUAL_LENGTH * sum(part.kind == "element" for part in specimen.model.parts), 1.0)
+        length = int(str(place.key[2])) - int(str(place.key[1])) + 1
+        return by_size - 0.5 * float(np.log(length / usual) / np.log(WITHIN)) ** 2
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which part, and by how much."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.far.refine import robust_misfit
+from frf_ipz.diagnosis.search.far.sketches import Start, search_sketches
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.refine import robust_misfit
-from frf_ipz.diagnosis.search.sketches import Start, search_sketches
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect
