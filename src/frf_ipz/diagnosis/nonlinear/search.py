@@ -30,7 +30,7 @@ from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, starts_at_rest, transform
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -50,14 +50,16 @@ if TYPE_CHECKING:
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
+LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
 USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains the recordings
 CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
 MOST_APART = 9.0  # mean square of what blows disagree in besides the law, over the expected one
-BENT_NATS, BENT_PART = 250.0, 0.1  # evidence, and part of what is left, that a force of another kind may gain
-BENT_PART_MOVING = 0.75  # the same where stretches start in motion: how they start is known in the first modes only
+BENT_NATS = 250.0  # evidence that forces of other kinds at the place of a law may gain
+BENT = 0.1, 0.01  # and parts of what is left, and of what the law explains
+BENT_MOVING = 0.5, 0.05  # the same where stretches start in motion: how they start is known in the first modes only
 NEAR, MOST_NEAR = 5.0, 4  # times the smallest cost: laws at whose places an unknown one may sit, and how many
 PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
@@ -170,10 +172,12 @@ def search_laws(
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
 
-    short, long = track_of(SHORT, ROUGH), track_of(LONG, FINE)
+    is_longer = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
+    periods = LONGER if is_longer else LONG
+    short, long = track_of(SHORT, ROUGH), track_of(periods, FINE)
     missed = long.linear.cost / long.linear.n_rows
     if missed < USUAL:
-        long = track_of(LONG, max(FINE * float(np.sqrt(missed / USUAL)), FINEST))
+        long = track_of(periods, max(FINE * float(np.sqrt(missed / USUAL)), FINEST))
     fits = find_candidates(short, long, laws)
     found = _judge(long, linearity, plant, fits)
     if found.verdict == UNEXPLAINED:
@@ -279,13 +283,19 @@ def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) ->
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
-    bent = _drop(track, best)
-    most_bent = BENT_PART_MOVING if track.stretches.moving.any() else BENT_PART
-    if 0.5 * bent / max(1.0, left) > BENT_NATS and bent > most_bent * best.cost:
-        return f"is bent: a force of another kind at its place would gain {0.5 * bent:.0f} nats more"
     if part > MOST_LEFT:
         return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
+    bent = _drop(track, best)
+    if _is_bent(track, best, bent):
+        return f"is bent: forces of other kinds at its place would gain {0.5 * bent:.0f} nats more"
     return ""
+
+
+def _is_bent(track: Track, fit: LawFit, drop: float) -> bool:
+    """Other forces at the place of a law explain more than errors of the model imitate."""
+    of_cost, of_gain = BENT_MOVING if track.stretches.moving.any() else BENT
+    needed = max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))
+    return drop > needed and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > BENT_NATS
 
 
 def _gain(fit: LawFit, drop: float, n_places: int, scale: float) -> float:

@@ -73,3 +73,32 @@ def test_small_changes_are_followed(name, numbers):
     assert np.linalg.norm(by_change) > 0
     for mine, other in zip(found, (by_change, by_strength), strict=False):
         assert np.linalg.norm(mine - other) <= DERIVATIVE * np.linalg.norm(other)
+
+
+def test_a_small_force_besides_a_law_is_followed():
+    law, place, (w, v) = shipped_laws()["cubic_stiffness"], oscillator(), linear_motion()
+    k3, spring = 3e6, 2e3
+
+    class Both(type(law)):
+        part = 0.0
+
+        def solve(self, w, v, step):
+            """With a spring besides."""
+            del v
+            force = np.zeros_like(w)
+            for _ in range(8):  # what a step gives way by is small
+                moved = w - step.motion * force
+                force = k3 * moved**3 + self.part * spring * moved
+            return force
+
+    def force(part):
+        both = Both()
+        both.part = part
+        return march(both, (k3, 0.0), place, w, v).force
+
+    done = march(law, (k3, 0.0), place, w, v)
+    found = follow(law, place, done, np.zeros((0, 2, *w.shape)), spring * done.motion[None])[-1]
+    h = 1e-5
+    expected = (force(h) - force(-h)) / (2 * h)
+    assert np.linalg.norm(expected) > 0
+    assert np.linalg.norm(found - expected) <= DERIVATIVE * np.linalg.norm(expected)

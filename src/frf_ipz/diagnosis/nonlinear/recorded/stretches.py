@@ -235,14 +235,14 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
     sizes = _sizes(observations, n)
     for i, (blow, size) in enumerate(zip(blows, sizes, strict=True)):
         loudest = EDGE + min(max(int(np.argmax(size[EDGE:])) - round(EARLY * n), 0), max(room, 0))
-        if _starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
+        if starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
             cuts.append(_Cut(i, blow, 0, is_moving=False))
             if size[: n // 4].max() < QUIETER * size.max():
                 cuts.append(_Cut(i, blow, loudest, is_moving=True))
             continue
         parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
-        nearest = int(np.argmin([abs(part - loudest) for part in parts]))
-        parts[nearest] = loudest
+        if min(abs(part - loudest) for part in parts) > EARLY * n:
+            parts.append(loudest)
         cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
 
@@ -262,8 +262,19 @@ def _sizes(observations: Observations, n: int) -> list[FloatArray]:
     return found
 
 
-def _starts_at_rest(blow: Blow) -> bool:
-    """Nothing moves yet at the first samples."""
+def starts_at_rest(blow: Blow) -> bool:
+    """Look whether nothing moves yet at the first samples.
+
+    Parameters
+    ----------
+    blow : Blow
+        Of a shaker.
+
+    Returns
+    -------
+    bool
+        True at rest.
+    """
     signals = np.vstack([blow.force, blow.responses])
     first = max(FIRST_SAMPLES, round(FIRST_PART * blow.n_samples))
     size = np.sqrt(np.mean(signals**2, 1))
