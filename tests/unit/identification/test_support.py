@@ -1,0 +1,159 @@
+"""Whether the even and the odd lines, each fitted by itself, agree within what is said, and what is said if not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+
+from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.identification.root_covariance import pair_blocks
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+from frf_ipz.quantities import FrfQuantity
+from synthetic_frfs import accelerances, frf_set, labels_of, random_modes
+
+LINES_HZ = np.arange(1, 801) * 0.5
+EVEN = np.arange(len(LINES_HZ)) % 2 == 0
+FOUR = np.array([60.0, 130.0, 215.0, 300.0])
+NOISE = 1e-3
+SEED = 7
+WITHIN = 1.2  # rms of differences over their standard deviation: the bar of the calibration
+SAME = 0.5  # half widths within which two poles are one mode
+
+
+def recorded(folder):
+    """Read a test, or the tables of receptances that the milling tool comes as."""
+    if (folder / "test.toml").is_file():
+        return estimate_frfs(read_test(folder / "test.toml"), IngestOptions()).frfs
+    tables = [np.loadtxt(path) for path in sorted(folder.glob("EMA_Point_*.txt"))]
+    values = np.stack([table[:, 1] + 1j * table[:, 2] for table in tables], axis=1)
+    return frf_set(tables[0][:, 0], values, labels_of(len(tables), 1, FrfQuantity.RECEPTANCE))
+
+
+def unmeasured(frfs):
+    return replace(frfs, variance=np.full(frfs.variance.shape, np.nan))
+
+
+def four_modes(*, detuned=0.0):
+    return unmeasured(
+        accelerances(random_modes(FOUR * (1 + detuned), 0.01, seed=SEED), LINES_HZ, noise=NOISE, seed=SEED)
+    )
+
+
+def on_even_lines(frfs, others):
+    return replace(frfs, values=np.where(EVEN[:, None], others.values, frfs.values))
+
+
+def halves_of(frfs, options):
+    number = np.arange(frfs.n_lines)
+    return [fit_modes(frfs.lines(number % 2 == half), options) for half in range(2)]
+
+
+def partners(first, second):
+    a, b = (fit.model.poles[: fit.n_modes] for fit in (first, second))
+    apart = np.abs(a[:, None] - b) / np.minimum(-a.real[:, None], -b.real)
+    i, j = linear_sum_assignment(np.minimum(apart, 2.0))
+    same = apart[i, j] < SAME
+    return i[same], j[same]
+
+
+def differences(first, second):
+    """Difference of real and imaginary parts over its standard deviation, of modes that neither marks as poor."""
+    i, j = partners(first, second)
+    good = (first.modes["quality"].to_numpy()[i] != "poor") & (second.modes["quality"].to_numpy()[j] != "poor")
+    i, j = i[good], j[good]
+    apart = first.model.poles[i] - second.model.poles[j]
+    variance = pair_blocks(first.covariance)[i] + pair_blocks(second.covariance)[j]
+    return np.stack([apart.real, apart.imag], 1) / np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def test_modes_that_both_halves_have_are_not_doubted():
+    fit = fit_modes(four_modes(), FitOptions())
+    assert fit.warnings == ()
+    assert list(fit.modes["quality"]) == ["good"] * 4
+    assert "doubted" not in set(fit.decisions["action"])
+
+
+def test_a_mode_of_one_half_is_doubted():
+    truth, more = random_modes(FOUR, 0.01, seed=SEED), random_modes(np.array([260.0]), 0.01, seed=SEED)
+    frfs = four_modes()
+    added = 0.3 * accelerances(more, LINES_HZ, noise=0.0).values
+    fit = fit_modes(replace(frfs, values=frfs.values + np.where(EVEN[:, None], added, 0.0)), FitOptions())
+    doubtful = np.abs(fit.modes["frequency_hz"] - 260.0) < 2.0
+    assert doubtful.sum() == 1
+    assert list(fit.modes["quality"]) == np.where(doubtful, "poor", "good").tolist()
+    row = fit.decisions[fit.decisions["action"] == "doubted"].squeeze()
+    assert row["frequency_hz"] == fit.modes["frequency_hz"][doubtful].item()
+    assert row["reason"].startswith("comes up in one half only of the lines")
+    assert "1 of 5 modes do not come up in both halves" in fit.warnings[0]
+    assert count_within(fit, truth) == 4
+
+
+def count_within(fit, truth):
+    """Count the true poles within five of their standard deviations."""
+    poles = fit.model.poles[: fit.n_modes]
+    std = np.sqrt(np.trace(pair_blocks(fit.covariance)[: fit.n_modes], axis1=1, axis2=2))
+    return int(np.sum(np.min(np.abs(poles[:, None] - truth.poles) / std[:, None], axis=0) < 5))
+
+
+def test_halves_that_differ_raise_the_standard_deviations():
+    relative = 5e-4
+    frfs = on_even_lines(four_modes(), four_modes(detuned=relative))
+    fit = fit_modes(frfs, FitOptions())
+    assert "each fitted by itself, differ by" in fit.warnings[0]
+    std = np.sqrt(pair_blocks(fit.covariance)[:4, 1, 1]) / (2 * np.pi * FOUR)
+    half = relative / 2  # what the frequencies of all lines may be off
+    assert np.sqrt(np.mean((half / std) ** 2)) == pytest.approx(1.0, abs=0.6)  # damping shares the average
+    assert len(fit.modes) == 4
+    assert set(fit.modes["quality"]) == {"good"}
+
+
+def cut_off(frfs, at_s, left):
+    """Weaken what comes after a time, as an analyser's window does: no linear model follows."""
+    spectrum = np.concatenate([np.zeros((1, frfs.n_frfs)), frfs.values])
+    signal = np.fft.irfft(spectrum, axis=0)
+    time = np.arange(len(signal)) / (2 * frfs.frequency_hz[-1])
+    window = np.where(time < at_s, 1.0, left * np.exp(-np.maximum(time - at_s, 0.0) / (1.3 * at_s)))
+    return replace(frfs, values=np.fft.rfft(signal * window[:, None], axis=0)[1:])
+
+
+@pytest.mark.slow
+def test_halves_agree_where_a_window_makes_model_error():
+    found, errors = [], []
+    truth = random_modes(np.array([55.0, 98.0, 140.0, 188.0, 231.0, 290.0, 341.0]), 0.015, seed=SEED)
+    for seed, at_s in enumerate((0.04, 0.055, 0.08)):
+        exact = accelerances(truth, LINES_HZ, noise=0.0)
+        noisy = accelerances(truth, LINES_HZ, noise=NOISE, seed=seed)
+        frfs = unmeasured(cut_off(exact, at_s, 0.97))
+        frfs = replace(frfs, values=frfs.values + noisy.values - exact.values)
+        first, second = halves_of(frfs, FitOptions())
+        found.append(differences(first, second))
+        errors.append(len(found[-1]))
+    assert min(errors) > 0
+    assert rms(np.concatenate(found)) < WITHIN
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "band_hz", "fewest", "share"),
+    [
+        ("freefree_beam", (20.0, 999.0), 4, 0.8),
+        ("steel_beam_5x3", (1.0, 600.0), 13, 0.75),
+        ("raw_hammer", (500.0, 6500.0), 22, 0.9),
+        ("milling_tool", (300.0, 4000.0), 10, 0.8),
+    ],
+)
+def test_halves_of_real_measurements(recordings, name, band_hz, fewest, share):
+    frfs = recorded(recordings / name)
+    first, second = halves_of(frfs, FitOptions(band_hz=band_hz))
+    found = differences(first, second)
+    assert len(found) >= fewest  # modes that neither half marks as poor
+    assert len(partners(first, second)[0]) >= share * (first.n_modes + second.n_modes) / 2
+    assert rms(found) < WITHIN
