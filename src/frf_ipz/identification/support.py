@@ -150,6 +150,7 @@ def _partners(poles: ComplexArray, others: ComplexArray) -> IntArray:
     """Place of each pole's partner among others, or -1."""
     partners = np.full(len(poles), -1)
     width = np.minimum(-poles.real[:, None], -others.real)
+    width = np.maximum(width, np.finfo(float).eps * np.abs(others))  # a single line has no width
     apart = np.minimum(np.abs(poles[:, None] - others) / (SAME * width), 2.0)
     mine, theirs = optimize.linear_sum_assignment(apart)
     same = apart[mine, theirs] < 1
