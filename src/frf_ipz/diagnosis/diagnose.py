@@ -27,8 +27,10 @@ from frf_ipz.diagnosis.judging.decision import (
 from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
-from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping
+from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
 from frf_ipz.diagnosis.judging.gates import check
+from frf_ipz.diagnosis.judging.one_place import COMPLAINT as OF_ANOTHER_KIND
+from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.judging.verdict import LIMITS
@@ -149,10 +151,12 @@ def _decide(
     is_searched = bool(bench.effects) and not is_certain
     found = decide(bench, progress) if is_searched else only_null(bench)
     if is_searched and is_damping_alone(bench, found):
-        freed = at_bench(with_any_damping(options))
+        freed = without_level(at_bench(with_any_damping(options)))
         again = decide(freed, progress)
         if again.good.is_good:
             return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
+    if found.verdict == EXPLAINED and is_of_another_kind(found.final):
+        return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
     return bench, found, found.good.complaint
 
 

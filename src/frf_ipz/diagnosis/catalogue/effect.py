@@ -124,6 +124,9 @@ class Effect(ABC):
     imitators: ClassVar[tuple[str, ...]] = ()
     """Effects that look alike, the most alike first."""
 
+    has_dynamics: ClassVar[bool] = False
+    """Something with dynamics of its own hangs at a place: two of that kind at one place imitate much."""
+
     @abstractmethod
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """Say where the effect could sit: nowhere if it does not apply to this kind of model."""

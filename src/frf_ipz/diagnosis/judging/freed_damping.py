@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.polish import Fit
 
+OF_MODES = ("damping_level", "structural_damping")
 ANY = 20.0  # relative tolerance of damping ratios: more than a factor of ten
 MOSTLY = 0.5  # of all pulls
 
@@ -65,6 +66,23 @@ def with_any_damping(options: DiagnoseOptions) -> DiagnoseOptions:
         The others.
     """
     return replace(options, damping_tolerance=max(ANY, options.damping_tolerance))
+
+
+def without_level(bench: Bench) -> Bench:
+    """Leave out what damping ratios that may be anything stand for.
+
+    Parameters
+    ----------
+    bench : Bench
+        With damping left free.
+
+    Returns
+    -------
+    Bench
+        Without the effects of modal damping.
+    """
+    kept = {name: effect for name, effect in bench.effects.items() if name not in OF_MODES}
+    return replace(bench, effects=kept)
 
 
 def complain(fit: Fit, options: DiagnoseOptions) -> str:

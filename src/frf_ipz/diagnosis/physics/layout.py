@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -149,6 +150,7 @@ def shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
 
 
+@lru_cache(maxsize=1024)  # every hypothesis asks for the same few
 def _shift_row(model: StructuralModel, dof: Dof, axis: str) -> FloatArray:
     geometry = model.geometry
     position = geometry.coordinates_m[np.searchsorted(geometry.nodes, dof.node)]

@@ -23,6 +23,7 @@ class LocalDamper(Effect):
 
     name = "local_damper"
     imitators = ("attached_resonator", "viscoelastic_joint", "damping_level")
+    has_dynamics = True
 
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """Every node that moves."""

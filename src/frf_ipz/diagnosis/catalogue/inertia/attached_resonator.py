@@ -28,6 +28,7 @@ class AttachedResonator(Effect):
 
     name = "attached_resonator"
     imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
+    has_dynamics = True
 
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """Every node that moves."""

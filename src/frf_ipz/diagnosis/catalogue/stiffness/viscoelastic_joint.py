@@ -28,6 +28,7 @@ class ViscoelasticJoint(Effect):
 
     name = "viscoelastic_joint"
     imitators = ("local_damper", "grounded_spring", "attached_resonator", "global_stiffness")
+    has_dynamics = True
 
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """Every node that moves, every spring, the rotation of every pinned end."""

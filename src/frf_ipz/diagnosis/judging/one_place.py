@@ -1,0 +1,59 @@
+"""Two findings with dynamics of their own at nearly one place: rather one thing that the catalogue does not know."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.physics.layout import extents
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.search.hypothesis import Cause
+    from frf_ipz.diagnosis.search.polish import Fit
+
+NEAR = 0.05  # of the largest extent of a structure
+COMPLAINT = (
+    "two effects with dynamics of their own at nearly one place explain the measurement together, which rather are one "
+    "thing of another kind"
+)
+
+
+def is_of_another_kind(fit: Fit) -> bool:
+    """Tell whether several causes are rather one that the catalogue lacks.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of any number of causes.
+
+    Returns
+    -------
+    bool
+        Two of them imitate something at their place.
+    """
+    hypothesis = fit.hypothesis
+    dynamic = [cause for cause in hypothesis.causes if cause.effect.has_dynamics]
+    return any(_at_one_place(hypothesis.specimen, *two) for two in combinations(dynamic, 2))
+
+
+def _at_one_place(specimen: Specimen, first: Cause, second: Cause) -> bool:
+    nodes = [_nodes(cause) for cause in (first, second)]
+    if nodes[0] & nodes[1]:
+        return True
+    spans = extents(specimen.model)
+    if not spans:
+        return False
+    apart = [_apart(specimen, a, b) for a in nodes[0] for b in nodes[1]]
+    return min(apart, default=np.inf) <= NEAR * max(spans.values())
+
+
+def _nodes(cause: Cause) -> set[int]:
+    named = cause.place.location.get("nodes")
+    return {int(node) for node in named} if isinstance(named, list) else set()
+
+
+def _apart(specimen: Specimen, first: int, second: int) -> float:
+    return float(np.linalg.norm(specimen.positions[first] - specimen.positions[second]))

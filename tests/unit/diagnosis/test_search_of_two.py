@@ -1,0 +1,154 @@
+"""Two causes together, small ones beside large ones, and causes that only look like others."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosed import BAND_HZ, beam, labels, measured, observed
+from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.catalogue.together import build_together
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.search import fit_nothing, search
+from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.beams.variants import with_formulation
+from frf_ipz.fe.changes import with_point_masses, with_springs
+
+THICK_M, HIGH_HZ = 0.03, (60.0, 5000.0)  # shear and rotary inertia lower the highest mode there by some per cent
+SOFTER = 0.9
+SEEN = 0.02  # relative: noise of 0.1 % of the FRFs, tolerances of 0.1 % of the stiffness
+ROUNDING = 1e-9  # of the largest entry
+ATTACHED = shipped_effects()["attached_resonator"]
+GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+@pytest.fixture(scope="module")
+def thick(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("thick"), thickness_m=THICK_M)
+
+
+def bench_of(model, frfs, names):
+    effects = {name: effect for name, effect in shipped_effects().items() if name in names}
+    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_what_changes_stiffness_changes_that_of_an_exchanged_model(thick, order):
+    bench = bench_of(thick, measured(thick), ("shear_rotary_inertia", "global_stiffness"))
+    acting = [(effect, effect.places(bench.specimen)[0]) for effect in bench.effects.values()][::order]
+    built = dict(zip([effect.name for effect, _ in acting], build_together(bench.specimen, acting), strict=True))
+    change = built["global_stiffness"](np.array([SOFTER])).stiffness.toarray()
+    exchanged = with_formulation(thick, "timoshenko").stiffness_all.toarray()
+    assert_allclose(change, (SOFTER - 1) * exchanged, rtol=0, atol=ROUNDING * exchanged.max())
+    assert built["shear_rotary_inertia"](np.zeros(0)).model is not None
+
+
+def test_a_thick_beam_of_a_softer_material_is_found_and_put_right(thick):
+    exchanged = with_formulation(thick, "timoshenko")
+    true = replace(exchanged, stiffness_all=SOFTER * exchanged.stiffness_all)
+    options = DiagnoseOptions(effects=("shear_rotary_inertia", "global_stiffness", "added_mass", "axial_load"))
+    found = diagnose(thick, observed(measured(true, band_hz=HIGH_HZ), HIGH_HZ), options)
+    assert found.verdict == "explained"
+    assert {finding.effect for finding in found.findings} == {"shear_rotary_inertia", "global_stiffness"}
+    (ratio,) = (one.parameters["stiffness_ratio"].value for one in found.findings if one.parameters)
+    assert ratio == pytest.approx(SOFTER, rel=SEEN)
+    right = apply_to_model(thick, found).stiffness_all.diagonal()
+    assert_allclose(right, true.stiffness_all.diagonal(), rtol=SEEN)
+
+
+def test_a_wrong_sign_and_a_support_that_gives_way_are_found_together(tmp_path):
+    held, released = beam(tmp_path, right="clamped"), beam(tmp_path, right="free")
+    true = with_springs(released, {Dof(17, "z"): 3e4, Dof(17, "ry"): 1e9})
+    names = labels(outputs=("12:+z", "9:-z"))
+    frfs = measured(true, names, factors=lambda f: -np.ones((len(f), 2)))
+    options = DiagnoseOptions(effects=("sensor_gain", "boundary_compliance", "added_mass", "global_stiffness"))
+    found = diagnose(held, observed(frfs), options)
+    assert found.verdict == "explained"
+    assert {finding.effect for finding in found.findings} == {"sensor_gain", "boundary_compliance"}
+
+
+def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
+    def late(frequency_hz):
+        return np.exp(-2j * np.pi * frequency_hz[:, None] * np.array([0.0, 3e-5]))
+
+    bench = bench_of(nominal, measured(nominal, factors=late), ("time_delay", "added_mass", "local_damper"))
+    null = fit_nothing(bench)
+    assert null.misfit > 20 * null.n_values
+    best = search(bench, null).best
+    assert best.hypothesis.causes[-1].key == ("time_delay", "acc_2")
+    assert best.values[0] == pytest.approx(3e-5, rel=SEEN)
+
+
+def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
+    true = replace(with_point_masses(nominal, {12: 0.02}), modal_damping=GUESSED)
+    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert found.verdict == "unexplained"
+    assert "damping ratios are not those of the model" in found.statement
+    assert "4 % instead of 1 %" in found.statement
+    (finding,) = found.findings
+    assert dict(finding.location) == {"nodes": [12]}
+    assert finding.parameters["mass_kg"].value == pytest.approx(0.02, rel=SEEN)
+
+
+def test_a_stretch_of_usual_length_is_preferred_to_a_short_one_that_looks_the_same(nominal):
+    bench = bench_of(nominal, measured(nominal), ("local_stiffness",))
+    effect = bench.effects["local_stiffness"]
+    places = {place.key[1:]: place for place in effect.places(bench.specimen)}
+    likely = {length: effect.log_prior(bench.specimen, places[1, length], np.array([0.9])) for length in (1, 2, 4)}
+    assert likely[1] > likely[2] > likely[4]  # 4 % of 16 elements are less than one
+    smaller = effect.log_prior(bench.specimen, places[1, 1], np.array([0.95]))
+    assert smaller == pytest.approx(likely[1] + np.log(2))
+
+
+def with_causes(bench, *named):
+    causes = []
+    for name, node in named:
+        effect = bench.effects[name]
+        place = next(one for one in effect.places(bench.specimen) if one.location.get("nodes") == [node])
+        causes.append(Cause(effect=effect, place=place, n_places=1))
+    return SimpleNamespace(hypothesis=SimpleNamespace(causes=tuple(causes), specimen=bench.specimen))
+
+
+@pytest.mark.parametrize(
+    ("named", "expected"),
+    [
+        ((("attached_resonator", 9), ("attached_resonator", 9)), True),
+        ((("attached_resonator", 9), ("local_damper", 3)), False),
+        ((("attached_resonator", 9), ("added_mass", 9)), False),
+        ((("added_mass", 9), ("local_damper", 4), ("viscoelastic_joint", 4)), True),
+    ],
+)
+def test_two_with_dynamics_of_their_own_at_one_place_are_one_of_another_kind(nominal, named, expected):
+    names = ("attached_resonator", "local_damper", "added_mass", "viscoelastic_joint")
+    assert is_of_another_kind(with_causes(bench_of(nominal, measured(nominal), names), *named)) is expected
+
+
+def test_two_resonators_at_one_node_are_not_named(nominal):
+    first, second = (Cause(effect=ATTACHED, place=Place(key=(17, "z"), location={"nodes": [17]}), n_places=1),) * 2
+    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
+    both = bench.suppose((first, second))
+    values, unknown = np.array([0.02, 40.0, 0.03, 0.02, 250.0, 0.03]), np.zeros(bench.nuisance.size)
+
+    def chain(frequency_hz):
+        s = 2j * np.pi * frequency_hz
+        alone = bench.suppose(()).respond(np.zeros(0), unknown, s).values
+        return both.respond(values, unknown, s).values / alone
+
+    found = diagnose(nominal, observed(measured(nominal, factors=chain)), DiagnoseOptions(effects=(ATTACHED.name,)))
+    assert found.verdict == "unexplained"
+    assert "one thing of another kind" in found.statement
+    assert [dict(finding.location) for finding in found.findings] == [{"nodes": [17]}] * 2
