@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.together import build_together
@@ -152,3 +152,14 @@ def test_two_resonators_at_one_node_are_not_named(nominal):
     assert found.verdict == "unexplained"
     assert "one thing of another kind" in found.statement
     assert [dict(finding.location) for finding in found.findings] == [{"nodes": [17]}] * 2
+
+
+def test_all_sensors_may_be_late_together(nominal):
+    frfs = measured(nominal, factors=lambda f: np.exp(-2j * np.pi * f[:, None] * np.full(2, 1.2e-3)))
+    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("time_delay", "sensor_gain")))
+    (finding,) = found.findings
+    assert dict(finding.location) == {"channels": ["acc_1", "acc_2"]}
+    assert finding.parameters["delay_s"].value == pytest.approx(1.2e-3, rel=SEEN)
+    assert "All sensors together" in finding.statement
+    early, true = apply_to_frfs(frfs, found).values, measured(nominal).values
+    assert np.linalg.norm(early - true) < SEEN * np.linalg.norm(true)

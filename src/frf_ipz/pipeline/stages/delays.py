@@ -31,7 +31,8 @@ def known_delays(fit: ModalFit, corrected_by: Diagnosis | None) -> dict[str, flo
     for label, delay in zip(fit.labels, fit.model.delay_s, strict=True):
         if label.output_channel:
             delays[label.output_channel] = max(delays[label.output_channel], float(delay))
-    for finding in corrected_by.findings if corrected_by else ():
-        if finding.effect == DELAY and finding.key[0] in outputs:
-            delays[str(finding.key[0])] += float(finding.values[0])
+    late = [finding for finding in (corrected_by.findings if corrected_by else ()) if finding.effect == DELAY]
+    for finding in late:
+        for channel in outputs.intersection(map(str, finding.key)):
+            delays[channel] += float(finding.values[0])
     return {channel: delay for channel, delay in sorted(delays.items()) if delay > 0}

@@ -15,19 +15,23 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
-SHORTEST, LONGEST = 1e-4, 0.5  # periods of the band's upper edge
-TRIED = np.array([0.003, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45])
+SHORTEST, LONGEST = 1e-4, 1.5  # periods of the band's upper edge
+TRIED = np.array([0.003, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.6, 0.75, 0.95, 1.2])
 
 
 class TimeDelay(Effect):
-    """The channel is late."""
+    """A channel is late, or all sensors together: what a controller, a recorder or a network adds."""
 
     name = "time_delay"
     imitators = ("sensor_dynamics",)
 
     def places(self, specimen: Specimen) -> Sequence[Place]:
-        """Every channel."""
-        return [Place(key=(channel,), location={"channels": [channel]}) for channel in specimen.layout.channels]
+        """Every channel, and all sensors together."""
+        sensors = tuple(dict.fromkeys(channel for channel, _ in specimen.layout.outputs))
+        late = [(channel,) for channel in specimen.layout.channels]
+        return [
+            Place(key=channels, location={"channels": list(channels)}) for channels in dict.fromkeys([*late, sensors])
+        ]
 
     def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
         """Delay."""
@@ -36,14 +40,18 @@ class TimeDelay(Effect):
         return (Parameter(name="delay_s", low=SHORTEST * period, high=LONGEST * period),)
 
     def build(self, specimen: Specimen, place: Place) -> Builder:
-        """Turn the channel's phase."""
+        """Turn the phase."""
         del specimen
         return self.chain(place)
 
     def chain(self, place: Place) -> Builder:
         """Do the same for any structure."""
-        channel = str(place.key[0])
-        return lambda values: Change(channels={channel: lambda s: np.exp(-s * values[0])})
+        channels = [str(channel) for channel in place.key]
+
+        def change(values: FloatArray) -> Change:
+            return Change(channels=dict.fromkeys(channels, lambda s: np.exp(-s * values[0])))
+
+        return change
 
     def starts(self, specimen: Specimen, place: Place) -> FloatArray:
         """From little to much."""
@@ -54,4 +62,7 @@ class TimeDelay(Effect):
         """Say which channel, and by how much."""
         del specimen
         delay = values["delay_s"]
-        return f"The channel '{place.key[0]}' is late by {1e6 * delay.value:.4g} us (+- {1e6 * delay.std:.2g} us)."
+        late = f"late by {1e6 * delay.value:.4g} us (+- {1e6 * delay.std:.2g} us)"
+        if len(place.key) == 1:
+            return f"The channel '{place.key[0]}' is {late}."
+        return f"All sensors together are {late}."
