@@ -136,7 +136,8 @@ def diagnose(
     )
     if laws is not None and nonlinear:
         return _with_law(linear, laws)
-    return replace(linear, statement=_statement(found, linear.findings, complaint))
+    remains = complaint if found.verdict == UNEXPLAINED else ""
+    return replace(linear, statement=_statement(found, linear.findings, complaint), remains=remains)
 
 
 def _decide(

@@ -170,6 +170,8 @@ class Diagnosis:
         Smallest detectable size of each effect, by parameter, where it shows best.
     statement : str
         The verdict in a few sentences.
+    remains : str
+        What nothing explains, in words without a full stop; empty where nothing remains, and beside a force law.
     curves : Curves, optional
         FRFs to draw.
     numbers : mapping of str to float
@@ -195,6 +197,7 @@ class Diagnosis:
     gates: tuple[Gate, ...] = ()
     detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     statement: str = ""
+    remains: str = ""
     curves: Curves | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

@@ -35,7 +35,8 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     statements = [plain_signs(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
-    more = [f"A part of it is explained: {' '.join(statements)}"] if statements else []
+    more = [f"What is not explained: {plain_signs(diagnosis.remains)}."] if diagnosis.remains else []
+    more += [f"A part of it is explained: {' '.join(statements)}"] if statements else []
     return SENTENCES.get(diagnosis.verdict, ""), " ".join([*more, *place_of_mismatch(diagnosis)])
 
 

@@ -47,6 +47,8 @@ def test_what_nothing_explains_is_unknown(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained")
     assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
     assert verdict_of(diagnosis)[1].startswith("A part of it is explained: A mass")
+    told = verdict_of(replace(diagnosis, remains="damping is 2 % (+- 1 %)"))[1]
+    assert told.startswith("What is not explained: damping is 2 % (± 1 %). A part of it is explained: A mass")
     assert said_in_short(diagnosis)[0] == "unknown"
     assert said_in_short(replace(diagnosis, findings=()))[0] == "unknown"
 
