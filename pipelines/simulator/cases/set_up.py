@@ -117,7 +117,8 @@ def _timing(
     rng: np.random.Generator, band: tuple[float, float], first_hz: float, kind: str, longest: int
 ) -> tuple[float, int, float]:
     """Draw sampling rate, record length and a damping ratio that lets the record nearly decay."""
-    rate = float(next(rate for rate in RATES_HZ if rate >= rng.uniform(2.7, 4.3) * band[1]))
+    fast = (rate for rate in RATES_HZ if rate >= rng.uniform(2.7, 4.3) * band[1])
+    rate = float(next(fast, RATES_HZ[-1]))
     n_samples = int(rng.choice([n for n in LENGTHS if n <= longest]))
     ratio = float(np.exp(rng.uniform(np.log(0.0008), np.log(0.01))))
     left = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.15))))
