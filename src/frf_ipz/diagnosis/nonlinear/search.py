@@ -166,18 +166,23 @@ def search_laws(
     training, held_out = _divide(observations)
     plant, noise = make_plant(model, observations), read_noise(observations)
 
-    def track_of(periods: float, floor: float) -> Track:
-        window = Window(duration_s=periods / observations.band_hz[1], floor=floor)
+    def track_of(periods: float, floor: float, *, loudest: bool) -> Track:
+        window = Window(duration_s=periods / observations.band_hz[1], floor=floor, loudest=loudest)
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
 
     is_longer = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
     periods = LONGER if is_longer else LONG
-    short, long = track_of(SHORT, ROUGH), track_of(periods, FINE)
-    missed = long.linear.cost / long.linear.n_rows
-    if missed < USUAL:
-        long = track_of(periods, max(FINE * float(np.sqrt(missed / USUAL)), FINEST))
+    long = track_of(periods, FINE, loudest=False)
+    is_linear = long.missed < USUAL  # as far as its first parts say
+    if is_linear and is_longer:
+        periods = LONG  # how a louder stretch starts is not known, and the longer it is, the more that matters
+        long = track_of(periods, FINE, loudest=True)
+    if long.missed < USUAL:
+        floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
+        long = track_of(periods, floor, loudest=is_linear)
+    short = track_of(SHORT, ROUGH, loudest=is_linear)
     fits = find_candidates(short, long, laws)
     found = _judge(long, linearity, plant, fits)
     if found.verdict == UNEXPLAINED:

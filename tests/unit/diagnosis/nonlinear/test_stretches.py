@@ -40,3 +40,9 @@ def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, loud_s, expect
     assert stretches.moving.tolist() == 2 * expected
     for start in stretches.first_sample[stretches.moving] * stretches.step_s:
         assert start < loud_s < start + 0.3  # what lies early in a stretch counts most
+
+
+def test_a_record_is_looked_at_once_where_that_is_enough(chain, strike):
+    observations = random_records(strike(), 2.0)
+    plant, noise = make_plant(chain.model, observations), read_noise(observations)
+    assert not transform(observations, plant, noise, Window(duration_s=1.0, loudest=False)).moving.any()

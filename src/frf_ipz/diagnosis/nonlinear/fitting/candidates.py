@@ -29,6 +29,7 @@ SIMULATED = 2  # places of each law that are simulated on short stretches
 TURNS = 6  # of the refinement
 FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
 HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
+HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
@@ -48,6 +49,11 @@ class Track:
 
     stretches: Stretches
     linear: LinearFit
+
+    @property
+    def missed(self) -> float:
+        """Mean square that the linear model leaves, over the expected one."""
+        return self.linear.cost / self.linear.n_rows
 
     def shoot(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other stretches."""
@@ -112,10 +118,12 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
     return sorted(fits, key=lambda fit: fit.cost)
 
 
-def _simulated(track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS) -> list[LawFit]:
-    """Fit by simulation; those that stay hopeless after a few steps only so far."""
+def _simulated(
+    track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
+) -> list[LawFit]:
+    """Fit by simulation; those that stay hopeless after a few steps, against the least cost, only so far."""
     found = [track.shoot(fit, FIRST) for fit in fits]
-    least = min((fit.cost for fit in found), default=np.inf)
+    least = min(least, *(fit.cost for fit in found)) if found else least
     return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
 
 
@@ -129,7 +137,9 @@ def _climb(track: Track, fits: list[LawFit]) -> None:
         if not new:
             return
         done |= {(best.law.name, place) for place in new}
-        fits += _simulated(track, [_moved(track, best, place) for place in new])
+        moved = [_moved(track, best, place) for place in new]
+        hopeless = HOPELESS_NEAR if best.cost < best.n_rows else HOPELESS
+        fits += _simulated(track, moved, hopeless=hopeless, least=best.cost)
 
 
 def _moved(track: Track, fit: LawFit, place: int) -> LawFit:

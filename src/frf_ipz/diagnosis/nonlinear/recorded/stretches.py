@@ -122,12 +122,15 @@ class Window:
         Stretches of each record of a shaker.
     floor : float
         Misfit that the model is allowed, as a part of the response.
+    loudest : bool
+        A record from rest is looked at again where it is loudest.
     """
 
     duration_s: float
     start_s: float = 0.0
     per_record: int = 2
     floor: float = 0.01
+    loudest: bool = True
 
 
 def transform(observations: Observations, plant: Plant, noise: ChannelNoise, window: Window) -> Stretches:
@@ -237,12 +240,11 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
         loudest = EDGE + min(max(int(np.argmax(size[EDGE:])) - round(EARLY * n), 0), max(room, 0))
         if starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
             cuts.append(_Cut(i, blow, 0, is_moving=False))
-            if size[: n // 4].max() < QUIETER * size.max():
+            if window.loudest and size[: n // 4].max() < QUIETER * size.max():
                 cuts.append(_Cut(i, blow, loudest, is_moving=True))
             continue
         parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
-        if min(abs(part - loudest) for part in parts) > EARLY * n:
-            parts.append(loudest)
+        parts[int(np.argmin([abs(part - loudest) for part in parts]))] = loudest
         cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
 
