@@ -56,10 +56,11 @@ USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is righ
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains the recordings
 CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
+CLOSE_MOVING = 0.015  # the same where stretches start in motion: how they start is known in the first modes only
 MOST_APART = 9.0  # mean square of what blows disagree in besides the law, over the expected one
 BENT_NATS = 250.0  # evidence that forces of other kinds at the place of a law may gain
 BENT = 0.1, 0.01  # and parts of what is left, and of what the law explains
-BENT_MOVING = 0.5, 0.05  # the same where stretches start in motion: how they start is known in the first modes only
+BENT_MOVING = 0.5, 0.05  # the same where stretches start in motion
 NEAR, MOST_NEAR = 5.0, 4  # times the smallest cost: laws at whose places an unknown one may sit, and how many
 PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
@@ -284,7 +285,7 @@ def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) ->
         return "gains no more than a linear system could"
     part = relative_misfit(track.stretches, best.misfit)
     left = best.cost / best.n_rows
-    if left > MOST_MISFIT and part > CLOSE:
+    if left > MOST_MISFIT and part > (CLOSE_MOVING if track.stretches.moving.any() else CLOSE):
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
