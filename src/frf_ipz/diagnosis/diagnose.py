@@ -136,8 +136,7 @@ def diagnose(
     )
     if laws is not None and nonlinear:
         return _with_law(linear, laws)
-    remains = complaint if found.verdict == UNEXPLAINED else ""
-    return replace(linear, statement=_statement(found, linear.findings, complaint), remains=remains)
+    return replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
 
 
 def _decide(
@@ -158,7 +157,7 @@ def _decide(
             return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
     if found.verdict == EXPLAINED and is_of_another_kind(found.final):
         return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
-    return bench, found, found.good.complaint
+    return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
 
 
 def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
