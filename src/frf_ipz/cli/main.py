@@ -5,6 +5,7 @@ Every stage is imported by the command that needs it, so that ``--help`` answers
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -23,6 +24,12 @@ EPILOG = """
 
 [bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 a fault of the program.
 """
+
+THREADS = (
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OMP_NUM_THREADS",
+)  # more only wait for each other on small matrices
 
 app = typer.Typer(
     help="From hammer-test recordings and a nearly right FE model to a controller-ready model, and to what the model "
@@ -138,6 +145,8 @@ def main() -> None:
     """Run the command line; the exit status says how it went."""
     from frf_ipz.errors import FrfIpzError
 
+    for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
+        os.environ.setdefault(name, "1")
     try:
         app()
     except FrfIpzError as error:
