@@ -25,11 +25,8 @@ EPILOG = """
 [bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 a fault of the program.
 """
 
-THREADS = (
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "OMP_NUM_THREADS",
-)  # more only wait for each other on small matrices
+# Of linear algebra: on small matrices more than one only wait for each other.
+THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 app = typer.Typer(
     help="From hammer-test recordings and a nearly right FE model to a controller-ready model, and to what the model "

@@ -30,13 +30,14 @@ def build_together(specimen: Specimen, effects: Sequence[tuple[Effect, Place]]) 
         In the same order.
     """
     builders = [effect.build(specimen, place) for effect, place in effects]
-    for number, (effect, place) in enumerate(effects):
-        model = typical_change(specimen, effect, place, builders[number]).model
+    if len(effects) < 2:
+        return tuple(builders)
+    for number, ((effect, place), build) in enumerate(zip(effects, builders, strict=True)):
+        model = typical_change(specimen, effect, place, build).model
         if model is not None:
             exchanged = replace(specimen, basis=replace(specimen.basis, model=model))
-            others = [one for other, one in enumerate(effects) if other != number]
-            builders[:number], builders[number + 1 :] = _split(build_together(exchanged, others), number)
-            break
+            others = build_together(exchanged, [*effects[:number], *effects[number + 1 :]])
+            return (*others[:number], build, *others[number:])
     return tuple(builders)
 
 
@@ -60,7 +61,3 @@ def typical_change(specimen: Specimen, effect: Effect, place: Place, build: Buil
         Only its places matter.
     """
     return build(np.array([parameter.typical for parameter in effect.parameters(specimen, place)]))
-
-
-def _split(builders: Sequence[Builder], number: int) -> tuple[Sequence[Builder], Sequence[Builder]]:
-    return builders[:number], builders[number:]

@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import LIMITS, SECOND_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
-from frf_ipz.diagnosis.search.search import NEARLY_RIGHT, Ranking, fit_nothing, search
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, is_nearly_right, search
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -86,8 +86,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     alone = _one_is_enough(bench, one, two.final)
     if alone is not None:
         return alone
-    is_far = two.good.misfit > NEARLY_RIGHT
-    if two.verdict == EXPLAINED or is_far or gain_over(second.best, second.base) < STRONG_NATS:
+    if two.verdict == EXPLAINED or not is_nearly_right(two.final) or gain_over(second.best, second.base) < STRONG_NATS:
         return two
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search(bench, second.best))

@@ -12,7 +12,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.search.bench import weights_of
 from frf_ipz.diagnosis.search.far.sketches import receptances
-from frf_ipz.diagnosis.search.search import NEARLY_RIGHT
+from frf_ipz.diagnosis.search.search import is_nearly_right
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -49,7 +49,7 @@ def trace(bench: Bench, null: Fit) -> dict[str, list[int]]:
 
 def _misfits(bench: Bench, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
     """Robust misfit without and with a free dynamic stiffness on each of some motions."""
-    is_near = null.misfit < NEARLY_RIGHT * 2 * bench.data.measured.values.size
+    is_near = is_nearly_right(null)
     data = bench.thin.measured if is_near else bench.coarse
     unknown = null.unknown if is_near else np.zeros(bench.nuisance.size)
     response = null.hypothesis.respond(null.values, unknown, data.s)

@@ -20,9 +20,26 @@ SLOPE = 0.6  # of sigma over the distance to the next resonance
 STEP = 0.9  # from point to point, over sigma
 WIDEST = 0.02  # sigma over omega: lightly damped things that nobody knows of are not passed over
 MOST_POINTS = 260
-COARSE_WIDTH = 0.06  # sigma over omega of the contour for searching: no peak is missed
-COARSE_STEP = 0.8
-MIDDLE_WIDTH, MIDDLE_STEP = 0.015, 1.5  # the same on the way from there to the axis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distance:
+    """How far from the axis a contour lies.
+
+    Parameters
+    ----------
+    width : float
+        sigma over omega.
+    step : float
+        From point to point, over sigma.
+    """
+
+    width: float
+    step: float
+
+
+COARSE = Distance(width=0.06, step=0.8)  # for searching: no peak is missed
+MIDDLE = Distance(width=0.015, step=1.5)  # on the way from there to the axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,36 +126,22 @@ def fine_contour(resonances: Resonances, band_hz: tuple[float, float], least_dec
         step *= 1.02 * len(found) / MOST_POINTS
 
 
-def coarse_contour(band_hz: tuple[float, float], least_decay_1_s: float) -> ComplexArray:
-    """Lay a contour that is so far from the axis that everything along it is smooth.
+def wide_contour(band_hz: tuple[float, float], least_decay_1_s: float, distance: Distance) -> ComplexArray:
+    """Lay a contour away from the axis, where FRFs are smooth.
 
     Parameters
     ----------
     band_hz, least_decay_1_s
         As for `fine_contour`.
+    distance : Distance
+        How far.
 
     Returns
     -------
     (n_points,) complex array
         rad/s, by ascending frequency.
     """
-    return _march(band_hz, COARSE_STEP, lambda omega: max(COARSE_WIDTH * omega, least_decay_1_s))
-
-
-def middle_contour(band_hz: tuple[float, float], least_decay_1_s: float) -> ComplexArray:
-    """Lay a contour on the way from the coarse one to the axis.
-
-    Parameters
-    ----------
-    band_hz, least_decay_1_s
-        As for `fine_contour`.
-
-    Returns
-    -------
-    (n_points,) complex array
-        rad/s, by ascending frequency.
-    """
-    return _march(band_hz, MIDDLE_STEP, lambda omega: max(MIDDLE_WIDTH * omega, least_decay_1_s))
+    return _march(band_hz, distance.step, lambda omega: max(distance.width * omega, least_decay_1_s))
 
 
 def _decay(omega: float, resonances: Resonances, least: float) -> float:

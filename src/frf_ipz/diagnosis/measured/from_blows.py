@@ -9,7 +9,7 @@ from scipy import linalg
 from scipy.fft import next_fast_len
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.measured.contour import COARSE_WIDTH, Resonances, find_resonances
+from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
 from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energies, window_energy
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer import Measured
@@ -267,7 +267,7 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
     Measured
         With the covariance of their errors.
     """
-    wide = np.asarray(np.maximum(s.real, COARSE_WIDTH * s.imag) + 1j * s.imag)
+    wide = np.asarray(np.maximum(s.real, COARSE.width * s.imag) + 1j * s.imag)
     labels, values, sizes, covariances, input_of, common = [], [], [], [], [], []
     for place, group in enumerate(found.groups):
         points = _at(group, s)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.measured.contour import COARSE_WIDTH, Resonances, find_resonances
+from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
 from frf_ipz.diagnosis.measured.transfer import Measured
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
@@ -118,7 +118,7 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     placed = _within_reach(found, s)
     weights = _weights(frfs, placed)
     values = weights @ frfs.values
-    wide = _within_reach(found, np.maximum(placed.real, COARSE_WIDTH * placed.imag) + 1j * placed.imag, keep=True)
+    wide = _within_reach(found, np.maximum(placed.real, COARSE.width * placed.imag) + 1j * placed.imag, keep=True)
     size = np.maximum(np.abs(values), np.abs(_weights(frfs, wide) @ frfs.values))
     inputs = list(frfs.input_dofs)
     missed = (_missed(found, placed)[:, None] * size) ** 2
@@ -153,7 +153,7 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
     omega = 2 * np.pi * frfs.frequency_hz
     chosen = np.unique(np.clip(np.searchsorted(omega, s.imag), 0, len(omega) - 1))
     placed, values = frfs.s[chosen], frfs.values[chosen]
-    wide = _within_reach(found, np.maximum(placed.real, COARSE_WIDTH * placed.imag) + 1j * placed.imag, keep=True)
+    wide = _within_reach(found, np.maximum(placed.real, COARSE.width * placed.imag) + 1j * placed.imag, keep=True)
     inputs = list(frfs.input_dofs)
     return Measured(
         s=placed,

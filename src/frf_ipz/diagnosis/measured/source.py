@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.measured.contour import coarse_contour, fine_contour, middle_contour
+from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable
 
+    from frf_ipz.arrays import ComplexArray
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.observations import Blow, Observations
 
 ENOUGH_BLOWS = 3  # at a place: one of them can be kept for the check, the rest still tell the noise
-FAR = coarse_contour, middle_contour
 EVERY = 4  # points of the contour: one is kept for the check where blows are too few
 
 
@@ -76,10 +76,7 @@ def divide(observations: Observations) -> Source:
     names = {blow.name for blow in kept}
     fitted = tuple(blow for blow in observations.blows if blow.name not in names)
     found = survey(replace(observations, blows=fitted))
-    far = [
-        _looked_at(measure(found, contour(observations.band_hz, found.least_decay_1_s)), observations)
-        for contour in FAR
-    ]
+    far = _far(observations, found.least_decay_1_s, lambda s: measure(found, s))
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
     near = _looked_at(measure(found, s), observations)
     if not kept:
@@ -113,11 +110,16 @@ def _of_frfs(observations: Observations) -> Source:
     if observations.frfs is None:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
     found = survey_frfs(observations.frfs, observations.band_hz)
-    far = [
-        _looked_at(measure_frfs(found, contour(observations.band_hz, found.least_decay_1_s)), observations)
-        for contour in FAR
-    ]
+    far = _far(observations, found.least_decay_1_s, lambda s: measure_frfs(found, s))
     return _by_points(far, _looked_at(_near(found, observations), observations), found, "frf")
+
+
+def _far(
+    observations: Observations, least_decay_1_s: float, at: Callable[[ComplexArray], Measured]
+) -> tuple[Measured, Measured]:
+    """Measure far from the axis, and on the way to it."""
+    coarse, middle = (wide_contour(observations.band_hz, least_decay_1_s, distance) for distance in (COARSE, MIDDLE))
+    return _looked_at(at(coarse), observations), _looked_at(at(middle), observations)
 
 
 def _near(found: FrfSurvey, observations: Observations) -> Measured:
@@ -139,7 +141,7 @@ def _looked_at(measured: Measured, observations: Observations) -> Measured:
     return without_faint(points_of(measured, np.flatnonzero(kept)))
 
 
-def _by_points(far: Sequence[Measured], near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
+def _by_points(far: tuple[Measured, Measured], near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
     number = np.arange(len(near.s))
     held = number % EVERY == EVERY // 2
     return Source(

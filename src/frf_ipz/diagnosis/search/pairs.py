@@ -18,12 +18,13 @@ from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spr
 from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.polish import Fit, polish
 from frf_ipz.diagnosis.search.search import (
-    NEARLY_RIGHT,
+    GAIN,
     Fits,
     Ranking,
     climb_all,
     how_many,
     is_hopeless,
+    is_nearly_right,
     ranked,
     search,
 )
@@ -38,7 +39,6 @@ COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
 STEPPED, NOT_MUCH = 8, 2.0  # pairs whose neighbours are looked at far from the axis, and times the best cost
 CLOSER_PAIRS, EARLY_PAIRS, EXACT_PAIRS = 16, 8, 4  # that come half-way to the axis, to it, and are fitted exactly
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such pairs are not fitted exactly
-GAIN = 0.5  # nats
 
 
 def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
@@ -58,9 +58,8 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     Ranking
         Its base has one cause, its fits have two.
     """
-    size = 2 * bench.data.measured.values.size
     found: list[Ranking] = []
-    if first.best.misfit < NEARLY_RIGHT * size or not first.refined:
+    if is_nearly_right(first.best) or not first.refined:
         beside = search(bench, first.best)
         found.append(beside)
         if beside.fits and not is_good(beside.best):

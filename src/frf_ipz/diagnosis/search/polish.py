@@ -81,6 +81,11 @@ class Fit:
         """Minus the logarithm of likelihood times prior, up to a constant."""
         return 0.5 * (self.misfit + self.pull)
 
+    @property
+    def mean_misfit(self) -> float:
+        """Mean square of the whitened misfit."""
+        return self.misfit / self.n_values
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Data:

@@ -18,12 +18,12 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
 
 if TYPE_CHECKING:
-    pass
+    from frf_ipz.diagnosis.catalogue.effect import Effect
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
 
-NEARLY_RIGHT = 20.0  # sum of squares over the number of values: small effects are looked for on top of such a fit
+NEARLY_RIGHT = 20.0  # mean squared misfit: small effects are looked for on top of such a fit
 VERY_NEARLY = 2.0  # the same: nothing large can be missing
 SMALL_PULL = 600.0  # and this little is explained by what cannot be known
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
@@ -33,7 +33,7 @@ KEPT_PROMISE = 0.5  # of what a linear step promises: a fit that reaches less be
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
-FAR_OFF = 300.0  # sum of squares over the number of values
+FAR_OFF = 300.0  # mean squared misfit
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
 CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS = 2000.0  # nats behind the best: not looked at any more
@@ -109,17 +109,15 @@ def search(bench: Bench, base: Fit) -> Ranking:
     Ranking
         All that was fitted.
     """
-    size = 2 * bench.data.measured.values.size
     n_tried, refined = 0, list[Start]()
     fits: Fits = {}
-    if base.misfit > VERY_NEARLY * size or base.pull > SMALL_PULL:
+    if base.mean_misfit > VERY_NEARLY or base.pull > SMALL_PULL:
         starts = wide_search(bench, base)
         n_tried += len(starts)
         refined = refine_far(bench, base, starts)
         fits = _fitted(bench, base, refined)
-    near = base.misfit < NEARLY_RIGHT * size
-    if near or not is_hopeless(base):
-        n_tried += _add_close(bench, base, fits, least=PROMISING if near else MOST_OF_IT * base.cost)
+    if not is_hopeless(base):
+        n_tried += _add_close(bench, base, fits)
     climb_all(bench, base, fits)
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
 
@@ -144,8 +142,9 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
 
 
-def _add_close(bench: Bench, base: Fit, fits: Fits, *, least: float) -> int:
+def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
+    least = PROMISING if is_nearly_right(base) else MOST_OF_IT * base.cost
     found = close_search(bench, base)
     starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
     for start in starts:
@@ -193,7 +192,23 @@ def is_hopeless(fit: Fit) -> bool:
     bool
         Then no time is spent on its place.
     """
-    return fit.misfit > FAR_OFF * fit.n_values
+    return fit.mean_misfit > FAR_OFF
+
+
+def is_nearly_right(fit: Fit) -> bool:
+    """Tell whether what a fit leaves is so little that small effects can explain it.
+
+    Parameters
+    ----------
+    fit : Fit
+        Exact.
+
+    Returns
+    -------
+    bool
+        Then what else is missing is searched on top of it.
+    """
+    return fit.mean_misfit < NEARLY_RIGHT
 
 
 def how_many(early: Sequence[Fit], usual: int) -> int:
@@ -220,8 +235,7 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
     fitted = {fit.hypothesis.causes[-1].effect.name for fit in fits.values()}
     for fit in sorted(early, key=lambda fit: fit.cost):
         effect = fit.hypothesis.causes[-1].effect
-        alike = effect.name in best.imitators or best.name in effect.imitators
-        if alike and effect.name not in fitted:
+        if _are_alike(effect, best) and effect.name not in fitted:
             fitted.add(effect.name)
             _keep(fits, bench.fit_from(fit))
 
@@ -255,11 +269,13 @@ def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
     """Fit what looks like the best, at its place."""
     cause = best.hypothesis.causes[-1]
     for effect in bench.effects.values():
-        if effect.name not in cause.effect.imitators and cause.effect.name not in effect.imitators:
-            continue
-        for other in causes_of(effect, bench.specimen):
+        for other in causes_of(effect, bench.specimen) if _are_alike(effect, cause.effect) else ():
             if other.place.location == cause.place.location and other.key not in fits:
                 fits[other.key] = _from_neighbour(bench, base, other, best)
+
+
+def _are_alike(one: Effect, other: Effect) -> bool:
+    return one.name in other.imitators or other.name in one.imitators
 
 
 def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
@@ -283,8 +299,7 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)
-    is_near = fit.misfit < NEARLY_RIGHT * 2 * bench.data.measured.values.size
-    if len(hypothesis.parameters) == len(fit.values) and is_near:
+    if len(hypothesis.parameters) == len(fit.values) and is_nearly_right(fit):
         values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
         unknown = same_modes(hypothesis, values, fit)
         return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1)
