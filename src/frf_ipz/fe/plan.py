@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 
+MOST_DAMPED = 12  # DOFs with dampers: more are damping of the structure, not single dampers
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReductionPlan:
     """What is wanted, and what the user has fixed; all DOFs are unsigned and free in the model.
@@ -76,7 +79,7 @@ def plan_reduction(
     fewer = min((side for side in (loaded, read) if side), key=len, default=())
     plan = ReductionPlan(
         wanted=unsigned([*actuators, *sensors, *points]),
-        residual=_parsed(given, "residual_flexibility") if given is not None else fewer,
+        residual=_parsed(given, "residual_flexibility") if given is not None else unsigned([*fewer, *_damped(model)]),
         residual_is_given=given is not None,
         dofs=_parsed(options.dofs, "dofs"),
         modes=options.modes,
@@ -85,6 +88,12 @@ def plan_reduction(
         model.index(dof)
     _require_counts(plan, model)
     return plan
+
+
+def _damped(model: StructuralModel) -> tuple[Dof, ...]:
+    """DOFs on which dampers act: their forces bend the shapes, and undamped modes alone do not follow."""
+    on = np.flatnonzero(model.damping.diagonal())
+    return tuple(model.dofs[row] for row in on.tolist()) if len(on) <= MOST_DAMPED else ()
 
 
 def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:

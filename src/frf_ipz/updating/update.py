@@ -7,6 +7,7 @@ Sits between pairing and prediction. A method is a module that offers
 from __future__ import annotations
 
 import pkgutil
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol, cast
 
@@ -14,6 +15,7 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.progress import silent
 from frf_ipz.updating import methods
 from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.placing import with_misplacements
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.parameters import ParameterBasis
+    from frf_ipz.updating.placing import Misplacement
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
@@ -54,6 +57,7 @@ def update_model(
     options: UpdateOptions | None = None,
     *,
     basis: ParameterBasis | None = None,
+    misplacements: tuple[Misplacement, ...] = (),
     progress: Progress = silent,
 ) -> UpdatedModel:
     """Bring a reduced model to the measured poles and zeros.
@@ -71,6 +75,8 @@ def update_model(
     basis : ParameterBasis, optional
         What may change, and how likely: the parts of the FE model (`updating.parameters.structural_basis`) or what a
         diagnosis has chosen. Without it the method uses its own generic parameters.
+    misplacements : tuple of Misplacement
+        How far sensors and blows may be from their places: zeros count that much less.
     progress : Progress
         Told how far the work is.
 
@@ -91,7 +97,9 @@ def update_model(
     if chosen.method not in known:
         raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, known)}")
     module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
-    return cast("Method", module).update(make_problem(model, fit, pairs, basis), chosen, progress)
+    problem = make_problem(model, fit, pairs, basis)
+    problem = replace(problem, covariance=with_misplacements(problem, misplacements))
+    return cast("Method", module).update(problem, chosen, progress)
 
 
 def method_names() -> tuple[str, ...]:

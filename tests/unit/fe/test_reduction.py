@@ -1,9 +1,11 @@
 """Reduction to physical DOFs: exact modes, exact statics, good choices, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import linalg
+from scipy import linalg, sparse
 
 from fe_models import LUMPED_TEXT, beam, read_text_model, structural_model
 from frf_ipz.dofs import Dof, parse_dof
@@ -19,6 +21,7 @@ from frf_ipz.quantities import FrfQuantity
 
 BAND = (10.0, 700.0)
 EXACT = 1e-8  # relative: what a condition number of a few hundred leaves of double precision
+STRONG_NS_M, BENT = 2000.0, 1e-3  # nearly a support; relative, of the poles of the band
 STATIC = 1e-6  # relative, of FRFs at 1 % of the first frequency
 
 
@@ -175,6 +178,17 @@ def test_viscous_damping_goes_through_the_same_basis(tmp_path):
     options = ReduceOptions(modes=1, residual_flexibility=("1:x",))
     found = reduce(model, options, actuators=("1:x",), sensors=("2:x",), points=())
     assert_allclose(found.damping, model.damping.toarray(), rtol=1e-9, atol=1e-9)
+
+
+def test_a_strong_damper_bends_the_shapes():
+    held = beam(left="clamped", elements=20, modal_ratio=0.005)
+    place = held.place(Dof(13, "z"))
+    damper = sparse.csr_array(([STRONG_NS_M], ([place], [place])), shape=held.damping_all.shape)
+    damped = replace(held, damping_all=sparse.csr_array(held.damping_all + damper))
+    found, whole = model_poles(reduce(damped)), model_poles(damped)
+    in_band = (whole.imag > 0) & (np.abs(whole) < 2 * np.pi * BAND[1])
+    nearest = found[np.abs(found[:, None] - whole[in_band]).argmin(0)]
+    assert_allclose(nearest, whole[in_band], rtol=BENT)
 
 
 def test_default_damping_is_said():

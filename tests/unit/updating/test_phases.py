@@ -1,17 +1,23 @@
 """The phases of a minimal change: their sensitivities against differences, whatever the model and the parameters."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from frf_ipz.progress import silent
 from frf_ipz.updating.methods import minimal_change
 from frf_ipz.updating.minimal.gauss_newton import iterate
 from frf_ipz.updating.minimal.modal_frame import frame_of, modal_frame
+from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, structural_basis
 from frf_ipz.updating.problem import make_problem
 from updating_study import set_up
 
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
+STRONG = 5e-3  # of what would stop the motion
+UNTOUCHED = 1e-6  # of the largest stiffness
 SEEDS = (20, 12, 11)  # a plate and a frame with zeros off the axis, and a beam
 
 
@@ -87,3 +93,26 @@ def test_roots_are_followed_through_a_crossing(problem):
         slope = phase.slopes(small * (step - 1) * direction, before) @ direction
         moved = phase.errors(before) - phase.errors(near)
         assert np.abs(moved - small * slope).max() < 0.2 * max(np.abs(small * slope).max(), small)
+
+
+def test_a_model_that_is_right_stays_as_it_is_however_it_is_damped(bench):
+    """A damper bends shapes and moves moduli: that is no error of the stiffness."""
+    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    row = problem.rows(problem.frfs[0])[0]
+    rate = STRONG * np.sqrt(np.trace(problem.model.stiffness) * np.trace(problem.model.mass)) / (row @ row)
+    damped = replace(problem.model, damping=problem.model.damping + rate * np.outer(row, row))
+    there = problem.roots_near(damped, problem.computed)
+    kept = problem.frf < 0
+    known = replace(
+        problem,
+        model=damped,
+        values=there[kept],
+        computed=there[kept],
+        frf=problem.frf[kept],
+        covariance=problem.covariance[np.ix_(np.repeat(kept, 2), np.repeat(kept, 2))],
+        names=tuple(name for name, is_kept in zip(problem.names, kept, strict=True) if is_kept),
+    )
+    undamped = np.sqrt(np.abs(minimal_change._stiffness_phase(known, frame_of(damped)).eigenvalues))
+    assert np.abs(np.abs(there[kept]) / undamped[undamped > 0][: kept.sum()] - 1).max() > 0
+    found = minimal_change.update(known, UpdateOptions(ensemble=2), silent).model
+    assert np.abs(found.stiffness - damped.stiffness).max() < UNTOUCHED * np.abs(damped.stiffness).max()

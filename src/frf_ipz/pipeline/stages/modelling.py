@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray
+from frf_ipz.diagnosis.misplacements import misplacements
 from frf_ipz.diagnosis.parameters import diagnosed_basis
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
@@ -143,7 +144,8 @@ def update(
     InputError
         If the parameters are to be those of a diagnosis that is not applied.
     """
-    options = desk.job.pipeline.file.update
+    options, stated = desk.job.pipeline.file.update, desk.job.pipeline.file.diagnose
+    tolerance = stated.position_tolerance_m_per_m if stated and corrected_by else 0.0
     sensors = unweighed_sensors(desk.job.test, modal_fit.labels)
     nominal = desk.job.model
     if options.parameters == "diagnosis" and corrected_by is None:
@@ -157,11 +159,19 @@ def update(
             basis = diagnosed_basis(nominal, corrected_by, reduced, effects_of(desk))
         else:
             basis = structural_basis(model, reduced, mass=options.mass, sensors=sensors)
-        return update_model(reduced, modal_fit, pairs, options, basis=basis, progress=progress)
+        return update_model(
+            reduced,
+            modal_fit,
+            pairs,
+            options,
+            basis=basis,
+            misplacements=misplacements(model, reduced, modal_fit.labels, tolerance),
+            progress=progress,
+        )
 
     return desk.stage(
         "update",
-        {"options": asdict(options), "sensors": repr(sensors), "after": desk.after("pair")},
+        {"options": asdict(options), "sensors": repr(sensors), "tolerance": tolerance, "after": desk.after("pair")},
         compute,
         lambda result: {
             "pairs.parquet": partial(write_table, tables.pair_table(pairs, modal_fit.labels, result.after)),

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal.ensemble import Posterior, draw_ensemble
@@ -24,7 +24,7 @@ from frf_ipz.updating.minimal.modal_frame import ModalFrame, basis_inside, frame
 from frf_ipz.updating.minimal.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.minimal.suspects import contradicted, unmet_targets
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
-from frf_ipz.updating.tracking import WantedRoots
+from frf_ipz.updating.tracking import TrackedRoots, WantedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
 if TYPE_CHECKING:
@@ -59,6 +59,8 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     frame = frame_of(problem.model)
     phase = _stiffness_phase(problem, frame)
     start = phase.nominal_roots(problem.computed)
+    stated = _by_damping(problem.computed, start)
+    phase = replace(phase, targets=phase.targets - stated)
     left_out = contradicted(phase, start)
     phase = replace(
         phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.wanted.frf)), left_out) * LEFT_OUT**2)
@@ -69,9 +71,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     damping = _damping(problem, frame, inner, phase, result)
     damped = iterate(damping, damping.first_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
-    shift = np.log(np.abs(damped.tracked.values(len(phase.wanted.frf)))) - log_moduli(
-        result.tracked, len(phase.wanted.frf)
-    )
+    shift = _by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
     if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(result.noise))):
         phase = replace(phase, targets=phase.targets - shift, noise=phase.noise + np.diag((shift / 2) ** 2))
         result = iterate(
@@ -92,6 +92,11 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     )
     progress(0.8, "ensemble")
     return _updated(problem, options, posterior, history, left_out)
+
+
+def _by_damping(damped: ComplexArray, undamped: TrackedRoots) -> FloatArray:
+    """Give what damping adds to the logarithms of the moduli."""
+    return np.asarray(np.log(np.abs(damped)) - log_moduli(undamped, len(damped)))
 
 
 def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhase:

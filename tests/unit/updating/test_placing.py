@@ -1,0 +1,85 @@
+"""Misplaced sensors and blows: how far they move zeros, against zeros of a model that has them elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.misplacements import misplacements
+from frf_ipz.updating.placing import Misplacement, with_misplacements
+from frf_ipz.updating.problem import make_problem
+from frf_ipz.updating.update import update_model
+from updating_study import set_up
+
+SEEDS = (20, 12)  # a plate and a frame
+SMALL = 1e-5  # of a row: what is left of second order is as small
+SECOND_ORDER = 1e-3  # of the largest move
+TOLERANCE = 1e-3  # m/m, as stated by default
+
+
+@pytest.fixture(params=SEEDS, scope="module")
+def bench(request):
+    return set_up(request.param)
+
+
+def test_zeros_move_as_those_of_a_model_with_other_rows(bench):
+    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    label = problem.labels[problem.frfs[0]]
+    row = SMALL * np.random.default_rng(0).standard_normal(len(problem.model.dofs))
+    for dof, is_output in ((label.output_dof, True), (label.input_dof, False)):
+        only = replace(problem, covariance=np.zeros_like(problem.covariance))
+        found = with_misplacements(only, (Misplacement(dof=dof, is_output=is_output, row=row),))
+        moved = _zeros_with(problem, dof, is_output, row) - problem.computed
+        parts = np.stack([moved.real, moved.imag], axis=1).ravel()
+        expected = np.outer(parts, parts)
+        assert np.abs(expected).max() > 0
+        assert np.abs(found - expected).max() < SECOND_ORDER * np.abs(expected).max()
+    poles = 2 * np.count_nonzero(problem.frf < 0)
+    assert not found[:poles].any()
+
+
+def _zeros_with(problem, dof, is_output, row):
+    """Zeros of the same model with a sensor or a blow elsewhere; poles as they are."""
+    values = problem.computed.copy()
+    for target in np.flatnonzero(problem.frf >= 0):
+        frf = int(problem.frf[target])
+        output, force = problem.rows(frf)
+        label = problem.labels[frf]
+        if is_output and label.output_dof == dof:
+            output = output + row
+        if not is_output and label.input_dof == dof:
+            force = force + row
+        values[target] = _newton(problem.model, output, force, values[target])
+    return values
+
+
+def _newton(model, output, force, zero):
+    for _ in range(6):
+        dynamic = zero**2 * model.mass + zero * model.damping + model.stiffness
+        motion, across = np.linalg.solve(dynamic, force), np.linalg.solve(dynamic.T, output)
+        zero -= (output @ motion) / -(across @ (2 * zero * model.mass + model.damping) @ motion)
+    return zero
+
+
+def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are():
+    bench = set_up(SEEDS[0])
+    off = misplacements(bench.case.nominal, bench.reduced, bench.fit.labels, TOLERANCE)
+    ends = {(label.output_dof, True) for label in bench.fit.labels} | {(x.input_dof, False) for x in bench.fit.labels}
+    assert {(one.dof, one.is_output) for one in off} == ends
+    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    wider = with_misplacements(problem, off) - problem.covariance
+    zeros = np.repeat(problem.frf >= 0, 2)
+    assert np.all(np.diagonal(wider)[zeros] >= 0)
+    assert np.diagonal(wider)[zeros].max() > np.diagonal(problem.covariance)[zeros].min()
+    assert not wider[~zeros].any()
+
+
+def test_a_misplaced_sensor_is_not_taken_for_another_stiffness():
+    """A zero that lies elsewhere because of its sensor changes the model less where that is allowed for."""
+    bench = set_up(SEEDS[0])
+    off = misplacements(bench.case.nominal, bench.reduced, bench.fit.labels, TOLERANCE)
+    changes = [
+        np.abs(np.diagonal(found.model.stiffness) / np.diagonal(bench.reduced.stiffness) - 1).max()
+        for found in (update_model(bench.reduced, bench.fit, bench.pairs, misplacements=some) for some in ((), off))
+    ]
+    assert changes[1] < changes[0]
