@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Misfit
-from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 from frf_ipz.diagnosis.nonlinear.linear.plant import respond
@@ -46,8 +45,7 @@ def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit
     other = [(np.nan, np.nan), (np.nan, np.nan)]
     if held_out is not None and not held_out.moving.any():
         resting, unknowns = freedom.without_starts(fit.unknowns)
-        start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=unknowns)
-        simulated = shoot(held_out, resting, start, iterations=0).misfit
+        simulated = shoot(held_out, resting, fit.start(unknowns), iterations=0).misfit
         plain = _linear(held_out, resting, freedom.without_starts(track.linear.unknowns)[1])
         other = [_figures(held_out, plain), _figures(held_out, simulated)]
     before, after = (

@@ -10,8 +10,9 @@ linear can (`beyond_linear`). If none explains it, the place is looked for at wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,6 @@ from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
-from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -185,10 +185,11 @@ def search_laws(
         long = track_of(periods, floor, loudest=is_linear)
     short = track_of(SHORT, ROUGH, loudest=is_linear)
     fits = find_candidates(short, long, laws)
-    found = _judge(long, linearity, plant, fits)
+    bend_of = cache(partial(_bend, long))
+    found = _judge(long, linearity, plant, fits, bend_of)
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
-        found = _with_place(found, plant, _anywhere(short, long, fits), long)
+        found = _with_place(found, plant, _anywhere(short, long, fits, bend_of), long)
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
@@ -196,18 +197,17 @@ def search_laws(
     return replace(found, freedom=long.linear.freedom, before=before, after=after)
 
 
-def _anywhere(short: Track, long: Track, fits: list[LawFit]) -> AnyForce:
+def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:
     """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
     near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost][:MOST_NEAR]
-    bent = [AnyForce(place=fit.place, cost=fit.cost - _drop(long, fit)) for fit in near]
+    bent = [AnyForce(place=fit.place, cost=fit.cost - bend_of(fit)) for fit in near]
     found = find_place(short, long)[0]
     return min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
 
 
-def _drop(track: Track, fit: LawFit) -> float:
+def _bend(track: Track, fit: LawFit) -> float:
     """Drop of the cost by forces of other kinds at the place of a law."""
-    start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=fit.unknowns)
-    return gain_of_further(track.stretches, track.linear.freedom, start, simple_forces)
+    return gain_of_further(track.stretches, track.linear.freedom, fit.start(), simple_forces)
 
 
 def _with_place(found: LawSearch, plant: Plant, best: AnyForce, track: Track) -> LawSearch:
@@ -239,7 +239,9 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
     return replace(observations, blows=kept), replace(observations, blows=tuple(held))
 
 
-def _judge(track: Track, linearity: Linearity, plant: Plant, fits: list[LawFit]) -> LawSearch:
+def _judge(
+    track: Track, linearity: Linearity, plant: Plant, fits: list[LawFit], bend_of: Callable[[LawFit], float]
+) -> LawSearch:
     if not fits:
         return LawSearch(
             verdict=UNEXPLAINED, linearity=linearity, plant=plant, statement=f"{DISAGREE}; no law explains it."
@@ -253,7 +255,7 @@ def _judge(track: Track, linearity: Linearity, plant: Plant, fits: list[LawFit])
     weights = np.exp(gains - gains.max())
     findings = _findings(plant, fits, gains, weights / weights.sum(), scale)
     agreement = agreement_with(track.stretches, track.linear.freedom, best)
-    why = _complaint(track, best, agreement, float(gains[0]))
+    why = _complaint(track, best, agreement, float(gains[0]), bend_of)
     return LawSearch(
         verdict=UNEXPLAINED if why else EXPLAINED,
         linearity=linearity,
@@ -279,7 +281,9 @@ def _ranked(track: Track, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]
     return [fits[i] for i in order], drops[order]
 
 
-def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) -> str:
+def _complaint(
+    track: Track, best: LawFit, agreement: Agreement, gain: float, bend_of: Callable[[LawFit], float]
+) -> str:
     """Say what is wrong with a law; nothing where it explains the recordings."""
     if np.fmin(gain, agreement.gain) < FOUND_NATS:
         return "gains no more than a linear system could"
@@ -291,7 +295,7 @@ def _complaint(track: Track, best: LawFit, agreement: Agreement, gain: float) ->
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
     if part > MOST_LEFT:
         return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
-    bent = _drop(track, best)
+    bent = bend_of(best)
     if _is_bent(track, best, bent):
         return f"is bent: forces of other kinds at its place would gain {0.5 * bent:.0f} nats more"
     return ""

@@ -61,8 +61,7 @@ class Track:
         unknowns = fit.unknowns
         if len(unknowns) != len(self.linear.unknowns) or fit.n_rows != self.linear.n_rows:
             unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
-        start = Start(law=fit.law, place=fit.place, strength=fit.strength, shape=fit.shape, unknowns=unknowns)
-        return shoot(self.stretches, self.linear.freedom, start, iterations=iterations)
+        return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
 
 
 def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawFit]:

@@ -73,6 +73,16 @@ class LawFit:
     misfit: FloatArray
     settled: bool = False
 
+    def start(self, unknowns: FloatArray | None = None) -> Start:
+        """Start another fit from here, with these or other unknowns of the linear model."""
+        return Start(
+            law=self.law,
+            place=self.place,
+            strength=self.strength,
+            shape=self.shape,
+            unknowns=self.unknowns if unknowns is None else unknowns,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
