@@ -60,7 +60,7 @@ def agreement_with(stretches: Stretches, freedom: Freedom, fit: LawFit) -> Agree
     if stretches.moving.any() or counts.max() < ENOUGH:
         return Agreement(np.nan, np.nan)
     used = stretches.used
-    response = respond(freedom.plant, stretches.s[used], freedom.deviations(fit.unknowns))
+    response = respond(freedom.plant, stretches.s[used], freedom.deviations(fit.unknowns, fit.place))
     motion = stretches.motion[:, :, used]
     without = motion + response.to_sensors(fit.place) * fit.force[:, None, used]
     present = np.isfinite(stretches.variance[:, :, used])

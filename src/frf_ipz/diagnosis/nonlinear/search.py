@@ -21,7 +21,7 @@ import numpy as np
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates, refit
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -51,6 +51,10 @@ LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
 LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
+WEAK, TWICE = (
+    1.0,
+    2.0,
+)  # mean square that a linear model leaves below which the best laws are fitted to longer stretches
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
 USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
@@ -180,11 +184,15 @@ def search_laws(
     if is_linear and is_longer:
         periods = LONG  # how a louder stretch starts is not known, and the longer it is, the more that matters
         long = track_of(periods, FINE, loudest=True)
+    floor, is_weak = FINE, long.missed < WEAK
     if long.missed < USUAL:
         floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
         long = track_of(periods, floor, loudest=is_linear)
     short = track_of(SHORT, ROUGH, loudest=is_linear)
     fits = find_candidates(short, long, laws)
+    if is_weak:
+        long = track_of(TWICE * periods, floor, loudest=is_linear)
+        fits = refit(long, fits)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
     if found.verdict == UNEXPLAINED:
@@ -293,7 +301,7 @@ def _complaint(
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
-    if part > MOST_LEFT:
+    if part > MOST_LEFT and _hides(track, best):
         return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
     bent = bend_of(best)
     if _is_bent(track, best, bent):
@@ -301,11 +309,21 @@ def _complaint(
     return ""
 
 
+def _hides(track: Track, fit: LawFit) -> bool:
+    """Noise hides what other forces at the place of a law would have to explain for the law to be bent."""
+    scale = max(1.0, fit.cost / fit.n_rows)
+    return _bend_of_errors(track, fit) < 2 * BENT_NATS * scale
+
+
 def _is_bent(track: Track, fit: LawFit, drop: float) -> bool:
     """Other forces at the place of a law explain more than errors of the model imitate."""
+    return drop > _bend_of_errors(track, fit) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > BENT_NATS
+
+
+def _bend_of_errors(track: Track, fit: LawFit) -> float:
+    """Drop of the cost by forces of other kinds that errors of the model imitate."""
     of_cost, of_gain = BENT_MOVING if track.stretches.moving.any() else BENT
-    needed = max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))
-    return drop > needed and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > BENT_NATS
+    return max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))
 
 
 def _gain(fit: LawFit, drop: float, n_places: int, scale: float) -> float:

@@ -98,7 +98,7 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
     stretches, linear = track.stretches, track.linear
     clock, freedom = Clock(stretches), linear.freedom
     unknowns = linear.unknowns.copy()
-    unknowns[: sum(freedom.sizes[:4])] = 0.0
+    unknowns[: freedom.n_lasting] = 0.0
     force: ComplexArray | None = None
     best = np.inf
     for _ in range(n_turns):
@@ -163,8 +163,7 @@ def _rows(
     shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
     misfit = as_real((stretches.motion - shown)[:, :, used] * weight)
     on_place = np.zeros((stretches.n_blows, len(used)), complex) if force is None else -force[:, used]
-    shapes = freedom.plant.at_places.shapes[start.place]
-    by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, shapes))
+    by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, start.place))
     to_sensors = response.to_sensors(start.place)[:, used]
     return np.concatenate([by_unknowns, as_real(-to_sensors * forces[:, :, None, used] * weight)]), misfit
 

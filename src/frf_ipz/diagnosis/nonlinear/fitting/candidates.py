@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
 from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
@@ -57,7 +56,7 @@ class Track:
 
     def shoot(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other stretches."""
-        known = sum(self.linear.freedom.sizes[:4])
+        known = self.linear.freedom.n_lasting
         unknowns = fit.unknowns
         if len(unknowns) != len(self.linear.unknowns) or fit.n_rows != self.linear.n_rows:
             unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
@@ -90,6 +89,26 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
     return sorted(fits, key=lambda fit: fit.cost)
 
 
+def refit(track: Track, fits: Sequence[LawFit]) -> list[LawFit]:
+    """Fit the best laws and places to other stretches.
+
+    Parameters
+    ----------
+    track : Track
+        Longer stretches, say.
+    fits : sequence of LawFit
+        The best first.
+
+    Returns
+    -------
+    list of LawFit
+        Of the best fits, and of the best one of each other law; the smallest cost first.
+    """
+    best = list(fits[:FINALISTS])
+    best += [fit for law in {fit.law: None for fit in fits} for fit in _of(law, fits)[:1] if fit not in best]
+    return sorted(_simulated(track, best, hopeless=HOPELESS_LATE), key=lambda fit: fit.cost)
+
+
 def _of(law: Law, fits: Iterable[LawFit]) -> list[LawFit]:
     return [fit for fit in fits if fit.law is law]
 
@@ -106,7 +125,7 @@ def _different(fits: Iterable[LawFit]) -> list[LawFit]:
 def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
     guesses = screen(track.stretches, track.linear, laws)
     unknowns = track.linear.unknowns.copy()
-    unknowns[: sum(track.linear.freedom.sizes[:4])] = 0.0
+    unknowns[: track.linear.freedom.n_lasting] = 0.0
     chosen = [guess for law in laws for guess in [g for g in guesses if g.law is law][:OF_EACH_LAW]]
     chosen += [guess for guess in guesses[:OF_ALL] if guess not in chosen]
     fits = []
@@ -143,12 +162,13 @@ def _climb(track: Track, fits: list[LawFit]) -> None:
 
 def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
     """Bring a law to another place, where it moves as much and does as much work as at its own."""
-    shapes: FloatArray = track.linear.freedom.plant.at_places.shapes
-    here, there = shapes[fit.place], shapes[place]
+    freedom = track.linear.freedom
+    here, there = freedom.plant.at_places.shapes[[fit.place, place]]
+    fit = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
     ratio = float(here @ there / max(float(here @ here), 1e-300))
     if ratio <= 0:
-        return replace(fit, place=place)
-    return replace(fit, place=place, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
+        return fit
+    return replace(fit, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
 
 def neighbours(plant: Plant, place: int, count: int) -> list[int]:

@@ -174,7 +174,7 @@ def motion_at(
         Motion and velocity, m and m/s.
     """
     plant = freedom.plant
-    response = respond(plant, stretches.s, freedom.deviations(start.unknowns))
+    response = respond(plant, stretches.s, freedom.deviations(start.unknowns, start.place))
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
     beyond[freedom.moving] -= freedom.sensor_starts(start.unknowns, response)
     own, driven = response.at_place(start.place)
@@ -238,9 +238,8 @@ def _rows(
     linear = linear_motion(stretches, freedom, response)
     linear[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
     misfit = as_real((stretches.motion - linear)[:, :, used] * weight)
-    shapes = freedom.plant.at_places.shapes[start.place]
     by_law = [as_real(-to_sensors * force[:, None, used] * weight)[None] for force in forces]
-    rows = [as_real(freedom.columns(stretches, on_used, -start.strength * forces[0][:, used], shapes)), *by_law]
+    rows = [as_real(freedom.columns(stretches, on_used, -start.strength * forces[0][:, used], start.place)), *by_law]
     return np.concatenate(rows), misfit
 
 

@@ -110,7 +110,7 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
     on_used = respond(plant, stretches.s[used], no_deviations(plant))
     nothing = np.zeros((stretches.n_blows, len(used)), complex)
-    columns = as_real(freedom.columns(stretches, on_used, nothing, np.zeros(plant.n_modes)))
+    columns = as_real(freedom.columns(stretches, on_used, nothing, None))
     misfit = as_real(beyond[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
     factor = linalg.cholesky(columns @ columns.T + np.eye(len(columns)), lower=True)
     seen = linalg.solve_triangular(factor, columns @ misfit, lower=True)
@@ -141,8 +141,8 @@ def _settled_cost(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) 
         cost = float(misfit @ misfit + unknowns @ unknowns)
         if cost > (1 - SETTLED) * best:
             return min(best, cost)
-        best, no_shapes = cost, np.zeros(freedom.plant.n_modes)
-        columns = as_real(freedom.columns(stretches, response.on(used), nothing, no_shapes, unknowns))
+        best = cost
+        columns = as_real(freedom.columns(stretches, response.on(used), nothing, None, unknowns))
         normal = columns @ columns.T + np.eye(len(columns))
         unknowns = unknowns + linalg.solve(normal, columns @ misfit - unknowns, assume_a="pos")
     return best

@@ -129,7 +129,7 @@ def gain_of_further(stretches: Stretches, freedom: Freedom, start: Start, kinds:
 def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
     yielding = place.yielding(constant=start.law.holds)
-    response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns))
+    response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns, start.place))
     used = stretches.used
     with np.errstate(all="ignore"):  # a step too far may run away: its cost is infinite
         done = march(start.law, (start.strength, start.shape), yielding, *place.without_law())
@@ -141,11 +141,12 @@ def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
 
 
 def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexArray:
-    """Transform a law's force; one that is constant within steps acts half a step earlier than its time says."""
+    """Transform a law's force; one that is constant within steps acts throughout the step before its time."""
     clock = Clock(stretches, oversampling=FINER, fades=False)
     lines = clock.at_lines(np.where(np.isfinite(force), force, 0.0))
     lines[~np.isfinite(force).all(-1)] = np.inf
-    return lines * np.exp(stretches.s * clock.step_s / 2) if holds else lines
+    way = stretches.s * clock.step_s
+    return lines * np.expm1(way) / way if holds else lines
 
 
 def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
@@ -156,19 +157,21 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArr
     to_sensors = shot.response.to_sensors(start.place)[:, used]
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
-    seen = -to_sensors * lines[:, :, None] * weight
+    with np.errstate(invalid="ignore"):  # changes that run away are taken for none below
+        seen = -to_sensors * lines[:, :, None] * weight
     on_used = shot.response.on(used)
-    shapes = freedom.plant.at_places.shapes[start.place]
-    rows = freedom.columns(stretches, on_used, -shot.force[:, used], shapes, start.unknowns)
+    rows = freedom.columns(stretches, on_used, -shot.force[:, used], start.place, start.unknowns)
     rows[: 2 * n_free] += seen[: 2 * n_free]
     first = 2 * n_free + freedom.sensors.size
     for number in range(len(freedom.inputs)):
         mine = stretches.input_of == number
         rows[first + number * n_free : first + (number + 1) * n_free, mine] += seen[2 * n_free : 3 * n_free, mine]
     first += freedom.inputs.size
+    rows[first : first + n_free] += seen[3 * n_free : 4 * n_free]
+    first += n_free
     for which in range(2 if len(freedom.moving) else 0):
         for blow in freedom.moving:
-            rows[first : first + n_free, blow] += seen[(3 + which) * n_free : (4 + which) * n_free, blow]
+            rows[first : first + n_free, blow] += seen[(4 + which) * n_free : (5 + which) * n_free, blow]
             first += n_free
     return np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
 

@@ -1,7 +1,8 @@
 """What the linear model may be wrong by: unknowns that are fitted besides a law, each with its prior.
 
 All are counted in units of their prior standard deviation: frequencies and damping ratios of the modes of the band, the
-shapes at sensors and blows (positions, gains, uneven stiffness), and the motion at the start of a stretch.
+shapes at sensors and blows (positions, gains, uneven stiffness) and at the place of a law (uneven stiffness), and the
+motion at the start of a stretch.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
 
-BEYOND = 1.25  # times the top of the band: modes whose parameters are free
+BEYOND = 2.0  # times the top of the band: modes whose parameters are free
 BEYOND_MOVING = 2.0  # the same where stretches start in motion, of which these modes have a part
 UNIFORM = 3**-0.5  # standard deviation of a uniform distribution over its half width
 CORD_SPREAD = 0.7  # of the logarithm of frequency and damping on soft cords: a factor of two
@@ -45,6 +46,8 @@ class Freedom:
         Of shapes at sensors.
     inputs : (n_inputs, n_free) array
         Of shapes at blows.
+    places : (n_places, n_free) array
+        Of shapes at places; one place is looked at at a time.
     starts : (n_moving, n_free) array
         Of the modal velocity at the start of stretches, and of displacement times omega, m/s kg^1/2.
     moving : (n_moving,) int array
@@ -57,14 +60,15 @@ class Freedom:
     damping: FloatArray
     sensors: FloatArray
     inputs: FloatArray
+    places: FloatArray
     starts: FloatArray
     moving: IntArray
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of unknowns: frequencies, damping, sensors, inputs, starting motions and velocities."""
+        """Numbers of unknowns: frequencies, damping, sensors, inputs, place, starting motions and velocities."""
         return (
-            *(self.frequency.size, self.damping.size, self.sensors.size, self.inputs.size),
+            *(self.frequency.size, self.damping.size, self.sensors.size, self.inputs.size, len(self.modes)),
             *(self.starts.size, self.starts.size),
         )
 
@@ -73,13 +77,26 @@ class Freedom:
         """Number of all unknowns."""
         return sum(self.sizes)
 
-    def deviations(self, unknowns: FloatArray) -> Deviations:
+    @property
+    def n_lasting(self) -> int:
+        """Number of unknowns of the structure; those of how stretches start follow."""
+        return sum(self.sizes[:5])
+
+    def of_no_place(self, unknowns: FloatArray) -> FloatArray:
+        """Forget what unknowns say of the place of a law, for another place."""
+        parts = self._split(unknowns)
+        parts[4] = np.zeros_like(parts[4])
+        return np.concatenate(parts)
+
+    def deviations(self, unknowns: FloatArray, at: int | None = None) -> Deviations:
         """Turn unknowns into deviations of the plant.
 
         Parameters
         ----------
         unknowns : (n_unknowns,) array
             In prior standard deviations.
+        at : int, optional
+            Place of a law, an index in `Plant.places`.
 
         Returns
         -------
@@ -87,11 +104,13 @@ class Freedom:
             Zero for modes that are not free.
         """
         found = no_deviations(self.plant)
-        frequency, damping, sensors, inputs, _, _ = self._split(unknowns)
+        frequency, damping, sensors, inputs, place = self._split(unknowns)[:5]
         found.frequency[self.modes] = frequency * self.frequency
         found.damping[self.modes] = damping * self.damping
         found.sensors[:, self.modes] = sensors.reshape(self.sensors.shape) * self.sensors
         found.inputs[:, self.modes] = inputs.reshape(self.inputs.shape) * self.inputs
+        if at is not None:
+            found.place[self.modes] = place * self.places[at]
         return found
 
     def place_starts(self, unknowns: FloatArray, response: PlantResponse, place: int) -> ComplexArray:
@@ -111,7 +130,7 @@ class Freedom:
         (n_moving, n_lines) complex array
             m s.
         """
-        free = _free_motion(response, self.modes, 0) * self.plant.at_places.shapes[place, self.modes, None]
+        free = _free_motion(response, self.modes, 0) * response.place_shapes(place)[self.modes, None]
         return np.asarray(np.einsum("cbm,cml->bl", self.starts_of(unknowns), free))
 
     def sensor_starts(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
@@ -138,7 +157,7 @@ class Freedom:
 
     def starts_of(self, unknowns: FloatArray) -> FloatArray:
         """(2, n_moving, n_free) displacement times omega, and velocity, of modes at the start of stretches."""
-        parts = self._split(unknowns)[4:]
+        parts = self._split(unknowns)[5:]
         return np.array([part.reshape(self.starts.shape) * self.starts for part in parts])
 
     def columns(
@@ -146,7 +165,7 @@ class Freedom:
         stretches: Stretches,
         response: PlantResponse,
         place_force: ComplexArray,
-        place_shapes: FloatArray,
+        place: int | None,
         unknowns: FloatArray | None = None,
     ) -> ComplexArray:
         """Change of the weighted responses by each unknown.
@@ -159,8 +178,8 @@ class Freedom:
             The structure as it is thought to be.
         place_force : (n_blows, n_used) complex array
             Force of the law on the structure, N s.
-        place_shapes : (n_modes,) array
-            Shapes at the law's place.
+        place : int, optional
+            Of the law, an index in `Plant.places`; None without a law.
         unknowns : (n_unknowns,) array, optional
             Where the linear model is: how stretches start changes with frequencies and damping.
 
@@ -172,8 +191,9 @@ class Freedom:
         plant, modes = self.plant, self.modes
         own = response.modes[modes]
         force = stretches.force[:, stretches.used]
-        push = response.input_shapes[stretches.input_of][:, modes, None] * force[:, None]
-        motion = (push + place_shapes[modes, None] * place_force[:, None]) * own  # blow, mode, line
+        motion = response.input_shapes[stretches.input_of][:, modes, None] * force[:, None] * own  # blow, mode, line
+        if place is not None:
+            motion = motion + response.place_shapes(place)[modes, None] * place_force[:, None] * own
         omega = plant.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes])
         ratio = plant.damping_ratio[modes] * np.exp(response.deviations.damping[modes])
         by_damping = -own * (2 * ratio * omega)[:, None] * response.s * self.damping[:, None]
@@ -190,6 +210,8 @@ class Freedom:
         for number in range(len(plant.inputs)):
             mine = (stretches.input_of == number)[:, None, None]
             parts.append(seen(np.where(mine, force[:, None] * own, 0.0) * self.inputs[number][:, None]))
+        spread = np.zeros(len(modes)) if place is None else self.places[place]
+        parts.append(seen(place_force[:, None] * own * spread[:, None]))
         parts += self._start_columns(response, weight)
         columns = np.concatenate(parts)
         if unknowns is not None and len(self.moving):
@@ -301,9 +323,18 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
         damping=np.where(rigid, CORD_SPREAD, options.damping_tolerance * UNIFORM),
         sensors=_shape_spread(plant, tuple(s.dof for s in plant.sensors), modes, options),
         inputs=_shape_spread(plant, plant.inputs, modes, options),
+        places=_uneven(plant, modes, options),
         starts=starts,
         moving=moving,
     )
+
+
+def _uneven(plant: Plant, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+    """How far uneven stiffness moves shapes at places, as a part of the largest of all nodes, or of all springs."""
+    shapes = np.abs(plant.at_places.shapes[:, modes])
+    across = np.array([len(place.ends) > 1 for place in plant.places])[:, None]
+    largest = [np.where(across == kind, shapes, 0.0).max(0) for kind in (False, True)]
+    return np.asarray(UNEVEN * options.stiffness_tolerance * np.where(across, largest[1], largest[0]))
 
 
 def _shape_spread(plant: Plant, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions) -> FloatArray:

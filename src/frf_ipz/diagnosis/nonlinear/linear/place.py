@@ -50,12 +50,12 @@ class PlaceInTime:
     @property
     def shapes(self) -> FloatArray:
         """(n_modes,) at the place."""
-        return np.asarray(self.freedom.plant.at_places.shapes[self.place])
+        return np.asarray(self.freedom.plant.at_places.shapes[self.place] + self.deviations.place)
 
     @property
     def deviations(self) -> Deviations:
         """Of the structure."""
-        return self.freedom.deviations(self.unknowns)
+        return self.freedom.deviations(self.unknowns, self.place)
 
     def modes(self) -> Modes:
         """Give the modes that are followed."""
@@ -100,8 +100,8 @@ class PlaceInTime:
         Returns
         -------
         (n_columns, 2, n_blows, n_times) array
-            Per prior standard deviation: frequencies, damping ratios, shapes at the blow, and, where stretches start in
-            motion, displacements and velocities at the start; of each mode that is free.
+            Per prior standard deviation: frequencies, damping ratios, shapes at the blow and at the place, and, where
+            stretches start in motion, displacements and velocities at the start; of each mode that is free.
         """
         freedom, modes = self.freedom, self.modes()
         free = freedom.modes
@@ -111,6 +111,7 @@ class PlaceInTime:
         inputs = freedom.inputs[self.stretches.input_of]
         by_input = some.drive(inputs[:, :, None] * self.stretches.fine_force[:, None])
         columns.append(np.stack(self._read(some, by_input), 1) * self.shapes[free, None])
+        columns.append(self._by_place(some, total, law_force))
         if len(freedom.moving):
             columns += self._by_start(some)
         return np.concatenate([column.transpose(2, 1, 0, 3) for column in columns])
@@ -148,6 +149,15 @@ class PlaceInTime:
                 z[freedom.moving] += self._free(modes)
             ends.append(np.stack(self._read(modes, z), 1))
         return np.asarray((ends[0] - ends[1]) * (sizes * self.shapes[free] / (2 * DIFFERENCE))[:, None])
+
+    def _by_place(self, modes: Modes, total: FloatArray, law_force: FloatArray) -> FloatArray:
+        """(n_blows, 2, n_free, n_times) change by the shapes at the place: of what it reads, and of what acts on it."""
+        freedom, shapes = self.freedom, self.shapes[self.freedom.modes, None]
+        z = modes.drive(total - shapes * law_force[:, None])
+        if len(freedom.moving):
+            z[freedom.moving] += self._free(modes)
+        sizes = freedom.places[self.place][:, None]
+        return np.asarray(np.stack(self._read(modes, z), 1) * sizes)
 
     def _free(self, modes: Modes) -> np.ndarray:
         """(n_moving, n_free, n_times) free vibrations of the free modes, the last of `modes` or all of them."""

@@ -2,7 +2,7 @@
 
 Transfer functions join three kinds of points: struck ones, sensors, and places. Each is a sum over modes up to a few
 times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`Deviations`) moves
-frequencies, damping and the shapes at sensors and blows.
+frequencies, damping and the shapes at sensors, blows and the place of a law.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, Sensor
     from frf_ipz.structure import StructuralModel
 
-BEYOND = 3.0  # times the top of the band: modes that are followed one by one
+BEYOND = 6.0  # times the top of the band: modes that are followed one by one; a stop or a friction stirs all of them
 LEAST_MODES = 8
 CORD_PART = 0.01  # of the first elastic frequency: how a free structure hangs, where nothing else is known
 CORD_DAMPING = 0.03
@@ -125,12 +125,15 @@ class Deviations:
         Added to the shapes at the sensors.
     inputs : (n_inputs, n_modes) array
         Added to the shapes at the blows.
+    place : (n_modes,) array
+        Added to the shapes at the one place that is looked at.
     """
 
     frequency: FloatArray
     damping: FloatArray
     sensors: FloatArray
     inputs: FloatArray
+    place: FloatArray
 
 
 def no_deviations(plant: Plant) -> Deviations:
@@ -152,6 +155,7 @@ def no_deviations(plant: Plant) -> Deviations:
         damping=np.zeros(n_modes),
         sensors=np.zeros((len(plant.sensors), n_modes)),
         inputs=np.zeros((len(plant.inputs), n_modes)),
+        place=np.zeros(n_modes),
     )
 
 
@@ -324,18 +328,22 @@ class PlantResponse:
         shapes = self.input_shapes[:, None, first_mode:] * self.sensor_shapes[None, :, first_mode:]
         return np.asarray(shapes @ self.modes[first_mode:] + self._rest(self.plant.at_inputs, self.plant.at_sensors))
 
+    def place_shapes(self, place: int) -> FloatArray:
+        """(n_modes,) shapes at a place as it is."""
+        return np.asarray(self.plant.at_places.shapes[place] + self.deviations.place)
+
     def to_sensors(self, place: int) -> ComplexArray:
         """(n_sensors, n_lines) receptance from a place to the sensors."""
         there = _some(self.plant.at_places, slice(place, place + 1))
-        shapes = self.sensor_shapes * there.shapes
+        shapes = self.sensor_shapes * self.place_shapes(place)
         return np.asarray(shapes @ self.modes + self._rest(there, self.plant.at_sensors)[0])
 
     def at_place(self, place: int) -> tuple[ComplexArray, ComplexArray]:
         """Receptance of a place to itself, (n_lines,), and from the blows to it, (n_inputs, n_lines)."""
-        there = _some(self.plant.at_places, slice(place, place + 1))
-        own = there.shapes**2 @ self.modes + self._rest(there, there)[0]
-        driven = (self.input_shapes * there.shapes) @ self.modes + self._rest(there, self.plant.at_inputs)[0]
-        return np.asarray(own[0]), np.asarray(driven)
+        there, shapes = _some(self.plant.at_places, slice(place, place + 1)), self.place_shapes(place)
+        own = shapes**2 @ self.modes + self._rest(there, there)[0, 0]
+        driven = (self.input_shapes * shapes) @ self.modes + self._rest(there, self.plant.at_inputs)[0]
+        return np.asarray(own), np.asarray(driven)
 
     def _rest(self, loaded: Points, read: Points) -> ComplexArray:
         """(n_loaded, n_read, n_lines) contribution of the modes left out."""

@@ -1,0 +1,58 @@
+"""The fit of a law by simulation: what the linear model around it may be wrong by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
+from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
+from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
+from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+K3 = 3e9  # N/m^3: at the strongest blow as stiff as a third of a spring of the chain
+OFF = 4.0  # prior standard deviations that the shape at the place is off by, in the first mode
+NOISE_FLOOR = 1e-3  # of the response: what the fit may miss
+CERTAIN = 3.0  # standard deviations
+
+
+def hardening(w, v):
+    del v
+    return K3 * w**3
+
+
+@pytest.fixture(scope="module")
+def cubic(chain, strike):
+    """Blows on the chain with a cubic spring at node 3, and the plant, with 1 % of uneven stiffness allowed."""
+    observations = strike(hardening)
+    plant = make_plant(chain.model, observations)
+    stretches = transform(observations, plant, read_noise(observations), Window(duration_s=1.0, floor=NOISE_FLOOR))
+    options = DiagnoseOptions(stiffness_tolerance=5e-3)
+    place = next(i for i, p in enumerate(plant.places) if p.location == {"nodes": [3]})
+    return stretches, make_freedom(plant, stretches, observations.band_hz[1], options), place
+
+
+def start_at(freedom, place, **changes):
+    law = shipped_laws()["cubic_stiffness"]
+    return replace(
+        Start(law=law, place=place, strength=K3, shape=0.0, unknowns=np.zeros(freedom.n_unknowns)), **changes
+    )
+
+
+def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
+    stretches, freedom, place = cubic
+    shapes = freedom.plant.at_places.shapes.copy()
+    shapes[place, freedom.modes] -= OFF * freedom.places[place] * (freedom.modes == 0)
+    wrong = replace(freedom.plant, at_places=replace(freedom.plant.at_places, shapes=shapes))
+    fit = shoot(stretches, replace(freedom, plant=wrong), start_at(freedom, place), iterations=12)
+    held = shoot(
+        stretches, replace(freedom, plant=wrong, places=1e-9 * freedom.places), start_at(freedom, place), iterations=12
+    )
+    assert fit.cost < 0.5 * held.cost
+    std = np.sqrt(fit.covariance[0, 0])
+    assert abs(fit.strength - K3) < CERTAIN * std
+    assert abs(held.strength - K3) > CERTAIN * np.sqrt(held.covariance[0, 0])
