@@ -51,10 +51,8 @@ LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
 LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
-WEAK, TWICE = (
-    1.0,
-    2.0,
-)  # mean square that a linear model leaves below which the best laws are fitted to longer stretches
+WEAK, TWICE = 1.0, 2.0  # mean square that a linear model leaves below which the best laws see longer stretches
+LONGER_BY = 1.2  # times as long, where records are long enough
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
 USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
@@ -177,22 +175,11 @@ def search_laws(
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
         return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
 
-    is_longer = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
-    periods = LONGER if is_longer else LONG
-    long = track_of(periods, FINE, loudest=False)
-    is_linear = long.missed < USUAL  # as far as its first parts say
-    if is_linear and is_longer:
-        periods = LONG  # how a louder stretch starts is not known, and the longer it is, the more that matters
-        long = track_of(periods, FINE, loudest=True)
-    floor, is_weak = FINE, long.missed < WEAK
-    if long.missed < USUAL:
-        floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
-        long = track_of(periods, floor, loudest=is_linear)
-    short = track_of(SHORT, ROUGH, loudest=is_linear)
+    from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
+    short, long, longer = _tracks(track_of, from_rest=from_rest)
     fits = find_candidates(short, long, laws)
-    if is_weak:
-        long = track_of(TWICE * periods, floor, loudest=is_linear)
-        fits = refit(long, fits)
+    if longer is not None:
+        long, fits = longer, refit(longer, fits)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
     if found.verdict == UNEXPLAINED:
@@ -203,6 +190,23 @@ def search_laws(
     progress(0.9, "proving on what was not fitted")
     before, after = prove(long, _held_out(held_out, plant, noise, long), found.fit)
     return replace(found, freedom=long.linear.freedom, before=before, after=after)
+
+
+def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, Track, Track | None]:
+    """Cut short and long stretches, and longer ones for the best laws where a linear model leaves little."""
+    periods = LONGER if from_rest else LONG
+    long = track_of(periods, FINE, loudest=False)
+    is_linear = long.missed < USUAL  # as far as its first parts say
+    if is_linear and from_rest:
+        periods = LONG  # how a louder stretch starts is not known, and the longer it is, the more that matters
+        long = track_of(periods, FINE, loudest=True)
+    floor, is_weak = FINE, long.missed < WEAK
+    if long.missed < USUAL:
+        floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
+        long = track_of(periods, floor, loudest=is_linear)
+    short = track_of(SHORT, ROUGH, loudest=is_linear)
+    longer = track_of(TWICE * periods, floor, loudest=is_linear) if is_weak else long
+    return short, long, longer if longer.stretches.n_samples > LONGER_BY * long.stretches.n_samples else None
 
 
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:

@@ -1,0 +1,50 @@
+"""Which stretches laws are fitted to, and when noise may hide that a law is another one."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from frf_ipz.diagnosis.nonlinear import search
+
+
+def cutter(missed, most=float("inf")):
+    """Tracks that say how long they were asked to be; a linear model leaves so much."""
+
+    def cut(periods, floor, *, loudest):
+        n_samples = min(periods, most)
+        return SimpleNamespace(
+            missed=missed, floor=floor, loudest=loudest, stretches=SimpleNamespace(n_samples=n_samples)
+        )
+
+    return cut
+
+
+def lengths(found):
+    return [track and track.stretches.n_samples for track in found]
+
+
+@pytest.mark.parametrize(
+    ("missed", "most", "expected"),
+    [(30.0, 1e9, [80, 320, None]), (0.8, 1e9, [80, 320, 640]), (0.8, 330, [80, 320, None])],
+)
+def test_longer_stretches_are_cut_where_a_linear_model_leaves_little(missed, most, expected):
+    assert lengths(search._tracks(cutter(missed, most), from_rest=False)) == expected
+
+
+def test_a_record_that_starts_linear_is_looked_at_where_it_is_loudest():
+    short, long, longer = search._tracks(cutter(0.3), from_rest=True)
+    assert long.loudest
+    assert short.loudest
+    assert longer.loudest
+    assert lengths((short, long, longer)) == [80, 320, 640]
+    assert long.floor < search.FINE
+
+
+@pytest.mark.parametrize(("explained", "hidden"), [(1e5, False), (1e4, True)])
+def test_noise_hides_another_law_only_where_the_bend_of_a_wrong_one_would_not_show(explained, hidden):
+    track = SimpleNamespace(
+        stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: False)),
+        linear=SimpleNamespace(cost=explained + 1e3),
+    )
+    fit = SimpleNamespace(cost=1e3, n_rows=5000)
+    assert search._hides(track, fit) == hidden
