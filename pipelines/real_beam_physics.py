@@ -38,7 +38,7 @@ from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.bench import Bench
-from frf_ipz.diagnosis.search.polish import Fit
+from frf_ipz.diagnosis.search.fit import Fit
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import set_up
 

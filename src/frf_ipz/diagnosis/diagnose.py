@@ -37,6 +37,7 @@ from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import FOUND_NATS as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
@@ -46,15 +47,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.diagnosis import Gate
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.judging.figures import Proof
     from frf_ipz.diagnosis.judging.findings import Weighed
+    from frf_ipz.diagnosis.nonlinear.linearity import Linearity
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Data
+    from frf_ipz.diagnosis.search.fit import Data
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
@@ -103,38 +106,24 @@ def diagnose(
     kept = _identifiable(chosen_effects(options, folder), scale)
     at_bench = partial(set_up, model, source, observations.band_hz, effects=kept, free_gains=scale)
     bench = at_bench(options)
-    laws = _laws(model, observations, options, folder, progress)
-    gates = check(source, None if laws is None else laws.linearity)
-    nonlinear = laws is not None and laws.is_nonlinear and bool(chosen_laws(options, folder))
-    certain = nonlinear and laws is not None and laws.linearity.score > CERTAIN * laws.linearity.limit
+    progress(0.1, "comparing weak and strong blows")
+    linearity = _linearity(observations)
+    gates = check(source, linearity)
+    excess = linearity.score / linearity.limit if linearity and chosen_laws(options, folder) else 0.0
+    certain = excess > CERTAIN
     bench, found, complaint = _decide(bench, at_bench, options, progress, is_certain=certain)
-    nonlinear &= certain or not kept or found.verdict == UNEXPLAINED
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
-    where = disagreement(bench, found.null, proof.curves)
-    weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
-    findings = _findings(bench, found, weighed)
-    linear = Diagnosis(
-        verdict=found.verdict,
-        findings=findings,
-        alternatives=_alternatives(found, weighed),
-        mismatch_hz=where[0],
-        mismatch_where=where[1],
-        mismatch_location=_mismatch_location(bench, found, findings),
-        mismatch=where[2],
-        before=proof.before,
-        updated=proof.updated,
-        after=proof.after,
-        held=source.held,
-        ambiguity=_ambiguity(bench, found, weighed),
-        gates=gates,
-        detectability=detectable_sizes(bench, found.null, LIMITS[bench.kind].found_nats),
-        curves=proof.curves,
-        numbers=_numbers(found),
-        warnings=tuple(gate.statement for gate in gates if not gate.passed),
-    )
-    if laws is not None and nonlinear:
+    linear = _linear(bench, found, proof, gates, held=source.held)
+    if excess > 1 and (certain or not kept or found.verdict == UNEXPLAINED):
+        laws = search_laws(
+            model,
+            observations,
+            options,
+            folder=folder,
+            progress=lambda part, text: progress(0.9 + 0.1 * part, text),
+        )
         return _with_law(linear, laws)
     return replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
 
@@ -172,20 +161,36 @@ def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Pr
     return found, proof
 
 
-def _laws(
-    model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
-) -> LawSearch | None:
-    """Ask blows of several levels for what is not linear; None where there are none."""
-    counts = [len(observations.at(dof)) for dof in observations.input_dofs]
-    if max(counts, default=0) < ENOUGH_TO_COMPARE:
-        return None
-    return search_laws(
-        model,
-        observations,
-        options,
-        folder=folder,
-        progress=lambda part, text: progress(0.1 + 0.1 * part, text),
+def _linear(bench: Bench, found: Decision, proof: Proof, gates: tuple[Gate, ...], *, held: str) -> Diagnosis:
+    """Gather what a linear model explains; it is not said yet."""
+    where = disagreement(bench, found.null, proof.curves)
+    weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
+    findings = _findings(bench, found, weighed)
+    return Diagnosis(
+        verdict=found.verdict,
+        findings=findings,
+        alternatives=_alternatives(found, weighed),
+        mismatch_hz=where[0],
+        mismatch_where=where[1],
+        mismatch_location=_mismatch_location(bench, found, findings),
+        mismatch=where[2],
+        before=proof.before,
+        updated=proof.updated,
+        after=proof.after,
+        held=held,
+        ambiguity=_ambiguity(bench, found, weighed),
+        gates=gates,
+        detectability=detectable_sizes(bench, found.null, LIMITS[bench.kind].found_nats),
+        curves=proof.curves,
+        numbers=_numbers(found),
+        warnings=tuple(gate.statement for gate in gates if not gate.passed),
     )
+
+
+def _linearity(observations: Observations) -> Linearity | None:
+    """Compare blows of several levels; None where no place has two."""
+    counts = [len(observations.at(dof)) for dof in observations.input_dofs]
+    return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
 
 
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:

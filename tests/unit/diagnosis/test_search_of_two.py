@@ -13,19 +13,23 @@ from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.together import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
+from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import fit_nothing, search
+from frf_ipz.diagnosis.search.search import fit_nothing, search, search_beside
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
+from frf_ipz.progress import silent
 
 THICK_M, HIGH_HZ = 0.03, (60.0, 5000.0)  # shear and rotary inertia lower the highest mode there by some per cent
 SOFTER = 0.9
 SEEN = 0.02  # relative: noise of 0.1 % of the FRFs, tolerances of 0.1 % of the stiffness
+WEAK_N_M = 45.0  # so little that the mass alone leaves nothing to explain
 ROUNDING = 1e-9  # of the largest entry
 ATTACHED = shipped_effects()["attached_resonator"]
 GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
@@ -91,6 +95,24 @@ def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
     best = search(bench, null).best
     assert best.hypothesis.causes[-1].key == ("time_delay", "acc_2")
     assert best.values[0] == pytest.approx(3e-5, rel=SEEN)
+
+
+def test_a_small_cause_beside_one_that_explains_nearly_all_is_named(nominal, monkeypatch):
+    true = with_springs(with_point_masses(nominal, {12: 0.02}), {Dof(8, "z"): WEAK_N_M})
+    bench = bench_of(nominal, measured(true), ("added_mass", "grounded_spring", "sensor_gain"))
+    assert [cause.effect.name for cause in decide(bench, silent).final.hypothesis.causes] == ["added_mass"]
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], beside_nats=LIMITS["hammer"].beside_nats))
+    found = decide(bench, silent)
+    assert [cause.effect.name for cause in found.final.hypothesis.causes] == ["added_mass", "grounded_spring"]
+    assert found.further[0].base.hypothesis.causes[0].place.location == {"nodes": [12]}
+
+
+def test_nothing_is_added_to_a_cause_that_explains_all(nominal):
+    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("added_mass", "grounded_spring"))
+    one = search(bench, fit_nothing(bench)).best
+    beside = search_beside(bench, one, LIMITS["hammer"].beside_nats)
+    assert beside.fits == ()
+    assert beside.n_tried > 5
 
 
 def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.physics.response import Modes
     from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.polish import Fit
     from frf_ipz.structure import StructuralModel
 
 HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.diagnosis.observations import Observations
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.frf import FrfSet
 
 ALIKE = 3.0  # points of a contour that share what a model cannot follow

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
-from frf_ipz.diagnosis.judging.verdict import LIMITS, SECOND_NATS, STRONG_NATS, Goodness, goodness
+from frf_ipz.diagnosis.judging.verdict import LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, is_nearly_right, search
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.progress import Progress
 
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
@@ -76,9 +76,10 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     needed = LIMITS[bench.kind].found_nats
     if null_good.is_good and (gain_over(best, null) < needed or not is_significant(best, -1)):
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
-    if good.is_good:
-        return one
     progress(0.6, "searching for a second cause")
+    if good.is_good:
+        second = search_beside(bench, best, LIMITS[bench.kind].beside_nats)
+        return _beside(bench, one, second) or one
     second = search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good)
     two = _beside(bench, one, second)
     if two is None:
@@ -86,7 +87,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     alone = _one_is_enough(bench, one, two.final)
     if alone is not None:
         return alone
-    if two.verdict == EXPLAINED or not is_nearly_right(two.final) or gain_over(second.best, second.base) < STRONG_NATS:
+    if two.verdict == EXPLAINED or not two.final.is_nearly_right or gain_over(second.best, second.base) < STRONG_NATS:
         return two
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search(bench, second.best))
@@ -98,7 +99,7 @@ def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
     for number in range(2):
         alone = fit_without(bench, both, number)
         good = goodness(bench, alone)
-        if good.is_good and gain_over(both, alone) <= SECOND_NATS:
+        if good.is_good and gain_over(both, alone) <= LIMITS[bench.kind].beside_nats:
             fits = tuple(sorted((alone, *one.ranking.fits), key=lambda fit: -fit.log_evidence))
             return replace(one, final=alone, ranking=replace(one.ranking, fits=fits), good=good)
     return None
@@ -108,7 +109,9 @@ def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
     """Take a further cause, if it explains much."""
     good, before = goodness(bench, ranking.best), goodness(bench, found.final)
     gain = min(gain_over(ranking.best, found.final), gain_over(ranking.best, found.null))
-    if not ranking.fits or gain <= SECOND_NATS or good.score >= before.score:
+    limits = LIMITS[bench.kind]
+    needed = limits.beside_nats if before.is_good else limits.second_nats if good.is_good else PARTIAL_NATS
+    if not ranking.fits or gain <= needed or good.score >= max(before.score, 1.0):
         return None
     verdict = EXPLAINED if good.is_good else UNEXPLAINED
     return replace(found, verdict=verdict, final=ranking.best, further=(*found.further, ranking), good=good)
@@ -176,7 +179,7 @@ def fit_without(bench: Bench, fit: Fit, number: int) -> Fit:
     values = np.delete(fit.values, np.arange(start, start + counts[number]))
     causes = tuple(cause for index, cause in enumerate(fit.hypothesis.causes) if index != number)
     from_there = polish(bench.suppose(causes), bench.data, values, unknown=fit.unknown, iterations=12)
-    if gain_over(fit, from_there) <= SECOND_NATS:
+    if gain_over(fit, from_there) <= PARTIAL_NATS:
         return from_there
     anew = bench.fit(causes, values)
     return max(from_there, anew, key=lambda one: one.log_evidence)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter
     from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.polish import Fit
 
 PLACES = 2  # of each effect, spread over the structure
 STEPS = 5  # halvings of the range

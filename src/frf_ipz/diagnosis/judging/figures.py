@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Data, Fit
+    from frf_ipz.diagnosis.search.fit import Data, Fit
 
 BANDS = 6  # pieces of the band, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations

@@ -14,10 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 NORMAL_95 = 1.96
-WIDER = 1.25  # intervals over Laplace's: neighbouring points share errors that no covariance knows
 LISTED = 0.95  # probability that the listed places hold
 MOST_PLACES = 12
 INSIGNIFICANT = 2.0  # times a tolerance: a user's tolerances are half widths, not standard deviations
@@ -185,7 +184,7 @@ def _estimates(fit: Fit, which: int, scale: float, across: FloatArray | float) -
     cause, start = hypothesis.causes[which], sum(hypothesis.counts[:which])
     variance = np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0)
     variance[start : start + hypothesis.counts[which]] += across
-    spread = WIDER * np.sqrt(variance)
+    spread = np.sqrt(variance)
     spread = np.minimum(spread, hypothesis.high - hypothesis.low)  # where data say nothing, the range still does
     found = {}
     for index in range(start, start + hypothesis.counts[which]):

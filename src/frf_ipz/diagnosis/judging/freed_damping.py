@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 OF_MODES = ("damping_level", "structural_damping")
 ANY = 20.0  # relative tolerance of damping ratios: more than a factor of ten
@@ -43,7 +43,8 @@ def is_damping_alone(bench: Bench, found: Decision) -> bool:
     """
     if found.verdict != UNEXPLAINED:
         return False
-    return any(_is_of_damping(bench, fit) for fit in (found.final, found.null))
+    suspects = (found.final,) if found.final.is_nearly_all else (found.final, found.null)
+    return any(_is_of_damping(bench, fit) for fit in suspects)
 
 
 def _is_of_damping(bench: Bench, fit: Fit) -> bool:

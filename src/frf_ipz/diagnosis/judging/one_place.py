@@ -11,8 +11,8 @@ from frf_ipz.diagnosis.physics.layout import extents
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
-    from frf_ipz.diagnosis.search.polish import Fit
 
 NEAR = 0.05  # of the largest extent of a structure
 COMPLAINT = (

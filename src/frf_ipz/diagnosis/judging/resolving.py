@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 MOST_CANDIDATES = 60
 TELLS = 0.02  # relative difference of FRFs that a measurement shows beyond doubt

@@ -12,12 +12,11 @@ import numpy as np
 
 from frf_ipz.diagnosis.search.bench import weights_of
 from frf_ipz.diagnosis.search.far.sketches import receptances
-from frf_ipz.diagnosis.search.search import is_nearly_right
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.search.bench import Bench
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 ERROR = 0.01  # of an FRF's size: what counts as a misfit
 FEWEST_FRFS = 2
@@ -49,7 +48,7 @@ def trace(bench: Bench, null: Fit) -> dict[str, list[int]]:
 
 def _misfits(bench: Bench, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
     """Robust misfit without and with a free dynamic stiffness on each of some motions."""
-    is_near = is_nearly_right(null)
+    is_near = null.is_nearly_right
     data = bench.thin.measured if is_near else bench.coarse
     unknown = null.unknown if is_near else np.zeros(bench.nuisance.size)
     response = null.hypothesis.respond(null.values, unknown, data.s)

@@ -10,8 +10,9 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.search.fit import Data, Fit
 from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
-from frf_ipz.diagnosis.search.polish import Data, Fit, polish, same_modes
+from frf_ipz.diagnosis.search.polish import polish, same_modes
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Parameter, Sketch
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
-    from frf_ipz.diagnosis.search.polish import Fit
 
 COLUMNS = 600  # signatures that are weighed together
 BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear

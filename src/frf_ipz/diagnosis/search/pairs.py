@@ -16,15 +16,14 @@ from frf_ipz.diagnosis.search.far.refine import refine
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spread, step_far
 from frf_ipz.diagnosis.search.far.wide import wide_search
-from frf_ipz.diagnosis.search.polish import Fit, polish
+from frf_ipz.diagnosis.search.fit import Fit
+from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import (
     GAIN,
     Fits,
     Ranking,
     climb_all,
     how_many,
-    is_hopeless,
-    is_nearly_right,
     ranked,
     search,
 )
@@ -59,12 +58,13 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
         Its base has one cause, its fits have two.
     """
     found: list[Ranking] = []
-    if is_nearly_right(first.best) or not first.refined:
+    if first.best.is_nearly_right or not first.refined:
         beside = search(bench, first.best)
         found.append(beside)
         if beside.fits and not is_good(beside.best):
             found.append(search(bench, _newest_alone(bench, beside.best)))
-    if first.refined and not any(ranking.fits and is_good(ranking.best) for ranking in found):
+    is_open = first.refined and not first.best.is_nearly_all
+    if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in found):
         found.append(_of_pairs(bench, first))
     best = found[0]
     for ranking in found[1:]:
@@ -86,7 +86,7 @@ def _of_pairs(bench: Bench, first: Ranking) -> Ranking:
             pairs += [(start.cause, both) for both in _companions(bench, start)]
     exact = [bench.fit_from(fit) for fit in _early(bench, pairs)]
     best = max(exact, key=lambda fit: fit.log_evidence)
-    if not is_hopeless(best):
+    if not best.is_hopeless:
         best = _climbed(bench, _climbed(bench, best))
     base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
     fits: Fits = {best.hypothesis.causes[-1].key: best}

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.diagnosis.search.fit import Data, Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.polish import Data, Fit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

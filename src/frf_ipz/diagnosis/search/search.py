@@ -14,8 +14,9 @@ from frf_ipz.diagnosis.search.far.refine import refine
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, refine_far, spread
 from frf_ipz.diagnosis.search.far.wide import best_start, causes_of, wide_search
+from frf_ipz.diagnosis.search.fit import Fit
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.polish import Fit, polish, same_modes
+from frf_ipz.diagnosis.search.polish import polish, same_modes
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect
@@ -23,20 +24,17 @@ if TYPE_CHECKING:
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
 
-NEARLY_RIGHT = 20.0  # mean squared misfit: small effects are looked for on top of such a fit
-VERY_NEARLY = 2.0  # the same: nothing large can be missing
-SMALL_PULL = 600.0  # and this little is explained by what cannot be known
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
 MOST_OF_IT = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
+PROMISED_PART = 0.5  # of what a fit gains: what a linear step on fewer points must promise of it
 KEPT_PROMISE = 0.5  # of what a linear step promises: a fit that reaches less begins anew
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
-FAR_OFF = 300.0  # mean squared misfit
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
 CLIMBED = 6  # effects whose neighbours are looked at
-HOPELESS = 2000.0  # nats behind the best: not looked at any more
+HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
 GAIN = 0.5  # nats: a neighbour must be better by that
 SETTLED = 2  # fits that go on until they converge
 MOST_STEPS = 12
@@ -111,12 +109,12 @@ def search(bench: Bench, base: Fit) -> Ranking:
     """
     n_tried, refined = 0, list[Start]()
     fits: Fits = {}
-    if base.mean_misfit > VERY_NEARLY or base.pull > SMALL_PULL:
+    if not base.is_nearly_all:
         starts = wide_search(bench, base)
         n_tried += len(starts)
         refined = refine_far(bench, base, starts)
         fits = _fitted(bench, base, refined)
-    if not is_hopeless(base):
+    if not base.is_hopeless:
         n_tried += _add_close(bench, base, fits)
     climb_all(bench, base, fits)
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
@@ -138,24 +136,59 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
         The best first.
     """
     order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    settled = [fit if fit.converged or is_hopeless(fit) else bench.go_on(fit) for fit in order[:SETTLED]]
+    settled = [fit if fit.converged or fit.is_hopeless else bench.go_on(fit) for fit in order[:SETTLED]]
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
+
+
+def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
+    """Search for one more cause that is small: from a fit that leaves nothing to explain but what scatter hides.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        Nearly right.
+    least : float
+        nats: what explains less is not fitted.
+
+    Returns
+    -------
+    Ranking
+        Without fits where one linear step promises less of everything.
+    """
+    fits: Fits = {}
+    found = close_search(bench, base)
+    for start in _most_promising(found, PROMISED_PART * least):
+        _keep(fits, _fit_close(bench, base, start))
+    if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
+        climb_all(bench, base, fits)
+    return Ranking(base=base, fits=ranked(bench, fits), n_tried=len(found))
 
 
 def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
-    least = PROMISING if is_nearly_right(base) else MOST_OF_IT * base.cost
     found = close_search(bench, base)
-    starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
+    starts = _most_promising(found, PROMISING if base.is_nearly_right else MOST_OF_IT * base.cost)
+    if not starts and base.is_nearly_right:
+        starts = _most_promising(found, -np.inf)[:1]  # how little the best one explains is told
     for start in starts:
-        if -start.cost > max(least, -starts[0].cost - HOPELESS) or (start is starts[0] and least <= PROMISING):
-            hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-            values = np.concatenate([base.values, start.values])
-            fit = bench.fit_beside(hypothesis, values, base)
-            _keep(fits, fit)
-            if fit.cost > base.cost + KEPT_PROMISE * start.cost:
-                _keep(fits, bench.fit((*base.hypothesis.causes, start.cause), values))
+        fit = _fit_close(bench, base, start)
+        _keep(fits, fit)
+        if fit.cost > base.cost + KEPT_PROMISE * start.cost:
+            _keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values])))
     return len(found)
+
+
+def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
+    """Take the best places of each effect that promise so much, nats, and are not far behind the best of all."""
+    starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
+    return [start for start in starts if -start.cost > max(least, -starts[0].cost - HOPELESS)]
+
+
+def _fit_close(bench: Bench, base: Fit, start: Start) -> Fit:
+    hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
+    return bench.fit_beside(hypothesis, np.concatenate([base.values, start.values]), base)
 
 
 def _keep(fits: Fits, fit: Fit) -> None:
@@ -174,41 +207,9 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     for fit in early[: how_many(early, FITTED_EXACTLY)]:
         if fit.cost < FAR_BEHIND * early[0].cost + SLACK:
             _keep(fits, bench.fit_from(fit))
-    if not is_hopeless(early[0]):
+    if not early[0].is_hopeless:
         _fit_imitators(bench, early, fits)
     return fits
-
-
-def is_hopeless(fit: Fit) -> bool:
-    """Tell whether a fit is so far off that its causes are wrong, or some are missing.
-
-    Parameters
-    ----------
-    fit : Fit
-        With large errors, or exact.
-
-    Returns
-    -------
-    bool
-        Then no time is spent on its place.
-    """
-    return fit.mean_misfit > FAR_OFF
-
-
-def is_nearly_right(fit: Fit) -> bool:
-    """Tell whether what a fit leaves is so little that small effects can explain it.
-
-    Parameters
-    ----------
-    fit : Fit
-        Exact.
-
-    Returns
-    -------
-    bool
-        Then what else is missing is searched on top of it.
-    """
-    return fit.mean_misfit < NEARLY_RIGHT
 
 
 def how_many(early: Sequence[Fit], usual: int) -> int:
@@ -226,7 +227,7 @@ def how_many(early: Sequence[Fit], usual: int) -> int:
     int
         Few where none is.
     """
-    return FITTED_HOPELESS if early and is_hopeless(early[0]) else usual
+    return FITTED_HOPELESS if early and early[0].is_hopeless else usual
 
 
 def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
@@ -253,15 +254,16 @@ def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
         By the key of their last cause, whose place is changed; new fits are added.
     """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    if ranked and not is_hopeless(ranked[0]):
+    if ranked and not ranked[0].is_hopeless:
         _add_imitators(bench, base, ranked[0], fits)
         ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     leaders: dict[str, Fit] = {}
     for fit in ranked:
         leaders.setdefault(fit.hypothesis.causes[-1].effect.name, fit)
     for leader in list(leaders.values())[:CLIMBED]:
-        best = max(fit.log_evidence for fit in fits.values())
-        if leader.log_evidence > best - HOPELESS and not is_hopeless(leader):
+        best = max(fits.values(), key=lambda fit: fit.log_evidence)
+        behind = BEHIND if best.is_nearly_all else HOPELESS
+        if leader.log_evidence > best.log_evidence - behind and not leader.is_hopeless:
             _climb(bench, base, leader, fits)
 
 
@@ -299,7 +301,7 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)
-    if len(hypothesis.parameters) == len(fit.values) and is_nearly_right(fit):
+    if len(hypothesis.parameters) == len(fit.values) and fit.is_nearly_right:
         values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
         unknown = same_modes(hypothesis, values, fit)
         return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1)

@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.physics.layout import lay_out
 from frf_ipz.diagnosis.physics.nuisance import make_nuisance
 from frf_ipz.diagnosis.physics.response import modify, respond, rows_of
 from frf_ipz.diagnosis.search.bench import Bench
-from frf_ipz.diagnosis.search.polish import Data
+from frf_ipz.diagnosis.search.fit import Data
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.finding import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
-MOST_NODES = 48  # of which all pairs are looked at; those between are stepped to
+MOST_IN_A_ROW, MOST_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
 NEXT_TO = 2  # nodes in a row that count as one place: what joins them is the structure itself
 
 
@@ -31,7 +31,8 @@ class CouplingSpring(Effect):
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """All pairs of nodes that are apart and not joined by a spring already."""
         dofs = specimen.moving_dofs
-        thinned = dofs[:: -(-len(dofs) // MOST_NODES)]
+        most = MOST_IN_A_ROW if specimen.model.kind == "beam" else MOST_NODES
+        thinned = dofs[:: -(-len(dofs) // most)]
         return [
             _place(first.node, second.node, first.direction)
             for first, second in combinations(thinned, 2)

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.transfer import Measured
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 Supposed: TypeAlias = tuple[tuple[Cause, ...], Start]
 """What is supposed already, and one more cause with the values of all."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.measured.transfer import Measured
-    from frf_ipz.diagnosis.search.polish import Fit
+    from frf_ipz.diagnosis.search.fit import Fit
 
 WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
 
