@@ -64,12 +64,14 @@ BENT_NATS = 250.0  # evidence that forces of other kinds at the place of a law m
 BENT = 0.1, 0.01  # and parts of what is left, and of what the law explains
 BENT_MOVING = 0.5, 0.05  # the same where stretches start in motion
 NEAR, MOST_NEAR = 5.0, 4  # times the smallest cost: laws at whose places an unknown one may sit, and how many
+SMALL = 0.5  # of the cost: what forces besides a law promise more than that is not small, and no promise
 PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
 MOST_LEFT = 0.1  # of the response, whatever the noise is: with more, laws and places were taken for each other
 FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
+NEARLY_ALL = 0.01  # or so much of the linear model's: what the forces lack is then their law, not their place
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
 WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
@@ -212,7 +214,7 @@ def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, 
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:
     """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
     near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost][:MOST_NEAR]
-    bent = [AnyForce(place=fit.place, cost=fit.cost - bend_of(fit)) for fit in near]
+    bent = [AnyForce(place=fit.place, cost=fit.cost - bend_of(fit)) for fit in near if bend_of(fit) < SMALL * fit.cost]
     found = find_place(short, long)[0]
     return min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
 
@@ -225,7 +227,7 @@ def _bend(track: Track, fit: LawFit) -> float:
 def _with_place(found: LawSearch, plant: Plant, best: AnyForce, track: Track) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
     left = best.cost / track.linear.n_rows
-    if left > min(PLACED, HALVED * track.linear.cost / track.linear.n_rows):
+    if left > max(min(PLACED, HALVED * track.missed), NEARLY_ALL * track.missed):
         return found
     place = plant.places[best.place]
     where = (

@@ -1,4 +1,4 @@
-"""Which stretches laws are fitted to, and when noise may hide that a law is another one."""
+"""Which stretches laws are fitted to, when noise may hide that a law is another one, and where an unknown one sits."""
 
 from types import SimpleNamespace
 
@@ -48,3 +48,20 @@ def test_noise_hides_another_law_only_where_the_bend_of_a_wrong_one_would_not_sh
     )
     fit = SimpleNamespace(cost=1e3, n_rows=5000)
     assert search._hides(track, fit) == hidden
+
+
+@pytest.mark.parametrize(("drop", "place"), [(300.0, 7), (950.0, 3)])
+def test_only_a_small_force_besides_a_law_is_believed_without_being_fitted(monkeypatch, drop, place):
+    """A law at place 7 leaves 1000; any force, fitted, leaves 2000 at place 3."""
+    monkeypatch.setattr(search, "find_place", lambda *_: [search.AnyForce(place=3, cost=2000.0)])
+    fit = SimpleNamespace(place=7, cost=1000.0)
+    assert search._anywhere(None, None, [fit], lambda _: drop).place == place
+
+
+@pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 2600.0, True)])
+def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
+    track = SimpleNamespace(linear=SimpleNamespace(n_rows=100), missed=linear)
+    plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
+    found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
+    again = search._with_place(found, plant, search.AnyForce(place=0, cost=100 * left), track)
+    assert bool(again.place) == said

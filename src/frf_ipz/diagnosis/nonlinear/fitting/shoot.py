@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.march import March, Yielding, follow, march
+from frf_ipz.diagnosis.nonlinear.fitting.march import AHEAD, March, Yielding, follow, march
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
@@ -141,12 +141,12 @@ def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
 
 
 def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexArray:
-    """Transform a law's force; one that is constant within steps acts throughout the step before its time."""
+    """Transform a law's force; one that is constant for a step acts around its time as `make_modes` has it."""
     clock = Clock(stretches, oversampling=FINER, fades=False)
     lines = clock.at_lines(np.where(np.isfinite(force), force, 0.0))
     lines[~np.isfinite(force).all(-1)] = np.inf
     way = stretches.s * clock.step_s
-    return lines * np.expm1(way) / way if holds else lines
+    return lines * (np.expm1(AHEAD * way) - np.expm1((AHEAD - 1) * way)) / way if holds else lines
 
 
 def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
