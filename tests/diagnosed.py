@@ -4,7 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observations import Observations
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.fe.response import model_frfs
@@ -105,3 +109,9 @@ def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=B
 
 def observed(frfs, band_hz=BAND_HZ):
     return Observations(kind="frf", blows=(), band_hz=band_hz, frfs=frfs)
+
+
+def bench_of(model, frfs, names):
+    """Everything a search for some effects works with."""
+    effects = {name: effect for name, effect in shipped_effects().items() if name in names}
+    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)

@@ -29,6 +29,7 @@ from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
 from frf_ipz.diagnosis.judging.gates import check
+from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
 from frf_ipz.diagnosis.judging.one_place import COMPLAINT as OF_ANOTHER_KIND
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
@@ -116,16 +117,11 @@ def diagnose(
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
     linear = _linear(bench, found, proof, gates, held=source.held)
+    linear = replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
     if excess > 1 and (certain or not kept or found.verdict == UNEXPLAINED):
-        laws = search_laws(
-            model,
-            observations,
-            options,
-            folder=folder,
-            progress=lambda part, text: progress(0.9 + 0.1 * part, text),
-        )
-        return _with_law(linear, laws)
-    return replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
+        laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
+        return _nonlinear(linear, bench, model, observations, laws_of)
+    return linear
 
 
 def _decide(
@@ -193,6 +189,34 @@ def _linearity(observations: Observations) -> Linearity | None:
     return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
 
 
+def _late(progress: Progress) -> Progress:
+    """Progress of what comes after the linear model."""
+    return lambda part, text: progress(0.9 + 0.1 * part, text)
+
+
+def _nonlinear(
+    linear: Diagnosis,
+    bench: Bench,
+    model: StructuralModel,
+    observations: Observations,
+    laws_of: Callable[[StructuralModel, Observations], LawSearch],
+) -> Diagnosis:
+    """Look for a law; for one beside a linear cause where none explains by itself."""
+    laws = laws_of(model, observations)
+    if laws.verdict != UNEXPLAINED:
+        return _with_law(linear, laws)
+    beside = search_beside_linear(bench, model, observations, laws_of) if bench.effects else None
+    if beside is not None:
+        law, cause = beside
+        found = _with_law(linear, law)
+        findings = tuple(sorted((*found.findings, cause), key=lambda finding: -finding.log_evidence_gain))
+        return replace(found, findings=findings, statement=f"{found.statement} {cause.statement}")
+    found = _with_law(linear, laws)
+    if found.findings or not linear.findings:
+        return found
+    return replace(linear, verdict=UNEXPLAINED, statement=f"{laws.statement} {linear.statement}")
+
+
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
     found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
@@ -212,6 +236,7 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
+        remains="",
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosed import BAND_HZ, beam, labels, measured, observed
+from diagnosed import beam, bench_of, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
@@ -16,11 +16,9 @@ from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS
-from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import fit_nothing, search, search_beside
-from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
@@ -43,11 +41,6 @@ def nominal(tmp_path_factory):
 @pytest.fixture(scope="module")
 def thick(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("thick"), thickness_m=THICK_M)
-
-
-def bench_of(model, frfs, names):
-    effects = {name: effect for name, effect in shipped_effects().items() if name in names}
-    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
 
 
 @pytest.mark.parametrize("order", [1, -1])

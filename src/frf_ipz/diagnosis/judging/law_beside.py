@@ -1,0 +1,62 @@
+"""A nonlinear law beside a linear cause: where no law explains by itself, the linear cause is taken out first."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
+from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
+from frf_ipz.diagnosis.judging.verdict import LIMITS
+from frf_ipz.diagnosis.measured.restored import restore
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.search.search import fit_nothing, search
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.nonlinear.search import LawSearch
+    from frf_ipz.diagnosis.observations import Observations
+    from frf_ipz.diagnosis.search.bench import Bench
+    from frf_ipz.structure import StructuralModel
+
+MOST_LEFT = 1 / 3  # of the linear misfit: a law's own traces are not explained so well by one linear cause
+
+
+def search_beside_linear(
+    bench: Bench,
+    model: StructuralModel,
+    observations: Observations,
+    search_laws: Callable[[StructuralModel, Observations], LawSearch],
+) -> tuple[LawSearch, Finding] | None:
+    """Search for a law beside the linear cause that explains most.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data, model and linear effects.
+    model : StructuralModel
+        The nominal model.
+    observations : Observations
+        What was measured.
+    search_laws : callable
+        From a model and what was measured to a law.
+
+    Returns
+    -------
+    tuple of LawSearch and Finding, or None
+        The law and the linear cause; None where no linear cause explains most of the misfit, or no law the rest.
+    """
+    null = fit_nothing(bench)
+    ranking = search(bench, null)
+    best = ranking.best
+    if best is null or best.misfit > MOST_LEFT * null.misfit or not is_significant(best, -1):
+        return None
+    if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
+        return None  # resonators and dampers follow the traces of laws
+    change = best.hypothesis.change(best.values)
+    laws = search_laws(with_change(model, change), restore(observations, change))
+    if laws.verdict != EXPLAINED:
+        return None
+    scale = max(1.0, best.mean_misfit)
+    return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)

@@ -1,0 +1,117 @@
+"""A law beside a linear cause, which goes into the model or out of the recordings before the law is sought."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosed import beam, bench_of, measured, observed
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
+from frf_ipz.diagnosis.measured.restored import restore
+from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.fe.changes import with_point_masses
+from frf_ipz.quantities import FrfQuantity
+
+ATTACHED = shipped_effects()["attached_resonator"]
+MASS_KG = 0.02
+SEEN = 0.02  # relative: noise of 0.1 % of the FRFs
+RATE_HZ, SAMPLES = 2000.0, 3000
+LATE_S, GAIN = 1.3e-4, 0.8  # a quarter of a sample, and a gain
+WRAPPED = 1e-6  # of the largest value: the end of a record that has died out
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+class Laws:
+    """Stands for the search for a law, and remembers what it was given."""
+
+    def __init__(self, verdict):
+        self.verdict, self.given = verdict, []
+
+    def __call__(self, model, observations):
+        self.given.append((model, observations))
+        return SimpleNamespace(verdict=self.verdict)
+
+
+def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    laws = Laws("explained")
+    found = search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws)
+    (given, _), (law, cause) = laws.given[0], found
+    place = nominal.place(Dof(12, "z"))
+    added = given.mass_all.toarray()[place, place] - nominal.mass_all.toarray()[place, place]
+    assert added == pytest.approx(MASS_KG, rel=SEEN)
+    assert law.verdict == "explained"
+    assert (cause.effect, dict(cause.location)) == ("added_mass", {"nodes": [12]})
+
+
+def test_without_a_law_nothing_is_named(nominal):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    laws = Laws("unexplained")
+    assert search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws) is None
+    assert len(laws.given) == 1
+
+
+def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):
+    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
+    place = next(one for one in ATTACHED.places(bench.specimen) if one.location == {"nodes": [12]})
+    true = with_change(nominal, ATTACHED.build(bench.specimen, place)(np.array([0.01, 250.0, 0.02])))
+    frfs = measured(true)
+    laws = Laws("explained")
+    assert search_beside_linear(bench_of(nominal, frfs, ("attached_resonator",)), nominal, observed(frfs), laws) is None
+    assert laws.given == []
+
+
+def test_a_model_that_explains_all_leaves_nothing_to_take_out(nominal):
+    frfs = measured(nominal)
+    laws = Laws("explained")
+    assert search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws) is None
+    assert laws.given == []
+
+
+def pulse(shift_s):
+    """A smooth pulse far below half the rate."""
+    time = np.arange(SAMPLES) / RATE_HZ - 0.2 - shift_s
+    return np.exp(-((time / 0.01) ** 2)) * np.cos(2 * np.pi * 60 * time)
+
+
+def test_recordings_are_restored():
+    sensors = tuple(
+        Sensor(channel=name, dof=parse_dof(dof), quantity=FrfQuantity.ACCELERANCE)
+        for name, dof in (("acc_1", "9:+z"), ("acc_2", "5:-z"))
+    )
+    blow = Blow(
+        name="a",
+        input_channel="force",
+        input_dof=parse_dof("3:+z"),
+        sensors=sensors,
+        step_s=1 / RATE_HZ,
+        force=GAIN * pulse(0.0),
+        responses=np.stack([pulse(LATE_S), pulse(0.0)]),
+    )
+    change = Change(
+        channels={
+            "force": lambda s: np.full(len(s), GAIN, complex),
+            "acc_1": lambda s: np.exp(-s * LATE_S),
+        },
+        moved={"acc_2": 6},
+    )
+    (found,) = restore(Observations(kind="hammer", blows=(blow,), band_hz=(10.0, 200.0)), change).blows
+    assert_allclose(found.force, pulse(0.0), rtol=0, atol=WRAPPED)
+    assert_allclose(found.responses[0], pulse(0.0), rtol=0, atol=WRAPPED)
+    assert np.array_equal(found.responses[1], blow.responses[1])
+    assert [sensor.dof.name for sensor in found.sensors] == ["9:z", "6:z"]
+    assert found.sensors[1].dof.sign == -1
+
+
+def test_a_faultless_chain_is_left_alone():
+    seen = Observations(kind="hammer", blows=(), band_hz=(10.0, 200.0))
+    assert restore(seen, Change()) is seen
