@@ -14,6 +14,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.nonlinear.linear.plant import Deviations, Plant, PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 BEYOND = 2.0  # times the top of the band: modes whose parameters are free
 BEYOND_MOVING = 2.0  # the same where stretches start in motion, of which these modes have a part
-UNIFORM = 3**-0.5  # standard deviation of a uniform distribution over its half width
+
 CORD_SPREAD = 0.7  # of the logarithm of frequency and damping on soft cords: a factor of two
 UNEVEN = 2.0  # times the stiffness tolerance: what uneven stiffness does to shapes
 DIFFERENCE = 1e-5  # of a frequency or damping ratio: step of a derivative
