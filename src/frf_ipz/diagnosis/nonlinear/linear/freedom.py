@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
 
 BEYOND = 2.0  # times the top of the band: modes whose parameters are free
-BEYOND_MOVING = 2.0  # the same where stretches start in motion, of which these modes have a part
 
 CORD_SPREAD = 0.7  # of the logarithm of frequency and damping on soft cords: a factor of two
 UNEVEN = 2.0  # times the stiffness tolerance: what uneven stiffness does to shapes
@@ -307,8 +306,7 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
     Freedom
         For the modes of the band and the first ones above it.
     """
-    beyond = BEYOND_MOVING if stretches.moving.any() else BEYOND
-    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * beyond * top_hz))
+    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
     rigid = modes < plant.n_rigid
     frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM
     moving = np.flatnonzero(stretches.moving)
