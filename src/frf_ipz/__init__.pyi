@@ -5,6 +5,7 @@ from .diagnosis.comparing.compare import compare as compare
 from .diagnosis.comparing.states import CompareOptions as CompareOptions
 from .diagnosis.comparing.states import State as State
 from .diagnosis.diagnose import diagnose as diagnose
+from .diagnosis.misplacements import misplacements as misplacements
 from .diagnosis.observed import observe as observe
 from .diagnosis.options import DiagnoseOptions as DiagnoseOptions
 from .diagnosis.parameters import diagnosed_basis as diagnosed_basis
