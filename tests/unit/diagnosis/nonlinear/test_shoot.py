@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.nonlinear.fitting import shoot as shooting
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
@@ -56,3 +57,14 @@ def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
     std = np.sqrt(fit.covariance[0, 0])
     assert abs(fit.strength - K3) < CERTAIN * std
     assert abs(held.strength - K3) > CERTAIN * np.sqrt(held.covariance[0, 0])
+
+
+@pytest.mark.parametrize("size", [1e200, np.inf])
+def test_changes_that_run_away_are_taken_for_none(cubic, monkeypatch, size):
+    """Of a stiff stop, say: the derivative grows from contact to contact until it has no number any more."""
+    stretches, freedom, place = cubic
+    follow = shooting.follow
+    monkeypatch.setattr(shooting, "follow", lambda *given: size * follow(*given))
+    fit = shoot(stretches, freedom, start_at(freedom, place), iterations=2)
+    assert np.isfinite(fit.cost)
+    assert np.isfinite(fit.covariance).all()

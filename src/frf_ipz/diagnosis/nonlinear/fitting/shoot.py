@@ -31,6 +31,7 @@ FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a
 SETTLED = 3e-3  # relative drop of the cost
 ROUNDING = 1e-10  # added to normal equations of unit diagonal: they stay positive
 TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
+RUNAWAY = 1e100  # standard deviations: a change as large runs away, and is taken for none
 LONGEST = 0.5  # relative change of a law's number in one step
 Kinds = Callable[[FloatArray, FloatArray], FloatArray]
 WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
@@ -153,11 +154,12 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArr
     """Derive the weighted responses by unknowns, strength and shape (times their size), and further forces."""
     start, used, n_free = shot.start, stretches.used, len(freedom.modes)
     changes = shot.place.changes(shot.done.force)
-    by_force = follow(start.law, shot.yielding, shot.done, changes, added)
+    with np.errstate(all="ignore"):  # changes that run away are taken for none below
+        by_force = follow(start.law, shot.yielding, shot.done, changes, added)
     to_sensors = shot.response.to_sensors(start.place)[:, used]
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
-    with np.errstate(invalid="ignore"):  # changes that run away are taken for none below
+    with np.errstate(all="ignore"):
         seen = -to_sensors * lines[:, :, None] * weight
     on_used = shot.response.on(used)
     rows = freedom.columns(stretches, on_used, -shot.force[:, used], start.place, start.unknowns)
@@ -173,7 +175,8 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArr
         for blow in freedom.moving:
             rows[first : first + n_free, blow] += seen[(4 + which) * n_free : (5 + which) * n_free, blow]
             first += n_free
-    return np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
+    found = np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
+    return np.where(np.abs(found).max(axis=1, keepdims=True) < RUNAWAY, found, 0.0)
 
 
 def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
