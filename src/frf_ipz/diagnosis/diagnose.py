@@ -120,7 +120,7 @@ def diagnose(
     linear = replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
     if excess > 1 and (certain or not kept or found.verdict == UNEXPLAINED):
         laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
-        return _nonlinear(linear, bench, model, observations, laws_of)
+        return _nonlinear(linear, bench, found, model, observations, laws_of)
     return linear
 
 
@@ -197,6 +197,7 @@ def _late(progress: Progress) -> Progress:
 def _nonlinear(
     linear: Diagnosis,
     bench: Bench,
+    decision: Decision,
     model: StructuralModel,
     observations: Observations,
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
@@ -205,7 +206,7 @@ def _nonlinear(
     laws = laws_of(model, observations)
     if laws.verdict != UNEXPLAINED:
         return _with_law(linear, laws)
-    beside = search_beside_linear(bench, model, observations, laws_of) if bench.effects else None
+    beside = search_beside_linear(bench, decision, model, observations, laws_of) if bench.effects else None
     if beside is not None:
         law, cause = beside
         found = _with_law(linear, law)

@@ -52,6 +52,8 @@ def with_misplacements(problem: UpdateProblem, misplacements: tuple[Misplacement
     (2 n, 2 n) array
         Of the real and the imaginary part of each target in turn, (rad/s)^2.
     """
+    if not misplacements:
+        return problem.covariance
     moved = np.zeros((len(problem.values), len(misplacements)), complex)
     for target in np.flatnonzero(problem.frf >= 0).tolist():
         moved[target] = _moved(problem, target, misplacements)

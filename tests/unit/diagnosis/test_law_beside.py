@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from diagnosed import beam, bench_of, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.judging.decision import only_null
 from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
 from frf_ipz.diagnosis.measured.restored import restore
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
@@ -41,10 +42,15 @@ class Laws:
         return SimpleNamespace(verdict=self.verdict)
 
 
+def beside(model, frfs, names, laws):
+    bench = bench_of(model, frfs, names)
+    return search_beside_linear(bench, only_null(bench), model, observed(frfs), laws)
+
+
 def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     laws = Laws("explained")
-    found = search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws)
+    found = beside(nominal, frfs, ("added_mass",), laws)
     (given, _), (law, cause) = laws.given[0], found
     place = nominal.place(Dof(12, "z"))
     added = given.mass_all.toarray()[place, place] - nominal.mass_all.toarray()[place, place]
@@ -56,7 +62,7 @@ def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
 def test_without_a_law_nothing_is_named(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     laws = Laws("unexplained")
-    assert search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws) is None
+    assert beside(nominal, frfs, ("added_mass",), laws) is None
     assert len(laws.given) == 1
 
 
@@ -66,14 +72,14 @@ def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):
     true = with_change(nominal, ATTACHED.build(bench.specimen, place)(np.array([0.01, 250.0, 0.02])))
     frfs = measured(true)
     laws = Laws("explained")
-    assert search_beside_linear(bench_of(nominal, frfs, ("attached_resonator",)), nominal, observed(frfs), laws) is None
+    assert beside(nominal, frfs, ("attached_resonator",), laws) is None
     assert laws.given == []
 
 
 def test_a_model_that_explains_all_leaves_nothing_to_take_out(nominal):
     frfs = measured(nominal)
     laws = Laws("explained")
-    assert search_beside_linear(bench_of(nominal, frfs, ("added_mass",)), nominal, observed(frfs), laws) is None
+    assert beside(nominal, frfs, ("added_mass",), laws) is None
     assert laws.given == []
 
 

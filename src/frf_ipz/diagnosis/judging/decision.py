@@ -107,11 +107,12 @@ def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
 
 def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
     """Take a further cause, if it explains much."""
-    good, before = goodness(bench, ranking.best), goodness(bench, found.final)
+    if not ranking.fits:
+        return None
+    good, limits = goodness(bench, ranking.best), LIMITS[bench.kind]
     gain = min(gain_over(ranking.best, found.final), gain_over(ranking.best, found.null))
-    limits = LIMITS[bench.kind]
-    needed = limits.beside_nats if before.is_good else limits.second_nats if good.is_good else PARTIAL_NATS
-    if not ranking.fits or gain <= needed or good.score >= max(before.score, 1.0):
+    needed = limits.beside_nats if found.good.is_good else limits.second_nats if good.is_good else PARTIAL_NATS
+    if gain <= needed or good.score >= max(found.good.score, 1.0):
         return None
     verdict = EXPLAINED if good.is_good else UNEXPLAINED
     return replace(found, verdict=verdict, final=ranking.best, further=(*found.further, ranking), good=good)

@@ -9,12 +9,13 @@ from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.restored import restore
 from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.search import fit_nothing, search
+from frf_ipz.diagnosis.search.search import search
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.search.bench import Bench
@@ -25,6 +26,7 @@ MOST_LEFT = 1 / 3  # of the linear misfit: a law's own traces are not explained 
 
 def search_beside_linear(
     bench: Bench,
+    linear: Decision,
     model: StructuralModel,
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
@@ -35,6 +37,8 @@ def search_beside_linear(
     ----------
     bench : Bench
         Data, model and linear effects.
+    linear : Decision
+        What a linear search came to; where none was made, it is made here.
     model : StructuralModel
         The nominal model.
     observations : Observations
@@ -47,8 +51,8 @@ def search_beside_linear(
     tuple of LawSearch and Finding, or None
         The law and the linear cause; None where no linear cause explains most of the misfit, or no law the rest.
     """
-    null = fit_nothing(bench)
-    ranking = search(bench, null)
+    null = linear.null
+    ranking = linear.ranking if linear.ranking.fits else search(bench, null)
     best = ranking.best
     if best is null or best.misfit > MOST_LEFT * null.misfit or not is_significant(best, -1):
         return None

@@ -165,7 +165,7 @@ def update(
             pairs,
             options,
             basis=basis,
-            misplacements=misplacements(model, reduced, modal_fit.labels, tolerance),
+            misplacements=misplacements(model, reduced, modal_fit.labels, tolerance) if tolerance else (),
             progress=progress,
         )
 
