@@ -8,7 +8,7 @@ from exact_beams import exact_frequencies_hz, rectangle
 from fe_models import ALUMINIUM, LUMPED_TEXT, beam, read_text_model
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
-from frf_ipz.fe.beams.interpolation import deflection_row, slope_row
+from frf_ipz.fe.beams.interpolation import deflection_row, kink_at, slope_row
 from frf_ipz.fe.beams.variants import geometric_stiffness, with_axial_force, with_formulation
 from frf_ipz.fe.changes import released, with_point_masses
 from frf_ipz.fe.eigen import solve_basis
@@ -65,6 +65,25 @@ def test_another_theory_is_the_beam_built_anew(to):
         expected = getattr(anew, name).toarray()
         assert_allclose(getattr(changed, name).toarray(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     assert_allclose(changed.parts[2].stiffness, anew.parts[2].stiffness, rtol=1e-12)
+
+
+@pytest.mark.parametrize("to", ["euler-bernoulli", "timoshenko"])
+def test_another_theory_is_the_one_that_holds_between_nodes(to):
+    other = {"euler-bernoulli": "timoshenko", "timoshenko": "euler-bernoulli"}[to]
+    anew = beam(formulation=to, thickness_m=0.05)
+    changed = with_formulation(beam(formulation=other, thickness_m=0.05), to)
+    assert_allclose(slope_row(changed, 0.111), slope_row(anew, 0.111), rtol=1e-12)
+
+
+def test_a_force_bends_a_corner_into_a_stocky_beam():
+    # in the middle of a clamped-clamped beam, the slope on one side of a static force is the shear's alone
+    model = beam(elements=40, left="clamped", right="clamped", thickness_m=0.05)
+    motion, loads = np.zeros(len(model.all_dofs)), np.zeros(len(model.dofs))
+    loads[model.index(Dof(21, "z"))] = 1.0
+    motion[~model.fixed] = np.linalg.solve(model.stiffness.toarray(), loads)
+    slope = slope_row(model, LENGTH / 2) @ motion  # of the element to the right
+    assert_allclose(kink_at(model, LENGTH / 2), -slope, rtol=1e-6)
+    assert kink_at(with_formulation(model, "euler-bernoulli"), LENGTH / 2) == kink_at(model, LENGTH / 2)
 
 
 def test_another_theory_keeps_what_was_added():

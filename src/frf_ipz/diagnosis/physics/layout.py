@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.interpolation import slope_row
+from frf_ipz.fe.beams.interpolation import kink_at, slope_row
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -148,6 +148,26 @@ def shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
     """
     axes = [axis for axis in extents(model) if axis != dof.direction]
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
+
+
+def kink_beside(model: StructuralModel, dof: Dof) -> float:
+    """How fast the motion falls on both sides of a force, by local shear.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+    dof : Dof
+        Of the force.
+
+    Returns
+    -------
+    float
+        1/N; zero but for beams, where a force makes a corner.
+    """
+    if model.kind != "beam" or dof.direction not in AXES:
+        return 0.0
+    return kink_at(model, float(model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, dof.node), 0]))
 
 
 @lru_cache(maxsize=1024)  # every hypothesis asks for the same few

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.diagnosis.physics.layout import extents, motion_row, shift_rows
+from frf_ipz.diagnosis.physics.layout import extents, kink_beside, motion_row, shift_rows
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -266,6 +266,8 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
     span = extents(basis.model)
     directions = {dof.direction for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)}
     axes = tuple(axis for axis in span if directions != {axis})
+    shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes])
+    beyond_scatter = LOCAL * _local(basis, layout, n_modes)
     return Nuisance(
         n_modes=n_modes,
         n_rigid=n_rigid,
@@ -274,10 +276,10 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         damping_std=np.where(np.arange(n_modes) < n_rigid, SUSPENSION_SPREAD, options.damping_tolerance * UNIFORM),
         cords_std=(CORDS * first) ** 2,
         axes=axes,
-        shift_std=np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes]),
+        shift_std=shift_std,
         n_outputs=len(layout.outputs),
         n_inputs=len(layout.inputs),
-        local_std=LOCAL * _local(basis, layout, n_modes),
+        local_std=np.copysign(np.hypot(beyond_scatter, _corners(basis, layout, shift_std)), beyond_scatter),
         n_channels=len(layout.channels),
         gain_std=options.gain_tolerance * UNIFORM,
         is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
@@ -292,6 +294,16 @@ def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
     whole = outputs @ np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), inputs.T)
     scattered = (outputs[:, :n_modes] / (basis.modes.eigenvalues[:n_modes] + shift)) @ inputs[:, :n_modes].T
     return np.asarray((whole - scattered)[layout.output_of, layout.input_of])
+
+
+def _corners(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
+    """Standard deviation of the compliance beside a force, m/N: the FRF has a corner where sensor and blow meet."""
+    apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
+    sensors = np.array([dof.node for _, dof in layout.outputs])
+    struck = np.array([dof.node for dof in layout.inputs])
+    meet = sensors[layout.output_of] == struck[layout.input_of]
+    kinks = np.array([kink_beside(basis.model, dof) for dof in layout.inputs])
+    return np.asarray(np.where(meet, apart * kinks[layout.input_of], 0.0))
 
 
 def all_shift_rows(basis: Basis, nuisance: Nuisance, dofs: tuple[Dof, ...]) -> FloatArray:

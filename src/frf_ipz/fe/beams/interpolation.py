@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,12 +63,34 @@ def slope_row(model: StructuralModel, x_m: float) -> FloatArray:
     return _row(model, x_m, derivative=1)
 
 
+def kink_at(model: StructuralModel, x_m: float) -> float:
+    """Slope by shear on each side of a force: half of what jumps there.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        A beam, by either theory.
+    x_m : float
+        Where the force acts, m from the left end.
+
+    Returns
+    -------
+    float
+        1/N: 1 / (2 kappa G A). Next to the force the deflection falls by it with every metre.
+
+    Raises
+    ------
+    InputError
+        If the model is no beam, or the place is not on it.
+    """
+    beam = replace(beam_options(model), formulation="timoshenko")
+    elements, place = beam_elements(beam), _element_at(model, x_m)
+    softness = elements.shear_parameter * elements.length**2 / (12 * elements.bending_stiffness)
+    return float(softness[place] / 2)
+
+
 def _row(model: StructuralModel, x_m: float, derivative: int) -> FloatArray:
-    beam = beam_options(model)
-    if not 0 <= x_m <= beam.length_m:
-        raise InputError(f"x = {x_m:g} m is not on the beam '{model.name}', which goes from 0 to {beam.length_m:g} m")
-    elements = beam_elements(beam)
-    place = min(int(x_m / beam.length_m * beam.elements), beam.elements - 1)
+    elements, place = beam_elements(beam_options(model)), _element_at(model, x_m)
     length = elements.length[place : place + 1]
     polynomials = deflection_polynomials(length, elements.shear_parameter[place : place + 1])[0]
     xi = float(np.clip(x_m / length[0] - place, 0.0, 1.0))
@@ -75,3 +98,10 @@ def _row(model: StructuralModel, x_m: float, derivative: int) -> FloatArray:
     row = np.zeros(len(model.all_dofs))
     row[2 * place : 2 * place + 4] = polynomials @ powers
     return row
+
+
+def _element_at(model: StructuralModel, x_m: float) -> int:
+    beam = beam_options(model)
+    if not 0 <= x_m <= beam.length_m:
+        raise InputError(f"x = {x_m:g} m is not on the beam '{model.name}', which goes from 0 to {beam.length_m:g} m")
+    return min(int(x_m / beam.length_m * beam.elements), beam.elements - 1)

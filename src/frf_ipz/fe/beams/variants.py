@@ -38,8 +38,9 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
     InputError
         If the model is no beam.
     """
-    beam = beam_options(model)
-    elements = element_parts(replace(beam, formulation=formulation))
+    file = _beam_file(model)
+    beam = replace(file.beam, formulation=formulation)
+    elements = element_parts(beam)
     others = [part for part in model.parts if part.kind != "element"]
     old_mass, old_stiffness = mass_and_stiffness(
         [part for part in model.parts if part.kind == "element"], _order(model)
@@ -50,6 +51,7 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
         mass_all=sparse.csr_array(model.mass_all + (mass - old_mass)),
         stiffness_all=sparse.csr_array(model.stiffness_all + (stiffness - old_stiffness)),
         parts=(*elements, *others),
+        source=replace(file, beam=beam),  # who interpolates between nodes asks it for the theory
     )
 
 
@@ -117,9 +119,13 @@ def beam_options(model: StructuralModel) -> BeamOptions:
     InputError
         If the model is no beam.
     """
+    return _beam_file(model).beam
+
+
+def _beam_file(model: StructuralModel) -> BeamFile:
     if not isinstance(model.source, BeamFile):
         raise InputError(f"the model '{model.name}' is of kind '{model.kind}'; only a beam can be built anew")
-    return model.source.beam
+    return model.source
 
 
 def _order(model: StructuralModel) -> int:
