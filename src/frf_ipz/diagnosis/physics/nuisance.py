@@ -297,7 +297,7 @@ def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
 
 
 def _corners(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
-    """Standard deviation of the compliance beside a force, m/N: the FRF has a corner where sensor and blow meet."""
+    """Give the compliance, m/N, by which an FRF may be off where sensor and blow meet: it has a corner there."""
     apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
     sensors = np.array([dof.node for _, dof in layout.outputs])
     struck = np.array([dof.node for dof in layout.inputs])
