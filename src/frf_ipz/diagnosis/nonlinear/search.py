@@ -21,7 +21,7 @@ import numpy as np
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates, refit
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -51,7 +51,7 @@ LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
 LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
-WEAK, TWICE = 1.0, 2.0  # mean square that a linear model leaves below which the best laws see longer stretches
+WEAK, TWICE = 1.0, 2.0  # mean square that a linear model leaves below which stretches are longer, and how much
 LONGER_BY = 1.2  # times as long, where records are long enough
 ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
 USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
@@ -178,10 +178,8 @@ def search_laws(
         return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
 
     from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
-    short, long, longer = _tracks(track_of, from_rest=from_rest)
+    short, long = _tracks(track_of, from_rest=from_rest)
     fits = find_candidates(short, long, laws)
-    if longer is not None:
-        long, fits = longer, refit(longer, fits)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
     if found.verdict == UNEXPLAINED:
@@ -194,8 +192,8 @@ def search_laws(
     return replace(found, freedom=long.linear.freedom, before=before, after=after)
 
 
-def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, Track, Track | None]:
-    """Cut short and long stretches, and longer ones for the best laws where a linear model leaves little."""
+def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, Track]:
+    """Cut short and long stretches; both are longer where a linear model leaves little."""
     periods = LONGER if from_rest else LONG
     long = track_of(periods, FINE, loudest=False)
     is_linear = long.missed < USUAL  # as far as its first parts say
@@ -206,9 +204,11 @@ def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, 
     if long.missed < USUAL:
         floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
         long = track_of(periods, floor, loudest=is_linear)
-    short = track_of(SHORT, ROUGH, loudest=is_linear)
-    longer = track_of(TWICE * periods, floor, loudest=is_linear) if is_weak else long
-    return short, long, longer if longer.stretches.n_samples > LONGER_BY * long.stretches.n_samples else None
+    if is_weak:
+        longer = track_of(TWICE * periods, floor, loudest=is_linear)
+        if longer.stretches.n_samples > LONGER_BY * long.stretches.n_samples:
+            return long, longer
+    return track_of(SHORT, ROUGH, loudest=is_linear), long
 
 
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from frf_ipz.diagnosis.nonlinear import search
+from frf_ipz.diagnosis.nonlinear.fitting import candidates
 
 
 def cutter(missed, most=float("inf")):
@@ -20,24 +21,32 @@ def cutter(missed, most=float("inf")):
 
 
 def lengths(found):
-    return [track and track.stretches.n_samples for track in found]
+    return [track.stretches.n_samples for track in found]
 
 
 @pytest.mark.parametrize(
     ("missed", "most", "expected"),
-    [(30.0, 1e9, [80, 320, None]), (0.8, 1e9, [80, 320, 640]), (0.8, 330, [80, 320, None])],
+    [(30.0, 1e9, [80, 320]), (0.8, 1e9, [320, 640]), (0.8, 330, [80, 320])],
 )
-def test_longer_stretches_are_cut_where_a_linear_model_leaves_little(missed, most, expected):
+def test_stretches_are_longer_where_a_linear_model_leaves_little(missed, most, expected):
     assert lengths(search._tracks(cutter(missed, most), from_rest=False)) == expected
 
 
 def test_a_record_that_starts_linear_is_looked_at_where_it_is_loudest():
-    short, long, longer = search._tracks(cutter(0.3), from_rest=True)
-    assert long.loudest
+    short, long = search._tracks(cutter(0.3), from_rest=True)
     assert short.loudest
-    assert longer.loudest
-    assert lengths((short, long, longer)) == [80, 320, 640]
+    assert long.loudest
+    assert lengths((short, long)) == [320, 640]
     assert long.floor < search.FINE
+
+
+def test_the_best_law_is_fitted_until_it_settles():
+    def further(fit, _):
+        return SimpleNamespace(cost=fit.cost - 1, settled=fit.cost < 9)
+
+    fits = [SimpleNamespace(cost=20.0, settled=False), SimpleNamespace(cost=10.0, settled=False)]
+    candidates._settle(SimpleNamespace(shoot=further), fits)
+    assert [(fit.cost, fit.settled) for fit in fits] == [(20.0, False), (7.0, True)]
 
 
 @pytest.mark.parametrize(("explained", "hidden"), [(1e5, False), (1e4, True)])

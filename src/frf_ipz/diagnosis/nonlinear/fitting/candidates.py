@@ -1,7 +1,7 @@
 """The laws and places that explain best: screened, refined, simulated, and their neighbours too.
 
 Short stretches first: within them even strongly nonlinear motion is predictable, and a rough start is good enough. What
-is best there is then fitted on the long ones.
+is best there is then fitted on the long ones, the best of all until it settles.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
+ROUNDS = 4  # of further steps that the best fit may take until it settles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,27 +87,8 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
     fits = _simulated(long, _different(finalists), hopeless=HOPELESS_LATE)
     _climb(long, fits)
+    _settle(long, fits)
     return sorted(fits, key=lambda fit: fit.cost)
-
-
-def refit(track: Track, fits: Sequence[LawFit]) -> list[LawFit]:
-    """Fit the best laws and places to other stretches.
-
-    Parameters
-    ----------
-    track : Track
-        Longer stretches, say.
-    fits : sequence of LawFit
-        The best first.
-
-    Returns
-    -------
-    list of LawFit
-        Of the best fits, and of the best one of each other law; the smallest cost first.
-    """
-    best = list(fits[:FINALISTS])
-    best += [fit for law in {fit.law: None for fit in fits} for fit in _of(law, fits)[:1] if fit not in best]
-    return sorted(_simulated(track, best, hopeless=HOPELESS_LATE), key=lambda fit: fit.cost)
 
 
 def _of(law: Law, fits: Iterable[LawFit]) -> list[LawFit]:
@@ -143,6 +125,15 @@ def _simulated(
     found = [track.shoot(fit, FIRST) for fit in fits]
     least = min(least, *(fit.cost for fit in found)) if found else least
     return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
+
+
+def _settle(track: Track, fits: list[LawFit]) -> None:
+    """Fit the best law further, as long as it gets better."""
+    for _ in range(ROUNDS if fits else 0):
+        best = min(range(len(fits)), key=lambda i: fits[i].cost)
+        if fits[best].settled:
+            return
+        fits[best] = track.shoot(fits[best], MORE)
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:
