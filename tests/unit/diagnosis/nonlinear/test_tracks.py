@@ -40,13 +40,24 @@ def test_a_record_that_starts_linear_is_looked_at_where_it_is_loudest():
     assert long.floor < search.FINE
 
 
+def a_fit(cost, *, settled):
+    return SimpleNamespace(cost=cost, settled=settled, n_rows=100)
+
+
 def test_the_best_law_is_fitted_until_it_settles():
     def further(fit, _):
-        return SimpleNamespace(cost=fit.cost - 1, settled=fit.cost < 9)
+        return a_fit(fit.cost - 1, settled=fit.cost < 9)
 
-    fits = [SimpleNamespace(cost=20.0, settled=False), SimpleNamespace(cost=10.0, settled=False)]
+    fits = [a_fit(20.0, settled=False), a_fit(10.0, settled=False)]
     candidates._settle(SimpleNamespace(shoot=further), fits)
     assert [(fit.cost, fit.settled) for fit in fits] == [(20.0, False), (7.0, True)]
+
+
+@pytest.mark.parametrize(("left", "expected"), [(500.0, 60.0), (90.0, 90.0), (110.0, 60.0), (50.0, 50.0)])
+def test_a_law_that_leaves_much_is_fitted_afresh(left, expected):
+    fits = [a_fit(left, settled=True)]
+    candidates._settle(SimpleNamespace(shoot_afresh=lambda *_: a_fit(60.0, settled=True)), fits)
+    assert fits[0].cost == expected
 
 
 @pytest.mark.parametrize(("explained", "hidden"), [(1e5, False), (1e4, True)])

@@ -32,7 +32,7 @@ HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
-ROUNDS = 4  # of further steps that the best fit may take until it settles
+ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +63,12 @@ class Track:
             unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
         return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
 
+    def shoot_afresh(self, fit: LawFit, iterations: int) -> LawFit:
+        """Fit a law by simulation from its numbers, with the linear model as it starts without a law."""
+        unknowns = self.linear.unknowns.copy()
+        unknowns[: self.linear.freedom.n_lasting] = 0.0
+        return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
+
 
 def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawFit]:
     """Find the laws and places that explain stretches best.
@@ -87,7 +93,8 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
     fits = _simulated(long, _different(finalists), hopeless=HOPELESS_LATE)
     _climb(long, fits)
-    _settle(long, fits)
+    if fits:
+        _settle(long, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
 
@@ -128,12 +135,17 @@ def _simulated(
 
 
 def _settle(track: Track, fits: list[LawFit]) -> None:
-    """Fit the best law further, as long as it gets better."""
-    for _ in range(ROUNDS if fits else 0):
-        best = min(range(len(fits)), key=lambda i: fits[i].cost)
-        if fits[best].settled:
+    """Fit the best law further, as long as it gets better, and once more with the linear model as at first."""
+    best, is_fresh = min(range(len(fits)), key=lambda i: fits[i].cost), False
+    for _ in range(ROUNDS):
+        fit = fits[best]
+        if not fit.settled:
+            fits[best] = track.shoot(fit, MORE)
+        elif is_fresh or fit.cost < fit.n_rows:
             return
-        fits[best] = track.shoot(fits[best], MORE)
+        else:  # what is strongly nonlinear has other minima, in which starts of stretches are taken for the law
+            again, is_fresh = track.shoot_afresh(fit, FRESH), True
+            fits[best] = min(fit, again, key=lambda one: one.cost)
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:
