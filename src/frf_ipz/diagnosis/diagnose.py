@@ -14,6 +14,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
+from frf_ipz.diagnosis.judging.another_force import describe_another, find_another
 from frf_ipz.diagnosis.judging.decision import (
     CONSISTENT,
     EXPLAINED,
@@ -142,6 +143,9 @@ def _decide(
             return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
     if found.verdict == EXPLAINED and is_of_another_kind(found.final):
         return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
+    another = find_another(bench, found) if found.verdict == EXPLAINED else None
+    if another is not None:
+        return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_another(another)
     return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
 
 
@@ -243,6 +247,8 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
 
 def _mismatch_location(bench: Bench, found: Decision, findings: tuple[Finding, ...]) -> Mapping[str, object]:
     """Give the place of what was found, or of what remains unexplained."""
+    if found.another is not None:
+        return found.another.hypothesis.causes[-1].place.location
     if found.verdict == UNEXPLAINED:
         return trace(bench, found.null)
     return findings[0].location if findings else {}

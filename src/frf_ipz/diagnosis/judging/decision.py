@@ -37,6 +37,8 @@ class Decision:
         Of each further cause beside its base, where several were found.
     good, null_good : Goodness
         Of what was found, and of the nominal model.
+    another : Fit, optional
+        Of a force of another kind that explains more than what was found.
     """
 
     verdict: str
@@ -46,6 +48,7 @@ class Decision:
     further: tuple[Ranking, ...]
     good: Goodness
     null_good: Goodness
+    another: Fit | None = None
 
 
 def decide(bench: Bench, progress: Progress) -> Decision:

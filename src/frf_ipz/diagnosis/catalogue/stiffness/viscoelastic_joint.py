@@ -46,7 +46,7 @@ class ViscoelasticJoint(Effect):
 
     def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
-        own = specimen.stiffness_against(_motion(specimen, place))
+        own = specimen.stiffness_against(motion_at(specimen, place))
         low, high = (2 * np.pi * edge for edge in specimen.band_hz)
         name = "rotational_stiffness_Nm_rad" if place.key[0] == "end" else "stiffness_N_m"
         return (
@@ -56,7 +56,7 @@ class ViscoelasticJoint(Effect):
 
     def build(self, specimen: Specimen, place: Place) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = _motion(specimen, place)[:, None]
+        motion = motion_at(specimen, place)[:, None]
         light = 1 / (LIGHT * 2 * np.pi * specimen.band_hz[1]) ** 2
 
         def change(values: FloatArray) -> Change:
@@ -80,7 +80,7 @@ class ViscoelasticJoint(Effect):
         low, high = (2 * np.pi * edge for edge in specimen.band_hz)
         times = np.geomspace(1 / (2 * high), 1 / (0.5 * low), N_TIMES)
         return Sketch(
-            motion=_motion(specimen, place),
+            motion=motion_at(specimen, place),
             shapes=np.array([relaxing(specimen.contour, time) for time in times]),
             values=np.stack([np.ones(N_TIMES), times], 1),
         )
@@ -125,7 +125,21 @@ def relaxing(s: ComplexArray, time_s: float) -> ComplexArray:
     return np.asarray(s * time_s / (1 + s * time_s))
 
 
-def _motion(specimen: Specimen, place: Place) -> FloatArray:
+def motion_at(specimen: Specimen, place: Place) -> FloatArray:
+    """Weights of all DOFs in what a joint sees.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What is tested.
+    place : Place
+        A node, a spring, or a pinned end.
+
+    Returns
+    -------
+    (n_all,) array
+        The motion of a node, the stretch of a spring, the rotation of an end.
+    """
     kind = place.key[0]
     if kind == "node":
         return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key[1:]))

@@ -1,0 +1,60 @@
+"""A force at one place that springs, dampers and masses only imitate."""
+
+import re
+
+import numpy as np
+import pytest
+
+from diagnosed import BAND_HZ, beam, labels, measured, observed
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.quantities import FrfQuantity
+
+IMITATORS = ("attached_resonator", "viscoelastic_joint")
+NOISY = 0.004  # with less, two imitators are sought before: that takes longer
+SEEN = 0.05  # of an order: what this noise allows
+OUTPUTS, STRUCK = ("17:+z", "9:-z"), "6:+z"
+
+
+def with_force(model, node, stiffness):
+    """Factors by which a dynamic stiffness between a node and the ground changes FRFs, [Sherman1950] on receptances."""
+
+    def receptance(s, outputs, inputs):
+        return model_frfs(model, labels(outputs, inputs, FrfQuantity.RECEPTANCE), s)
+
+    def factors(frequency_hz):
+        s, at = 2j * np.pi * frequency_hz, (f"{node}:+z",)
+        plain, to_struck = receptance(s, OUTPUTS, (STRUCK,)), receptance(s, at, (STRUCK,))
+        from_node = receptance(s, OUTPUTS, at)
+        given_back = 1 / (1 / stiffness(s)[:, None] + receptance(s, at, at))
+        return 1 - from_node * given_back * to_struck / plain
+
+    return factors
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+def diagnosed(model, stiffness):
+    frfs = measured(model, factors=with_force(model, 12, stiffness), noise=NOISY)
+    return diagnose(model, observed(frfs), DiagnoseOptions(effects=IMITATORS))
+
+
+@pytest.mark.parametrize("order", [0.3, 0.5])
+def test_a_fractional_damper_is_not_named_by_what_imitates_it(nominal, order):
+    middle = 2 * np.pi * np.sqrt(np.prod(BAND_HZ))
+    found = diagnosed(nominal, lambda s: 300.0 * (s / middle) ** order)
+    assert found.verdict == "unexplained"
+    assert found.mismatch_location == {"nodes": [12]}
+    said = re.search(r"at node 12 \(x = 0.344 m\) that grows with the power (\S+) of frequency", found.statement)
+    assert float(said[1]) == pytest.approx(order, abs=SEEN)
+
+
+def test_a_joint_that_relaxes_once_is_named(nominal):
+    time = 1 / (2 * np.pi * 100.0)
+    found = diagnosed(nominal, lambda s: 300.0 * s * time / (1 + s * time))
+    assert found.verdict == "explained"
+    assert [finding.effect for finding in found.findings] == ["viscoelastic_joint"]
