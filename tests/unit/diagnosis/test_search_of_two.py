@@ -178,3 +178,15 @@ def test_all_sensors_may_be_late_together(nominal):
     assert "All sensors together" in finding.statement
     early, true = apply_to_frfs(frfs, found).values, measured(nominal).values
     assert np.linalg.norm(early - true) < SEEN * np.linalg.norm(true)
+
+
+def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp_path):
+    model = beam(tmp_path, left="pinned", right="pinned")
+    bench = bench_of(model, measured(model, labels(outputs=("12:+z", "9:-z"))), ("viscoelastic_joint",))
+    effect, values = bench.effects["viscoelastic_joint"], np.array([100.0, 1e-3])
+    places = {place.key[:2]: place for place in effect.places(bench.specimen)}
+    beside = effect.neighbours(bench.specimen, places["node", 16])
+    assert {place.key[:2] for place in beside} >= {("node", 15), ("end", "left"), ("end", "right")}
+    prior = {key: effect.log_prior(bench.specimen, place, values) for key, place in places.items()}
+    assert prior["end", "right"] == pytest.approx(np.log(15 / 2))  # 15 nodes that move, two ends
+    assert prior["node", 16] == 0.0

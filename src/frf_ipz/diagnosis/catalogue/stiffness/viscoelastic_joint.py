@@ -37,12 +37,7 @@ class ViscoelasticJoint(Effect):
         to_ground = {node for part in springs if 0 in part.nodes for node in part.nodes}
         found = [place for place in found if place.key[1] not in to_ground]
         found += [Place(key=("spring", part.name), location={"springs": [part.name]}) for part in springs]
-        source = specimen.model.source
-        if isinstance(source, BeamFile):
-            for end, node in (("left", 1), ("right", source.beam.elements + 1)):
-                if getattr(source.beam, end) == "pinned":
-                    found.append(Place(key=("end", end, node), location={"end": end, "nodes": [node]}))
-        return found
+        return found + _ends(specimen)
 
     def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
@@ -86,11 +81,17 @@ class ViscoelasticJoint(Effect):
         )
 
     def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
-        """Nodes beside; for others nothing."""
+        """Nodes beside, and ends, which look like the nodes beside them; for others nothing."""
         if place.key[0] != "node":
             return []
         inner = Place(key=place.key[1:], location=place.location)
-        return [Place(key=("node", *other.key), location=other.location) for other in beside_node(specimen, inner)]
+        beside = [Place(key=("node", *other.key), location=other.location) for other in beside_node(specimen, inner)]
+        return beside + _ends(specimen)
+
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Joints sit at ends: one of them is as likely as one at any node between."""
+        del values
+        return float(np.log(len(at_nodes(specimen)) / len(_ends(specimen)))) if place.key[0] == "end" else 0.0
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, how fast, where."""
@@ -123,6 +124,18 @@ def relaxing(s: ComplexArray, time_s: float) -> ComplexArray:
         1.
     """
     return np.asarray(s * time_s / (1 + s * time_s))
+
+
+def _ends(specimen: Specimen) -> list[Place]:
+    """Pinned ends of a beam."""
+    source = specimen.model.source
+    if not isinstance(source, BeamFile):
+        return []
+    return [
+        Place(key=("end", end, node), location={"end": end, "nodes": [node]})
+        for end, node in (("left", 1), ("right", source.beam.elements + 1))
+        if getattr(source.beam, end) == "pinned"
+    ]
 
 
 def motion_at(specimen: Specimen, place: Place) -> FloatArray:
