@@ -64,7 +64,7 @@ def agreement_with(stretches: Stretches, freedom: Freedom, fit: LawFit) -> Agree
     motion = stretches.motion[:, :, used]
     without = motion + response.to_sensors(fit.place) * fit.force[:, None, used]
     present = np.isfinite(stretches.variance[:, :, used])
-    variance = np.where(present, stretches.noise[:, used] + (FLOOR * np.abs(motion)) ** 2, np.inf)
+    variance = np.where(present, stretches.noise[:, :, used] + (FLOOR * np.abs(motion)) ** 2, np.inf)
     before, after = (_disagreement(stretches, values, variance) for values in (motion, without))
     expected = 2 * (np.sum(present) - np.count_nonzero(counts) * present[0].size)
     left = after / max(expected, 1)

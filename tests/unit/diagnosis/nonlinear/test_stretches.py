@@ -46,3 +46,16 @@ def test_a_record_is_looked_at_once_where_that_is_enough(chain, strike):
     observations = random_records(strike(), 2.0)
     plant, noise = make_plant(chain.model, observations), read_noise(observations)
     assert not transform(observations, plant, noise, Window(duration_s=1.0, loudest=False)).moving.any()
+
+
+def test_noise_of_the_force_is_more_of_a_weak_blow(chain, strike):
+    """It is the same in all blows, and the responses follow the force."""
+    observations = strike()
+    plant, quiet = make_plant(chain.model, observations), read_noise(observations)
+    loud = replace(quiet, force=replace(quiet.force, white=1e4 * max(quiet.force.white, 1e-12)))
+    added = [transform(observations, plant, noise, Window(duration_s=1.0)).noise for noise in (loud, quiet)]
+    stretches = transform(observations, plant, quiet, Window(duration_s=1.0))
+    part = ((added[0] - added[1]).mean(1) / np.mean(np.abs(stretches.motion) ** 2, 1))[:, stretches.used].mean(1)
+    peaks = np.abs(stretches.fine_force).max(1)
+    assert np.all(np.diff(part[np.argsort(peaks)]) < 0)
+    assert part.max() > 10 * part.min()

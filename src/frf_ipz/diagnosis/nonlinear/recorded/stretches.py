@@ -63,8 +63,8 @@ class Stretches:
         Force on finer times, N.
     motion : (n_blows, n_sensors, n_lines) complex array
         Responses as displacements, in the signs of the sensors, m s; 0 where a blow lacks a sensor.
-    noise : (n_sensors, n_lines) array
-        Variance of `motion` by the noise of the channels.
+    noise : (n_blows, n_sensors, n_lines) array
+        Variance of `motion` by the noise of the channels, that of the force included.
     variance : (n_blows, n_sensors, n_lines) array
         With what the model cannot be expected to meet; infinite where a blow lacks a sensor.
     input_of : (n_blows,) int array
@@ -178,7 +178,8 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     known, of_force = _noise(plant, noise, s, sigma)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
     forced = np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)
-    variance = known + (floor**2 + forced[:, None]) * size
+    noisy = known + forced[:, None] * size
+    variance = noisy + floor**2 * size
     variance[~present] = np.inf
     return Stretches(
         s=s,
@@ -189,7 +190,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         start_force=start_force,
         fine_force=fine_force,
         motion=motion,
-        noise=known,
+        noise=noisy,
         variance=variance,
         input_of=np.array([plant.inputs.index(cut.blow.input_dof) for cut in cuts]),
         blow_of=np.array([cut.number for cut in cuts]),
