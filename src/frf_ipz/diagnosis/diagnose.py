@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
-CERTAIN = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing is preferred
+CERTAIN = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
 ENOUGH_TO_COMPARE = 2  # blows at a place
 ALIKE_NATS = 5.0  # effects nearer to each other than that are not told apart
 MOST_ALTERNATIVES = 6
@@ -119,10 +119,12 @@ def diagnose(
     found, proof = _proven(bench, held_out, found)
     linear = _linear(bench, found, proof, gates, held=source.held)
     linear = replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
-    if excess > 1 and (certain or not kept or found.verdict == UNEXPLAINED):
-        laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
+    if excess <= 1:
+        return linear
+    laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
+    if certain or not kept or found.verdict == UNEXPLAINED:
         return _nonlinear(linear, bench, found, model, observations, laws_of)
-    return linear
+    return _unless_a_law(linear, laws_of(model, observations))
 
 
 def _decide(
@@ -220,6 +222,12 @@ def _nonlinear(
     if found.findings or not linear.findings:
         return found
     return replace(linear, verdict=UNEXPLAINED, statement=f"{laws.statement} {linear.statement}")
+
+
+def _unless_a_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
+    """Keep a linear explanation that leaves nothing, unless a law says how blows disagree, which nothing linear can."""
+    is_proven = laws.verdict == EXPLAINED and laws.beyond_linear > LAW_NATS
+    return _with_law(linear, laws) if is_proven else linear
 
 
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:

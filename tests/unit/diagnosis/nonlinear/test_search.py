@@ -1,5 +1,8 @@
+from types import SimpleNamespace
+
 import pytest
 
+from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
@@ -62,6 +65,21 @@ def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, stri
     assert found.findings == ()
     assert found.alternatives[0].effect == "cubic_stiffness"
     assert "no more than a linear system" in found.statement
+
+
+@pytest.mark.parametrize(
+    ("verdict", "beyond_linear", "said"),
+    [
+        ("explained", 200.0, "law"),
+        ("explained", 30.0, "spring"),
+        ("explained", float("nan"), "spring"),
+        ("unexplained", 200.0, "spring"),
+    ],
+)
+def test_a_linear_cause_that_leaves_nothing_gives_way_to_a_proven_law_only(monkeypatch, verdict, beyond_linear, said):
+    monkeypatch.setattr(whole, "_with_law", lambda *_: "law")
+    found = SimpleNamespace(verdict=verdict, beyond_linear=beyond_linear)
+    assert whole._unless_a_law("spring", found) == said
 
 
 def test_nothing_is_found_in_a_linear_chain(chain, strike):
