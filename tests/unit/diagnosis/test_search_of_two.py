@@ -190,3 +190,12 @@ def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp
     prior = {key: effect.log_prior(bench.specimen, place, values) for key, place in places.items()}
     assert prior["end", "right"] == pytest.approx(np.log(15 / 2))  # 15 nodes that move, two ends
     assert prior["node", 16] == 0.0
+
+
+def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
+    true = replace(nominal, modal_damping=np.array([0.01, 0.01, 0.0035, 0.01]))
+    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert found.verdict == "unexplained"
+    assert "0.35 % instead of 1 % at 287.1 Hz" in found.statement
+    allowed = DiagnoseOptions(effects=("added_mass", "damping_level"), damping_tolerance=0.7)
+    assert diagnose(nominal, observed(measured(true)), allowed).verdict == "consistent"

@@ -1,4 +1,4 @@
-"""Which stretches laws are fitted to, when noise may hide that a law is another one, and where an unknown one sits."""
+"""Which stretches laws are fitted to, when a law is bent, and where an unknown one sits."""
 
 from types import SimpleNamespace
 
@@ -60,14 +60,14 @@ def test_a_law_that_leaves_much_is_fitted_afresh(left, expected):
     assert fits[0].cost == expected
 
 
-@pytest.mark.parametrize(("explained", "hidden"), [(1e5, False), (1e4, True)])
-def test_noise_hides_another_law_only_where_the_bend_of_a_wrong_one_would_not_show(explained, hidden):
+@pytest.mark.parametrize(("drop", "least", "bent"), [(150.0, 0.0, True), (150.0, 250.0, False), (90.0, 0.0, False)])
+def test_a_small_bend_is_too_much_only_where_noise_may_hide_a_larger_one(drop, least, bent):
+    """Errors of the model imitate 100."""
     track = SimpleNamespace(
-        stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: False)),
-        linear=SimpleNamespace(cost=explained + 1e3),
+        stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: False)), linear=SimpleNamespace(cost=9e3)
     )
     fit = SimpleNamespace(cost=1e3, n_rows=5000)
-    assert search._hides(track, fit) == hidden
+    assert search._is_bent(track, fit, drop, least=least) == bent
 
 
 @pytest.mark.parametrize(("drop", "place"), [(300.0, 7), (950.0, 3)])
