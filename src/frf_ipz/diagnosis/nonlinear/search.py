@@ -67,7 +67,7 @@ NEAR, MOST_NEAR = 5.0, 4  # times the smallest cost: laws at whose places an unk
 SMALL = 0.5  # of the cost: what forces besides a law promise more than that is not small, and no promise
 PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
-MOST_LEFT = 0.1  # of the response, whatever the noise is: with more, laws and places were taken for each other
+MOST_LEFT = 0.1  # of the response: with more, noise hides much of how another law bends, and any bend is too much
 FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
@@ -307,23 +307,15 @@ def _complaint(
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:
         return f"leaves blows that disagree {np.sqrt(agreement.left):.3g} times more than noise explains"
-    if part > MOST_LEFT and _hides(track, best):
-        return f"leaves {part:.0%} of the response, in which noise may hide that it is another law or place"
     bent = bend_of(best)
-    if _is_bent(track, best, bent):
+    if _is_bent(track, best, bent, least=0.0 if part > MOST_LEFT else BENT_NATS):
         return f"is bent: forces of other kinds at its place would gain {0.5 * bent:.0f} nats more"
     return ""
 
 
-def _hides(track: Track, fit: LawFit) -> bool:
-    """Noise hides what other forces at the place of a law would have to explain for the law to be bent."""
-    scale = max(1.0, fit.cost / fit.n_rows)
-    return _bend_of_errors(track, fit) < 2 * BENT_NATS * scale
-
-
-def _is_bent(track: Track, fit: LawFit, drop: float) -> bool:
-    """Other forces at the place of a law explain more than errors of the model imitate."""
-    return drop > _bend_of_errors(track, fit) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > BENT_NATS
+def _is_bent(track: Track, fit: LawFit, drop: float, *, least: float) -> bool:
+    """Other forces at the place of a law explain more than errors of the model imitate, and so many nats at least."""
+    return drop > _bend_of_errors(track, fit) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > least
 
 
 def _bend_of_errors(track: Track, fit: LawFit) -> float:
