@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from scipy import sparse
@@ -78,6 +79,7 @@ def with_axial_force(model: StructuralModel, force_N: float) -> StructuralModel:
     return replace(model, stiffness_all=sparse.csr_array(model.stiffness_all + force_N * geometric_stiffness(model)))
 
 
+@lru_cache(maxsize=2)  # a search for an axial load asks for the same one again and again
 def geometric_stiffness(model: StructuralModel) -> Matrix:
     """Stiffness that an axial tension of 1 N adds to a beam.
 

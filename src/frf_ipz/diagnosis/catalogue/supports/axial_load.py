@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,6 +63,7 @@ class AxialLoad(Effect):
         )
 
 
+@lru_cache(maxsize=2)  # a search asks for it with every hypothesis
 def buckling_load(specimen: Specimen) -> float:
     """Find the axial compression at which the beam buckles.
 
