@@ -30,7 +30,7 @@ from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
 from frf_ipz.diagnosis.judging.gates import check
-from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
+from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.judging.one_place import COMPLAINT as OF_ANOTHER_KIND
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
@@ -123,7 +123,8 @@ def diagnose(
         return linear
     laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
     if certain or not kept or found.verdict == UNEXPLAINED:
-        return _nonlinear(linear, bench, found, model, observations, laws_of)
+        bench_of = partial(_set_up_again, model, options, kept, scale)
+        return _nonlinear(linear, bench, bench_of, found, model, observations, laws_of)
     return _unless_a_law(linear, laws_of(model, observations))
 
 
@@ -200,26 +201,41 @@ def _late(progress: Progress) -> Progress:
     return lambda part, text: progress(0.9 + 0.1 * part, text)
 
 
+def _set_up_again(
+    model: StructuralModel,
+    options: DiagnoseOptions,
+    effects: Mapping[str, Effect],
+    free_gains: str,
+    observations: Observations,
+) -> Bench:
+    """Bring the model and changed recordings together."""
+    return set_up(model, divide(observations), observations.band_hz, options, effects, free_gains=free_gains)
+
+
 def _nonlinear(
     linear: Diagnosis,
     bench: Bench,
+    bench_of: Callable[[Observations], Bench],
     decision: Decision,
     model: StructuralModel,
     observations: Observations,
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
 ) -> Diagnosis:
-    """Look for a law; for one beside a linear cause where none explains by itself."""
+    """Look for a law, and for a linear cause beside it where it strains the model or none explains by itself."""
     laws = laws_of(model, observations)
-    if laws.verdict != UNEXPLAINED:
-        return _with_law(linear, laws)
-    beside = search_beside_linear(bench, decision, model, observations, laws_of) if bench.effects else None
+    if not bench.effects:
+        beside = None
+    elif laws.verdict == UNEXPLAINED:
+        beside = search_beside_linear(bench, decision, model, observations, laws_of)
+    else:
+        beside = search_beside_law(bench_of, laws, model, observations, laws_of)
     if beside is not None:
         law, cause = beside
         found = _with_law(linear, law)
         findings = tuple(sorted((*found.findings, cause), key=lambda finding: -finding.log_evidence_gain))
         return replace(found, findings=findings, statement=f"{found.statement} {cause.statement}")
     found = _with_law(linear, laws)
-    if found.findings or not linear.findings:
+    if laws.verdict != UNEXPLAINED or found.findings or not linear.findings:
         return found
     return replace(linear, verdict=UNEXPLAINED, statement=f"{laws.statement} {linear.statement}")
 

@@ -1,4 +1,7 @@
-"""A nonlinear law beside a linear cause: where no law explains by itself, the linear cause is taken out first."""
+"""A nonlinear law beside a linear cause: the one is taken out of the recordings, and the other is searched for.
+
+The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
 from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.restored import restore
+from frf_ipz.diagnosis.nonlinear.simulate import without_law
 from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.search import search
+from frf_ipz.diagnosis.search.search import fit_nothing, search
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 MOST_LEFT = 1 / 3  # of the linear misfit: a law's own traces are not explained so well by one linear cause
+STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
+EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
 
 
 def search_beside_linear(
@@ -64,3 +70,46 @@ def search_beside_linear(
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+
+
+def search_beside_law(
+    bench_of: Callable[[Observations], Bench],
+    laws: LawSearch,
+    model: StructuralModel,
+    observations: Observations,
+    search_laws: Callable[[StructuralModel, Observations], LawSearch],
+) -> tuple[LawSearch, Finding] | None:
+    """Search for a linear cause beside a law that explains.
+
+    Parameters
+    ----------
+    bench_of : callable
+        Brings the nominal model and what was measured together.
+    laws : LawSearch
+        The law that was found with the nominal model.
+    model : StructuralModel
+        The nominal model.
+    observations : Observations
+        What was measured.
+    search_laws : callable
+        From a model and what was measured to a law.
+
+    Returns
+    -------
+    tuple of LawSearch and Finding, or None
+        The law and the linear cause; None where the law does not strain the model, or no cause relieves it.
+    """
+    if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
+        return None
+    bench = bench_of(without_law(observations, laws.freedom, laws.fit))
+    null = fit_nothing(bench)
+    ranking = search(bench, null)
+    best = ranking.best
+    if best is null or gain_over(best, null) < LIMITS[bench.kind].found_nats or not is_significant(best, -1):
+        return None
+    change = best.hypothesis.change(best.values)
+    again = search_laws(with_change(model, change), restore(observations, change))
+    if again.verdict != EXPLAINED or again.strain > EASED * laws.strain:
+        return None
+    scale = max(1.0, best.mean_misfit)
+    return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)

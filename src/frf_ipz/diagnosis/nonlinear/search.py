@@ -124,6 +124,13 @@ class LawSearch:
         """No linear system explains the recordings."""
         return self.verdict != LINEAR
 
+    @property
+    def strain(self) -> float:
+        """Mean square of the lasting unknowns that the law was fitted with, in tolerances; 0 without a law."""
+        if self.fit is None or self.freedom is None:
+            return 0.0
+        return float(np.mean(self.fit.unknowns[: self.freedom.n_lasting] ** 2))
+
 
 def search_laws(
     model: StructuralModel,

@@ -6,7 +6,7 @@ It holds for motions of the place up to those that it was fitted to.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,10 +19,12 @@ from frf_ipz.diagnosis.nonlinear.recorded.stretches import FINER, Window, transf
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
+    from frf_ipz.diagnosis.nonlinear.fitting.march import March
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.observations import Observations
+    from frf_ipz.dofs import Dof
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,13 +75,8 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
     InputError
         If a record starts in motion.
     """
-    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows))
-    stretches = transform(observations, freedom.plant, read_noise(observations), whole)
-    if stretches.moving.any():
-        raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
-    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
-    done = march(fit.law, (fit.strength, fit.shape), place.yielding(constant=fit.law.holds), *place.without_law())
-    shown = _sensors(place, done.force)
+    place, done = _whole(observations, freedom, fit)
+    stretches, shown = place.stretches, _sensors(place, done.force)
     measured = _measured(observations, stretches)
     return Simulation(
         step_s=stretches.step_s,
@@ -89,6 +86,55 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
         force=done.force[:, ::FINER],
         misfit=_misfit(measured, shown, stretches.step_s, observations),
     )
+
+
+def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Observations:
+    """Take out of recordings what a law adds to them.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records that start at rest.
+    freedom : Freedom
+        Unknowns of the linear model that the law was fitted with.
+    fit : LawFit
+        The law at its place.
+
+    Returns
+    -------
+    Observations
+        As the structure would have answered without the law; what lies before a blow is left as it is.
+
+    Raises
+    ------
+    InputError
+        If a record starts in motion.
+    """
+    place, done = _whole(observations, freedom, fit)
+    added = _sensors(place, done.force) - _sensors(place, np.zeros_like(done.force))
+    blows, keys = list(observations.blows), _channels(observations)
+    for row, number in enumerate(place.stretches.blow_of):
+        blow, start = blows[number], place.stretches.first_sample[row]
+        left = blow.responses.copy()
+        for response, sensor in zip(left, blow.sensors, strict=True):
+            response[start : start + added.shape[-1]] -= added[row, keys.index((sensor.channel, sensor.dof))]
+        blows[number] = replace(blow, responses=left)
+    return replace(observations, blows=tuple(blows))
+
+
+def _whole(observations: Observations, freedom: Freedom, fit: LawFit) -> tuple[PlaceInTime, March]:
+    """Go through whole records."""
+    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows))
+    stretches = transform(observations, freedom.plant, read_noise(observations), whole)
+    if stretches.moving.any():
+        raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
+    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
+    yielding = place.yielding(constant=fit.law.holds)
+    return place, march(fit.law, (fit.strength, fit.shape), yielding, *place.without_law())
+
+
+def _channels(observations: Observations) -> list[tuple[str, Dof]]:
+    return list(dict.fromkeys((s.channel, s.dof) for blow in observations.blows for s in blow.sensors))
 
 
 def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
@@ -114,7 +160,7 @@ def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
 
 def _measured(observations: Observations, stretches: Stretches) -> FloatArray:
     found = np.zeros((stretches.n_blows, stretches.motion.shape[1], stretches.n_samples))
-    keys = list(dict.fromkeys((s.channel, s.dof) for blow in observations.blows for s in blow.sensors))
+    keys = _channels(observations)
     for row, number in enumerate(stretches.blow_of):
         blow, start = observations.blows[number], stretches.first_sample[row]
         for sensor, response in zip(blow.sensors, blow.responses, strict=True):

@@ -4,9 +4,12 @@ import pytest
 
 from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging import law_beside
+from frf_ipz.diagnosis.judging.law_beside import STRAINED
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import search_laws
-from frf_ipz.diagnosis.nonlinear.simulate import simulate
+from frf_ipz.diagnosis.nonlinear.simulate import simulate, without_law
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 CASES = {
@@ -100,3 +103,38 @@ def test_a_law_outside_the_catalogue_is_not_explained(chain, strike, law, words)
     assert found.verdict == "unexplained"
     assert words in found.statement
     assert dict(found.place) == {"nodes": [3]}
+
+
+def test_recordings_without_the_law_are_those_of_a_linear_chain(solved):
+    *_, observations, found = solved
+    rest = without_law(observations, found.freedom, found.fit)
+    assert assess_linearity(rest).score < 0.1 * found.linearity.score
+
+
+def test_a_law_alone_does_not_strain_the_model(solved):
+    assert solved[-1].strain < 0.1 * STRAINED
+
+
+@pytest.mark.parametrize(("strain", "again", "both"), [(50.0, 2.0, True), (50.0, 40.0, False), (5.0, 0.1, False)])
+def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, again, both):
+    """A spring gains 1000 nats on the recordings without the law."""
+    spring = SimpleNamespace(
+        log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=SimpleNamespace(change=lambda _: "change")
+    )
+    replaced = {
+        "without_law": lambda *_: "rest",
+        "fit_nothing": lambda _: SimpleNamespace(log_evidence=0.0),
+        "search": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
+        "is_significant": lambda *_: True,
+        "with_change": lambda *_: "changed model",
+        "restore": lambda *_: "restored",
+        "weigh": lambda *_: ["spring"],
+        "finding_of": lambda cause, *_: cause,
+    }
+    for name, stub in replaced.items():
+        monkeypatch.setattr(law_beside, name, stub)
+    laws = SimpleNamespace(strain=strain, fit="fit", freedom=SimpleNamespace(moving=()))
+    eased = SimpleNamespace(verdict="explained", strain=again)
+    bench = SimpleNamespace(kind="hammer")
+    found = law_beside.search_beside_law(lambda _: bench, laws, "model", "measured", lambda *_: eased)
+    assert found == ((eased, "spring") if both else None)
