@@ -144,11 +144,11 @@ def _decide(
         again = decide(freed, progress)
         if again.good.is_good:
             return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
-    if found.verdict == EXPLAINED and is_of_another_kind(found.final):
-        return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
-    another = find_another(bench, found) if found.verdict == EXPLAINED else None
+    another = find_another(bench, found) if found.final.is_nearly_all else None
     if another is not None:
         return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_another(another)
+    if found.verdict == EXPLAINED and is_of_another_kind(found.final):
+        return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
     return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
 
 
