@@ -174,10 +174,13 @@ def test_points_of_interest():
     def case(nominal, without, diagnosed):
         return Scored(judgement=RIGHT, points=PointErrors(nominal=nominal, without=without, diagnosed=diagnosed))
 
-    cases = [case(0.6, 0.15, 0.05), case(0.65, 0.16, 0.05), case(0.2, 0.04, 0.05)]
+    cases = [case(0.6, 0.16, 0.05), case(0.66, 0.14, 0.02), case(1.0, 0.09, 0.1)]
     group = "unmeasured points"
-    assert_allclose(bar(group, "nominal error over that with the diagnosis", *cases).value, 12, rtol=EXACT)
-    assert_allclose(bar(group, "error without a diagnosis over that with it", *cases).value, 3, rtol=EXACT)
+    for other, medians, ratios in (("of the nominal model", 13.2, 12.0), ("without a diagnosis", 2.8, 3.2)):
+        found = bar(group, f"median error {other} over that with the diagnosis", *cases)
+        assert_allclose(found.value, medians, rtol=EXACT)
+        found = bar(group, f"error {other} over that with the diagnosis, median", *cases)
+        assert_allclose(found.value, ratios, rtol=EXACT)
     worse = bar(group, "more than 10 % worse than without a diagnosis", *cases)
     assert (worse.rate.hits, worse.rate.count) == (1, 3)
 
