@@ -289,7 +289,10 @@ def _findings(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Fi
     if not causes:
         return ()
     if not found.further:
-        return (finding_of(weighed[0], gain_over(found.final, found.null), scale),)
+        only = finding_of(weighed[0], gain_over(found.final, found.null), scale)
+        return (
+            replace(only, is_significant=only.is_significant or found.verdict == EXPLAINED),
+        )  # nothing else would do
     competing = weigh(found.further[-1].fits, scale)
     newest = finding_of(competing[0], gain_over(found.final, found.further[-1].base), scale)
     older = [

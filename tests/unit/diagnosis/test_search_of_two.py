@@ -199,3 +199,10 @@ def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
     assert "0.35 % instead of 1 % at 287.1 Hz" in found.statement
     allowed = DiagnoseOptions(effects=("added_mass", "damping_level"), damping_tolerance=0.7)
     assert diagnose(nominal, observed(measured(true)), allowed).verdict == "consistent"
+
+
+def test_a_level_that_alone_explains_is_significant_though_not_far_beyond_its_tolerance(nominal):
+    true = replace(nominal, modal_damping=np.full(4, 0.0042))
+    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert found.verdict == "explained"
+    assert [(finding.effect, finding.is_significant) for finding in found.findings] == [("damping_level", True)]
