@@ -206,3 +206,11 @@ def test_a_level_that_alone_explains_is_significant_though_not_far_beyond_its_to
     found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
     assert found.verdict == "explained"
     assert [(finding.effect, finding.is_significant) for finding in found.findings] == [("damping_level", True)]
+
+
+@pytest.mark.parametrize("ratio", [0.002, 0.03])
+def test_a_level_far_from_the_stated_one_is_found_where_only_damping_is_wrong(nominal, ratio):
+    bench = bench_of(nominal, measured(replace(nominal, modal_damping=np.full(4, ratio))), ("damping_level",))
+    null = fit_nothing(bench)
+    assert null.is_nearly_right
+    assert search(bench, null).best.values[0] == pytest.approx(ratio, rel=SEEN)

@@ -104,7 +104,8 @@ def _direct(score: Score, cause: Cause) -> Start:
     sizes, gains = score.weigh(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
     if first.low < first.neutral < first.high:
-        value = neutral + size * (values - neutral)
+        step = size * (values - neutral)  # of a ratio, far along: a straight line would leave its bounds
+        value = neutral * float(np.exp(step / neutral)) if first.is_log else neutral + step
     elif size <= 0:
         value, gain = values, 0.0
     else:
