@@ -290,9 +290,8 @@ def _findings(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Fi
         return ()
     if not found.further:
         only = finding_of(weighed[0], gain_over(found.final, found.null), scale)
-        return (
-            replace(only, is_significant=only.is_significant or found.verdict == EXPLAINED),
-        )  # nothing else would do
+        is_needed = found.verdict == EXPLAINED  # nothing explains without it
+        return (replace(only, is_significant=only.is_significant or is_needed),)
     competing = weigh(found.further[-1].fits, scale)
     newest = finding_of(competing[0], gain_over(found.final, found.further[-1].base), scale)
     older = [
