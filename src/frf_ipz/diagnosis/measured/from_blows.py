@@ -23,7 +23,7 @@ LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms 
 UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
 BEFORE = 32  # samples before a blow that tell the noise
 MOST_BIAS = 0.5  # of the force's power that may be noise
-COMMON_PART = 1e-2  # of the largest: shared errors below are left out
+COMMON_PART = 1e-2  # of a line's own: independent parts of shared errors below are left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -340,6 +340,7 @@ def _common(found: Survey, place: int, points: _Lines) -> ComplexArray:
         force = points.force[:, column]
         total += np.outer(force.conj(), force) * window_energy(s, pulse)
     total *= np.outer(root, root) / np.outer(points.power, points.power)
-    values, vectors = linalg.eigh(total)
-    kept = values > COMMON_PART * values[-1]
-    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
+    own = np.sqrt(np.diag(total).real)  # lines that a shaker hardly drives err by far more than others
+    values, vectors = linalg.eigh(total / np.outer(own, own))
+    kept = values > COMMON_PART
+    return np.asarray(own[:, None] * vectors[:, kept] * np.sqrt(values[kept]))

@@ -211,4 +211,5 @@ def _block(
 def _directions(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Directions of shared errors, and the part of them that is more than variance 1 allows."""
     directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return directions, 1 - 1 / np.sqrt(1 + sizes**2)
+    strong = sizes**2 > NEGLIGIBLE
+    return np.ascontiguousarray(directions[:, strong]), 1 - 1 / np.sqrt(1 + sizes[strong] ** 2)

@@ -143,18 +143,27 @@ def _apart(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> f
 
 
 def _left(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
-    """Misfit of the best local quotient over its expectation; force and motion are (n_records, WIDTH)."""
+    """Misfit of the best local quotient over its expectation; force and motion are (n_records, WIDTH).
+
+    Where no resonance is near, poles follow the noise; any quotient that explains is a proof of linearity.
+    """
+    return min(_left_by(poles, force, motion, energies) for poles in (0, POLES))
+
+
+def _left_by(poles: int, force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+    """Misfit of the best of all rounds over its expectation; they may swing where a pole comes onto a line."""
     n_blows, n_lines = motion.shape
     powers = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(max(POLES, ZEROS, TRANSIENT) + 1)
-    below, above, ends = powers[:, 1 : POLES + 1], powers[:, : ZEROS + 1], powers[:, : TRANSIENT + 1]
+    below, above, ends = powers[:, 1 : poles + 1], powers[:, : ZEROS + 1], powers[:, : TRANSIENT + 1]
     common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_blows * n_lines, -1)
     columns = np.hstack([common, np.kron(np.eye(n_blows), ends)])
     denominator, frf = np.ones(n_lines, complex), np.zeros(n_lines, complex)
-    total = 0.0
+    least = np.inf
     for _ in range(ROUNDS):
         weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
         found, *_ = np.linalg.lstsq(columns * weight[:, None], motion.ravel() * weight, rcond=1e-12)
-        total = float(np.sum(np.abs((motion.ravel() - columns @ found) * weight) ** 2))
-        denominator = 1 + below @ found[:POLES]
-        frf = (above @ found[POLES : POLES + ZEROS + 1]) / denominator
-    return float(total / (motion.size - columns.shape[1]))
+        denominator = 1 + below @ found[:poles]
+        frf = (above @ found[poles : poles + ZEROS + 1]) / denominator
+        left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator
+        least = min(least, float(np.sum(np.abs(left) ** 2 / _variance(motion, frf, energies))))
+    return float(least / (motion.size - columns.shape[1]))

@@ -104,8 +104,10 @@ def _direct(score: Score, cause: Cause) -> Start:
     sizes, gains = score.weigh(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
     if first.low < first.neutral < first.high:
-        step = size * (values - neutral)  # of a ratio, far along: a straight line would leave its bounds
-        value = neutral * float(np.exp(step / neutral)) if first.is_log else neutral + step
+        step = size * (values - neutral)
+        if first.is_log:  # a ratio: a straight line would leave its bounds
+            step = neutral * float(np.expm1(min(step / neutral, np.log(first.high / neutral))))
+        value = neutral + step
     elif size <= 0:
         value, gain = values, 0.0
     else:

@@ -3,9 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, assess_linearity
+from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, _left, assess_linearity
 
 HALF_BAND = WIDTH / 2  # lines
+ACROSS = np.linspace(-1, 1, WIDTH)  # a group of lines
+LOUD = 0.2  # noise over the motion of the strongest record
+GROUPS = 50
 
 
 def test_blows_on_a_linear_chain_agree(strike):
@@ -30,3 +33,19 @@ def test_groups_of_lines_keep_out_of_what_is_left_out(strike):
     assert len(found.frequency_hz) > 4
     assert np.all((found.frequency_hz + spacing < low) | (found.frequency_hz - spacing > high))
     assert not found.is_nonlinear
+
+
+def test_a_local_quotient_does_not_follow_loud_noise():
+    """Where a system has no resonance, the poles of a quotient have only noise to go by."""
+    rng = np.random.default_rng(4)
+    misfits = []
+    for _ in range(GROUPS):
+        force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
+        motion = force * np.exp(-0.5 * ACROSS) + LOUD * drawn(rng, 3, WIDTH) + drawn(rng, 3, 1)
+        misfits.append(_left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, LOUD**2)])))
+    assert max(misfits) < 1.6  # of 1 that is expected: 66 squared moduli, the worst of many groups
+
+
+def drawn(rng, *shape):
+    """Complex numbers of variance 1."""
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
