@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
 SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
+FIRST = 40.0  # of those from which a rough start leads to a strong law
 LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
 WEAK, TWICE = 1.0, 2.0  # mean square that a linear model leaves below which stretches are longer, and how much
 LONGER_BY = 1.2  # times as long, where records are long enough
@@ -186,7 +187,8 @@ def search_laws(
 
     from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
     short, long = _tracks(track_of, from_rest=from_rest)
-    fits = find_candidates(short, long, laws)
+    first = partial(track_of, FIRST, ROUGH, loudest=False) if short.missed > WEAK else None
+    fits = find_candidates(short, long, laws, first=first)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
     if found.verdict == UNEXPLAINED:

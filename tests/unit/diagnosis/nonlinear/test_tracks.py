@@ -85,3 +85,29 @@ def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
     again = search._with_place(found, plant, search.AnyForce(place=0, cost=100 * left), track)
     assert bool(again.place) == said
+
+
+def a_law_at(place, cost):
+    return SimpleNamespace(law="cubic", place=place, cost=cost, n_rows=100, strength=1.0)
+
+
+@pytest.mark.parametrize(
+    ("by_short", "by_first", "expected"),
+    [(300.0, 150.0, [7, 3]), (300.0, 299.0, [3]), (60.0, 80.0, [7, 3]), (0.5, 0.2, [3])],
+)
+def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, by_short, by_first, expected):
+    """Place 7 is only seen in the first moments; on long stretches it leaves 50, and place 3 so much as by_short."""
+    costs = {("first", 7): 10.0, ("short", 7): by_first, ("short", 3): by_short, ("long", 7): 50.0}
+    costs["long", 3] = 400.0 if by_short > 1 else 90.0
+    monkeypatch.setattr(candidates, "_refined", lambda track, _: [a_law_at(7 if track == "first" else 3, 1.0)])
+    monkeypatch.setattr(
+        candidates,
+        "_simulated",
+        lambda track, fits, **_: [a_law_at(fit.place, costs[track, fit.place]) for fit in fits],
+    )
+    monkeypatch.setattr(candidates, "_of", lambda law, fits: [fit for fit in fits if fit.law == law])
+    monkeypatch.setattr(candidates, "_different", lambda fits: list({fit.place: fit for fit in fits}.values()))
+    monkeypatch.setattr(candidates, "_climb", lambda *_: None)
+    monkeypatch.setattr(candidates, "_settle", lambda *_: None)
+    found = candidates.find_candidates("short", "long", ["cubic"], first=lambda: "first")
+    assert [fit.place for fit in found] == expected

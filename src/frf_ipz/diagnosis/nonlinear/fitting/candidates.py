@@ -1,7 +1,8 @@
 """The laws and places that explain best: screened, refined, simulated, and their neighbours too.
 
 Short stretches first: within them even strongly nonlinear motion is predictable, and a rough start is good enough. What
-is best there is then fitted on the long ones, the best of all until it settles.
+is best there is then fitted on the long ones, the best of all until it settles. The stronger a law, the shorter the
+stretches from which a rough start leads to it: where even the first moments are nonlinear, they come first.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
@@ -30,6 +31,7 @@ FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that 
 HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
 HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
+BETTER = 0.02  # relative drop of the cost on short stretches, by a start from still shorter ones, that is worth more
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
 ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
@@ -70,7 +72,9 @@ class Track:
         return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
 
 
-def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawFit]:
+def find_candidates(
+    short: Track, long: Track, laws: Sequence[Law], *, first: Callable[[], Track] | None = None
+) -> list[LawFit]:
     """Find the laws and places that explain stretches best.
 
     Parameters
@@ -79,6 +83,8 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
         The data.
     laws : sequence of Law
         To be tried.
+    first : callable, optional
+        Gives still shorter stretches. They are asked where nothing explains the long ones as well as can be expected.
 
     Returns
     -------
@@ -86,16 +92,44 @@ def find_candidates(short: Track, long: Track, laws: Sequence[Law]) -> list[LawF
         Fits to the long stretches, the smallest cost first.
     """
     rough, late = _refined(short, laws), _refined(long, laws)
-    chosen = [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]]
-    early = _simulated(short, _different(chosen))
-    _climb(short, early)
-    early.sort(key=lambda fit: fit.cost)
+    early = _climbed(short, [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]])
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
-    fits = _simulated(long, _different(finalists), hopeless=HOPELESS_LATE)
-    _climb(long, fits)
-    if fits:
-        _settle(long, fits)
+    fits = _finished(long, finalists)
+    if first is None or (fits and fits[0].cost < fits[0].n_rows):
+        return fits
+    again = _climbed(short, _first(first(), laws))
+    if not again or again[0].cost > max(again[0].n_rows, (1 - BETTER) * early[0].cost if early else np.inf):
+        return fits
+    return _best_of_each(fits + _finished(long, again[:FINALISTS]))
+
+
+def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+    """Fit the first moments, and keep what is not hopeless of each law."""
+    refined = _refined(track, laws)
+    fits = _climbed(track, [fit for law in laws for fit in _of(law, refined)[:SIMULATED]])
+    kept = [fit for fit in fits if fit.cost <= HOPELESS * fits[0].cost]
+    return [fit for law in laws for fit in _of(law, kept)[:SIMULATED]]
+
+
+def _climbed(track: Track, starts: Iterable[LawFit]) -> list[LawFit]:
+    """Fit by simulation, and the neighbours of the best too; the smallest cost first."""
+    fits = _simulated(track, _different(starts))
+    _climb(track, fits)
     return sorted(fits, key=lambda fit: fit.cost)
+
+
+def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
+    """Fit to the long stretches, the best until it settles; the smallest cost first."""
+    fits = _simulated(track, _different(finalists), hopeless=HOPELESS_LATE)
+    _climb(track, fits)
+    if fits:
+        _settle(track, fits)
+    return sorted(fits, key=lambda fit: fit.cost)
+
+
+def _best_of_each(fits: Iterable[LawFit]) -> list[LawFit]:
+    """Keep the best fit of each law and place; the smallest cost first."""
+    return _different(sorted(fits, key=lambda fit: fit.cost))
 
 
 def _of(law: Law, fits: Iterable[LawFit]) -> list[LawFit]:
