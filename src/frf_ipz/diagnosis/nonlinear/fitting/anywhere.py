@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 DEAD_ZONES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # parts of the largest motion
-YIELDS = (0.02, 0.06, 0.2)  # parts of the largest motion: a spring slips beyond
+YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring slips beyond; all of them, gradually
 STEEP = 3e-3  # of the largest velocity: below, friction grows with it
 FEW_TURNS, MANY_TURNS = 3, 8
 FINALISTS = 4  # places that are fitted on long stretches
