@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from frf_ipz.diagnosis.nonlinear import search
+from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
 
 
@@ -88,26 +89,62 @@ def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly
 
 
 def a_law_at(place, cost):
-    return SimpleNamespace(law="cubic", place=place, cost=cost, n_rows=100, strength=1.0)
+    return SimpleNamespace(law=SimpleNamespace(name="cubic"), place=place, cost=cost, n_rows=100, strength=1.0)
 
 
 @pytest.mark.parametrize(
     ("by_short", "by_first", "expected"),
-    [(300.0, 150.0, [7, 3]), (300.0, 299.0, [3]), (60.0, 80.0, [7, 3]), (0.5, 0.2, [3])],
+    [(300.0, 150.0, [7, 3]), (300.0, 299.0, [3]), (60.0, 80.0, [7, 3]), (0.5, 0.2, [3]), (300.0, 99.0, [3])],
 )
 def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, by_short, by_first, expected):
-    """Place 7 is only seen in the first moments; on long stretches it leaves 50, and place 3 so much as by_short."""
-    costs = {("first", 7): 10.0, ("short", 7): by_first, ("short", 3): by_short, ("long", 7): 50.0}
+    """A linear model leaves 100 of the first moments, the law at place 7 leaves 10, or 90 in the last case."""
+    tracks = {
+        name: SimpleNamespace(name=name, linear=SimpleNamespace(cost=100.0)) for name in ("first", "short", "long")
+    }
+    costs = {
+        ("first", 7): 90.0 if by_first == 99.0 else 10.0,
+        ("short", 7): by_first,
+        ("short", 3): by_short,
+        ("long", 7): 50.0,
+    }
     costs["long", 3] = 400.0 if by_short > 1 else 90.0
-    monkeypatch.setattr(candidates, "_refined", lambda track, _: [a_law_at(7 if track == "first" else 3, 1.0)])
+    monkeypatch.setattr(candidates, "_refined", lambda track, _: [a_law_at(7 if track.name == "first" else 3, 1.0)])
     monkeypatch.setattr(
         candidates,
         "_simulated",
-        lambda track, fits, **_: [a_law_at(fit.place, costs[track, fit.place]) for fit in fits],
+        lambda track, fits, **_: [a_law_at(fit.place, costs[track.name, fit.place]) for fit in fits],
     )
-    monkeypatch.setattr(candidates, "_of", lambda law, fits: [fit for fit in fits if fit.law == law])
+    monkeypatch.setattr(candidates, "_of", lambda law, fits: [fit for fit in fits if fit.law.name == law])
     monkeypatch.setattr(candidates, "_different", lambda fits: list({fit.place: fit for fit in fits}.values()))
     monkeypatch.setattr(candidates, "_climb", lambda *_: None)
     monkeypatch.setattr(candidates, "_settle", lambda *_: None)
-    found = candidates.find_candidates("short", "long", ["cubic"], first=lambda: "first")
+    found = candidates.find_candidates(tracks["short"], tracks["long"], ["cubic"], first=lambda: tracks["first"])
     assert [fit.place for fit in found] == expected
+
+
+@pytest.mark.parametrize(
+    ("left", "drop", "disagree", "explains"),
+    [(90.0, 50.0, 2.0, True), (200.0, 50.0, 2.0, False), (90.0, 200.0, 2.0, False), (90.0, 50.0, 50.0, False)],
+)
+def test_a_law_that_explains_all_but_little_of_the_first_moments_is_believed(
+    monkeypatch, left, drop, disagree, explains
+):
+    """A linear model leaves 10000 there; errors of the model imitate a bend of 100."""
+    moving = SimpleNamespace(any=lambda: False)
+    short = SimpleNamespace(
+        stretches=SimpleNamespace(moving=moving),
+        linear=SimpleNamespace(cost=1e4, freedom=None),
+        shoot_afresh=lambda *_: SimpleNamespace(cost=left, n_rows=300, misfit=None),
+    )
+    monkeypatch.setattr(search, "agreement_with", lambda *_: Agreement(1e4, disagree))
+    monkeypatch.setattr(search, "relative_misfit", lambda *_: 0.03)
+    monkeypatch.setattr(search, "_bend", lambda *_: drop)
+    assert search._explains_first(short, SimpleNamespace()) == explains
+
+
+def test_what_leads_to_the_same_law_or_nowhere_is_not_fitted_again():
+    law = SimpleNamespace(name="cubic")
+    fits = [
+        SimpleNamespace(law=law, place=place, cost=cost, n_rows=100) for place, cost in ((3, 50), (7, 90), (8, 500))
+    ]
+    assert candidates._others(fits, fits[:1]) == fits[1:2]

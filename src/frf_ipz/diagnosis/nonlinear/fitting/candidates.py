@@ -31,6 +31,7 @@ FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that 
 HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
 HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
+MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
 BETTER = 0.02  # relative drop of the cost on short stretches, by a start from still shorter ones, that is worth more
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
@@ -100,15 +101,22 @@ def find_candidates(
     again = _climbed(short, _first(first(), laws))
     if not again or again[0].cost > max(again[0].n_rows, (1 - BETTER) * early[0].cost if early else np.inf):
         return fits
-    return _best_of_each(fits + _finished(long, again[:FINALISTS]))
+    return _best_of_each(fits + _finished(long, _others(again[:FINALISTS], fits[:1])))
 
 
 def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:
-    """Fit the first moments, and keep what is not hopeless of each law."""
+    """Fit the first moments, and keep of each law what explains most of what nothing linear does."""
     refined = _refined(track, laws)
     fits = _climbed(track, [fit for law in laws for fit in _of(law, refined)[:SIMULATED]])
-    kept = [fit for fit in fits if fit.cost <= HOPELESS * fits[0].cost]
+    kept = [fit for fit in fits if fit.cost < min(MOST_LEFT * track.linear.cost, HOPELESS * fits[0].cost)]
     return [fit for law in laws for fit in _of(law, kept)[:SIMULATED]]
+
+
+def _others(fits: Sequence[LawFit], known: Sequence[LawFit]) -> list[LawFit]:
+    """Keep what is not hopeless, and no law at a place that is known: that was fitted afresh already."""
+    most = HOPELESS_LATE * max(fits[0].cost, fits[0].n_rows)
+    had = {(fit.law.name, fit.place) for fit in known}
+    return [fit for fit in fits if fit.cost <= most and (fit.law.name, fit.place) not in had]
 
 
 def _climbed(track: Track, starts: Iterable[LawFit]) -> list[LawFit]:
