@@ -17,7 +17,9 @@ from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.search import fit_nothing, search, search_beside
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
@@ -30,6 +32,7 @@ SEEN = 0.02  # relative: noise of 0.1 % of the FRFs, tolerances of 0.1 % of the 
 WEAK_N_M = 45.0  # so little that the mass alone leaves nothing to explain
 ROUNDING = 1e-9  # of the largest entry
 ATTACHED = shipped_effects()["attached_resonator"]
+SMALL_GAIN = 0.96  # tolerances of gains are half a per cent
 GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
 
 
@@ -214,3 +217,23 @@ def test_a_level_far_from_the_stated_one_is_found_where_only_damping_is_wrong(no
     null = fit_nothing(bench)
     assert null.is_nearly_right
     assert search(bench, null).best.values[0] == pytest.approx(ratio, rel=SEEN)
+
+
+def test_a_small_gain_is_not_taken_for_a_wrong_sign(nominal):
+    frfs = measured(nominal, factors=lambda _: np.array([[SMALL_GAIN, 1.0]]))
+    bench = bench_of(nominal, frfs, ("sensor_gain",))
+    starts = close_search(bench, fit_nothing(bench))
+    best = min(starts, key=lambda start: start.cost)
+    assert best.cause.place.key == ("acc_1", 1)
+    assert SMALL_GAIN < best.values[0] < 1  # tolerances take their part
+    assert all(start.cost > 0 for start in starts if start.cause.place.key[1] == -1)
+
+
+def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(nominal):
+    """A resonator stands for a mass and a spring as long as nothing stands beside it."""
+    true = with_springs(with_point_masses(nominal, {12: 0.005}), {Dof(8, "z"): 3 * WEAK_N_M})
+    bench = bench_of(nominal, measured(true), ("added_mass", "grounded_spring", "attached_resonator"))
+    first = search(bench, fit_nothing(bench))
+    assert first.best.hypothesis.causes[0].effect.name == "attached_resonator"
+    found = search_second(bench, first, lambda _: True)
+    assert [cause.effect.name for cause in found.best.hypothesis.causes] == ["added_mass", "grounded_spring"]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 COLUMNS = 600  # signatures that are weighed together
 BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear
 LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
+FADING = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
 
 
 def close_search(bench: Bench, base: Fit) -> list[Start]:
@@ -101,6 +102,9 @@ def _direct(score: Score, cause: Cause) -> Start:
     changed = score.change(hypothesis, np.array([values, *rest]))
     if first.low < first.neutral < first.high:
         changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
+    elif not _fades(changed, score.change(hypothesis, np.array([_twice(first, values), *rest]))):
+        middle = np.array([float(np.sqrt(first.low * first.high)), *rest])
+        return Start(cause=cause, values=middle, cost=-score.at(hypothesis, middle))
     sizes, gains = score.weigh(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
     if first.low < first.neutral < first.high:
@@ -113,6 +117,15 @@ def _direct(score: Score, cause: Cause) -> Start:
     else:
         value = values * size if first.neutral == 0 else values / size
     return Start(cause=cause, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain)
+
+
+def _fades(change: ComplexArray, of_twice: ComplexArray) -> bool:
+    """Whether an effect vanishes with its parameter; a sensor that is turned round does not."""
+    return bool(np.linalg.norm(of_twice) > FADING * np.linalg.norm(change))
+
+
+def _twice(parameter: Parameter, value: float) -> float:
+    return value / 2 if np.isinf(parameter.neutral) else 2 * value
 
 
 def _small(parameter: Parameter) -> tuple[float, float]:

@@ -22,10 +22,12 @@ from frf_ipz.diagnosis.search.search import (
     GAIN,
     Fits,
     Ranking,
+    by_effect,
     climb_all,
     how_many,
     ranked,
     search,
+    search_beside,
 )
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
+OTHERS = 3  # first causes that are tried where a pair explains all
+PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
 FIRSTS, NOT_FAR = 8, 3.0  # causes that get companions, and times the best cost
 COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
 STEPPED, NOT_MUCH = 8, 2.0  # pairs whose neighbours are looked at far from the axis, and times the best cost
@@ -66,11 +70,22 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     is_open = first.refined and not first.best.is_nearly_all
     if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in found):
         found.append(_of_pairs(bench, first))
+    best = _likeliest(found)
+    return _likeliest([best, *_from_others(bench, first, best.best)]) if is_good(best.best) else best
+
+
+def _likeliest(found: list[Ranking]) -> Ranking:
     best = found[0]
     for ranking in found[1:]:
         if ranking.best.log_evidence > best.best.log_evidence + GAIN:
             best = ranking
     return best
+
+
+def _from_others(bench: Bench, first: Ranking, best: Fit) -> list[Ranking]:
+    """Search beside other first causes: one with parameters of its own may have stood for both."""
+    others = [fits[0] for fits in by_effect(first.fits)[1 : 1 + OTHERS] if fits[0].is_nearly_right]
+    return [search_beside(bench, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others]
 
 
 def _newest_alone(bench: Bench, fit: Fit) -> Fit:
