@@ -142,9 +142,8 @@ def test_a_law_that_explains_all_but_little_of_the_first_moments_is_believed(
     assert search._explains_first(short, SimpleNamespace()) == explains
 
 
-def test_what_leads_to_the_same_law_or_nowhere_is_not_fitted_again():
+def test_what_leads_to_the_same_law_is_not_fitted_again():
     law = SimpleNamespace(name="cubic")
-    fits = [
-        SimpleNamespace(law=law, place=place, cost=cost, n_rows=100) for place, cost in ((3, 50), (7, 90), (8, 500))
-    ]
-    assert candidates._others(fits, fits[:1]) == fits[1:2]
+    fits = [SimpleNamespace(law=law, place=place) for place in (3, 7, 8)]
+    assert candidates._others(fits, fits[:1]) == []
+    assert candidates._others(fits, fits[1:2]) == [fits[0], fits[2]]

@@ -113,10 +113,10 @@ def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:
 
 
 def _others(fits: Sequence[LawFit], known: Sequence[LawFit]) -> list[LawFit]:
-    """Keep what is not hopeless, and no law at a place that is known: that was fitted afresh already."""
-    most = HOPELESS_LATE * max(fits[0].cost, fits[0].n_rows)
+    """Leave out laws at places that are known, which were fitted afresh already; all, if the best is one of them."""
     had = {(fit.law.name, fit.place) for fit in known}
-    return [fit for fit in fits if fit.cost <= most and (fit.law.name, fit.place) not in had]
+    new = [fit for fit in fits if (fit.law.name, fit.place) not in had]
+    return new if new[:1] == list(fits[:1]) else []
 
 
 def _climbed(track: Track, starts: Iterable[LawFit]) -> list[LawFit]:
