@@ -159,11 +159,14 @@ def step_change(world: World, drives: tuple[Drive, ...], signals: FloatArray) ->
     Returns
     -------
     float
-        Change of the responses to the loudest blow within the band, norm over norm.
+        Change of the responses to the loudest blow within the band, norm over norm; infinite where they run away.
     """
     set_up = world.set_up
     loudest = int(np.argmax(np.abs(signals[:, 0]).max(axis=1)))
-    coarse, _ = true_records(world, (drives[loudest],), grid=make_grid(world, refine=0.5))
+    try:
+        coarse, _ = true_records(world, (drives[loudest],), grid=make_grid(world, refine=0.5))
+    except FloatingPointError:
+        return float("inf")
     index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
     a, b = (np.fft.rfft(one[1:], axis=-1)[:, index] for one in (coarse[0], signals[loudest]))
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))

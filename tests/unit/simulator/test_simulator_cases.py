@@ -58,6 +58,9 @@ TABLE = {  # of the contract: what a location and the parameters of each effect 
 LINEAR = [name for name in CONTRACT if name not in NONLINEAR]
 
 
+RUNS_AWAY = 103000050  # the seed of a stiff stop
+
+
 def test_the_simulator_shares_no_code_with_the_package():
     imported = {
         name.split(".")[0]
@@ -344,3 +347,7 @@ def test_many_truths_without_scatter_are_their_nominal_models(kind):
         assert check.frequency < 1e-3
         assert check.median < 4e-3
         assert check.exact < SIMULATION
+
+
+def test_a_law_that_runs_away_at_twice_the_step_is_drawn_again():
+    assert make_case(RUNS_AWAY, "gap_contact", analyse=False).truth["attempt"] > 0
