@@ -56,8 +56,6 @@ TABLE = {  # of the contract: what a location and the parameters of each effect 
     "dry_friction": ({"nodes", "springs"}, {"friction_N"}),
 }
 LINEAR = [name for name in CONTRACT if name not in NONLINEAR]
-
-
 RUNS_AWAY = 103000050  # the seed of a stiff stop
 
 
