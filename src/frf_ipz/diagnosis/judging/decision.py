@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.judging.verdict import LIMITS, PARTIAL_NATS, STRONG_NATS,
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
+from frf_ipz.diagnosis.search.ties import settle_ties
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -70,7 +71,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     null = fit_nothing(bench)
     null_good = goodness(bench, null)
     progress(0.3, "searching for one cause")
-    ranking = search(bench, null)
+    ranking = settle_ties(bench, search(bench, null))
     best = ranking.best
     good = goodness(bench, best)
     one = Decision(
@@ -81,9 +82,9 @@ def decide(bench: Bench, progress: Progress) -> Decision:
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
     progress(0.6, "searching for a second cause")
     if good.is_good:
-        second = search_beside(bench, best, LIMITS[bench.kind].beside_nats)
+        second = settle_ties(bench, search_beside(bench, best, LIMITS[bench.kind].beside_nats))
         return _beside(bench, one, second) or one
-    second = search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good)
+    second = settle_ties(bench, search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good))
     two = _beside(bench, one, second)
     if two is None:
         return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > needed else null)
@@ -93,7 +94,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     if two.verdict == EXPLAINED or not two.final.is_nearly_right or gain_over(second.best, second.base) < STRONG_NATS:
         return two
     progress(0.8, "searching for a third cause")
-    three = _beside(bench, two, search(bench, second.best))
+    three = _beside(bench, two, search_beside(bench, second.best, STRONG_NATS))
     return three if three is not None and three.verdict == EXPLAINED else two
 
 

@@ -19,7 +19,7 @@ Methods in Physics Research A 346 (1994) 306-311.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -170,6 +170,15 @@ class Nuisance:
         cords, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
         shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
         return np.concatenate([own, own, self.is_stated, cords, shifts, local, gains])
+
+    def with_part(self, part: float) -> Nuisance:
+        """Give the same with a part of the tolerances of stiffness, mass and frequencies."""
+        return replace(self, kappa_std=part * self.kappa_std, mu_std=part * self.mu_std)
+
+    def in_parts(self, values: FloatArray, part: float) -> FloatArray:
+        """Give the same state in the standard deviations of `with_part`."""
+        n_fields = sum(self.sizes[:2])
+        return np.concatenate([values[:n_fields] / part, values[n_fields:]])
 
     def pulls(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
         """Give the square roots of twice the prior's cost, and their slopes.
