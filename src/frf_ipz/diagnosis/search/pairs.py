@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
-OTHERS = 3  # first causes that are tried where a pair explains all
+OTHERS = 3  # first causes that are tried where a pair explains nearly all
 PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
 FIRSTS, NOT_FAR = 8, 3.0  # causes that get companions, and times the best cost
 COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
@@ -71,7 +71,7 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in found):
         found.append(_of_pairs(bench, first))
     best = _likeliest(found)
-    return _likeliest([best, *_from_others(bench, first, best.best)]) if is_good(best.best) else best
+    return _likeliest([best, *_from_others(bench, first, best.best)]) if best.best.is_nearly_all else best
 
 
 def _likeliest(found: list[Ranking]) -> Ranking:
