@@ -172,11 +172,35 @@ class Nuisance:
         return np.concatenate([own, own, self.is_stated, cords, shifts, local, gains])
 
     def with_part(self, part: float) -> Nuisance:
-        """Give the same with a part of the tolerances of stiffness, mass and frequencies."""
+        """Give the same with a part of the tolerances of stiffness, mass and frequencies.
+
+        Parameters
+        ----------
+        part : float
+            Of each standard deviation of `kappa` and `mu`.
+
+        Returns
+        -------
+        Nuisance
+            With the same parameters.
+        """
         return replace(self, kappa_std=part * self.kappa_std, mu_std=part * self.mu_std)
 
     def in_parts(self, values: FloatArray, part: float) -> FloatArray:
-        """Give the same state in the standard deviations of `with_part`."""
+        """Give the same state in the standard deviations of `with_part`.
+
+        Parameters
+        ----------
+        values : (size,) array
+            Parameters in standard deviations.
+        part : float
+            As for `with_part`.
+
+        Returns
+        -------
+        (size,) array
+            Parameters in the other standard deviations.
+        """
         n_fields = sum(self.sizes[:2])
         return np.concatenate([values[:n_fields] / part, values[n_fields:]])
 

@@ -99,15 +99,16 @@ def _direct(score: Score, cause: Cause) -> Start:
     first, *others = hypothesis.parameters[len(score.base.values) :]
     rest = [float(np.sqrt(parameter.low * parameter.high)) for parameter in others]
     neutral, values = _small(first)
+    is_between = first.low < first.neutral < first.high
     changed = score.change(hypothesis, np.array([values, *rest]))
-    if first.low < first.neutral < first.high:
+    if is_between:
         changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
     elif not _fades(changed, score.change(hypothesis, np.array([_twice(first, values), *rest]))):
         middle = np.array([float(np.sqrt(first.low * first.high)), *rest])
         return Start(cause=cause, values=middle, cost=-score.at(hypothesis, middle))
     sizes, gains = score.weigh(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
-    if first.low < first.neutral < first.high:
+    if is_between:
         step = size * (values - neutral)
         if first.is_log:  # a ratio: a straight line would leave its bounds
             step = neutral * float(np.expm1(min(step / neutral, np.log(first.high / neutral))))
