@@ -20,7 +20,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.search import fit_nothing, search, search_beside
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
 from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
@@ -239,6 +239,15 @@ def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(n
     assert first.best.hypothesis.causes[0].effect.name == "attached_resonator"
     found = search_second(bench, first, lambda _: True)
     assert [cause.effect.name for cause in found.best.hypothesis.causes] == ["added_mass", "grounded_spring"]
+
+
+def test_the_first_of_two_causes_is_placed_anew_beside_the_second(nominal):
+    true = with_springs(with_point_masses(nominal, {12: 0.002}), {Dof(8, "z"): 3e3})
+    bench, mass = bench_of(nominal, measured(true), ("grounded_spring",)), shipped_effects()["added_mass"]
+    beside = next(place for place in mass.places(bench.specimen) if place.location == {"nodes": [13]})
+    wrong = bench.fit((Cause(effect=mass, place=beside, n_places=16),), np.array([0.002]))
+    found = search_second(bench, Ranking(base=fit_nothing(bench), fits=(wrong,), n_tried=1), lambda _: True)
+    assert {cause.key[:2] for cause in found.best.hypothesis.causes} == {("added_mass", 12), ("grounded_spring", 8)}
 
 
 def test_a_place_that_needs_more_of_the_tolerances_falls_behind_where_the_model_is_better(nominal):

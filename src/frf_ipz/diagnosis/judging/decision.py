@@ -71,13 +71,15 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     null = fit_nothing(bench)
     null_good = goodness(bench, null)
     progress(0.3, "searching for one cause")
-    ranking = settle_ties(bench, search(bench, null))
+    ranking = search(bench, null)
+    needed = LIMITS[bench.kind].found_nats
+    if not null_good.is_good or gain_over(ranking.best, null) >= needed:
+        ranking = settle_ties(bench, ranking)
     best = ranking.best
     good = goodness(bench, best)
     one = Decision(
         verdict=EXPLAINED, null=null, final=best, ranking=ranking, further=(), good=good, null_good=null_good
     )
-    needed = LIMITS[bench.kind].found_nats
     if null_good.is_good and (gain_over(best, null) < needed or not is_significant(best, -1)):
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
     progress(0.6, "searching for a second cause")

@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.search.far.refine import refine
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spread, step_far
 from frf_ipz.diagnosis.search.far.wide import wide_search
-from frf_ipz.diagnosis.search.fit import Fit
+from frf_ipz.diagnosis.search.fit import VERY_NEARLY, Fit
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import (
     GAIN,
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
 OTHERS = 3  # first causes that are tried where a pair explains nearly all
+MOST_LEFT = 0.8  # of the cost of one cause: where a second leaves more, the first is not searched anew beside it
+NEAR_NATS = 100.0  # behind the best pair: such a pair's causes are stepped to better places
 PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
 FIRSTS, NOT_FAR = 8, 3.0  # causes that get companions, and times the best cost
 COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
@@ -66,12 +68,14 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     if first.best.is_nearly_right or not first.refined:
         beside = search(bench, first.best)
         found.append(beside)
-        if beside.fits and not is_good(beside.best):
+        if beside.fits and not is_good(beside.best) and beside.best.cost < MOST_LEFT * first.best.cost:
             found.append(search(bench, _newest_alone(bench, beside.best)))
     is_open = first.refined and not first.best.is_nearly_all
     if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in found):
-        found.append(_of_pairs(bench, first))
+        found += _of_pairs(bench, first, min((ranking.best.cost for ranking in found), default=np.inf))
     best = _likeliest(found)
+    if best.fits and best.best.mean_misfit <= VERY_NEARLY:
+        best = _settled(bench, best)
     return _likeliest([best, *_from_others(bench, first, best.best)]) if best.best.is_nearly_all else best
 
 
@@ -86,7 +90,28 @@ def _likeliest(found: list[Ranking]) -> Ranking:
 def _from_others(bench: Bench, first: Ranking, best: Fit) -> list[Ranking]:
     """Search beside other first causes: one with parameters of its own may have stood for both."""
     others = [fits[0] for fits in by_effect(first.fits)[1 : 1 + OTHERS] if fits[0].is_nearly_right]
-    return [search_beside(bench, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others]
+    found = [search_beside(bench, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others]
+    return [_settled(bench, pairs) if _is_near(pairs.best, best) else pairs for pairs in found]
+
+
+def _is_near(pair: Fit, best: Fit) -> bool:
+    return len(pair.hypothesis.causes) > 1 and pair.log_evidence > best.log_evidence - NEAR_NATS
+
+
+def _settled(bench: Bench, pairs: Ranking) -> Ranking:
+    """Step both causes of the best pair to better places: the first was placed when it was alone."""
+    best = _climbed(bench, _climbed(bench, pairs.best))
+    if best.log_evidence < pairs.best.log_evidence + GAIN:
+        return pairs
+    return _around(bench, best, pairs.n_tried)
+
+
+def _around(bench: Bench, best: Fit, n_tried: int) -> Ranking:
+    """Look at all neighbours of the last cause of a pair."""
+    base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
+    fits: Fits = {best.hypothesis.causes[-1].key: best}
+    climb_all(bench, base, fits)
+    return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried)
 
 
 def _newest_alone(bench: Bench, fit: Fit) -> Fit:
@@ -94,7 +119,8 @@ def _newest_alone(bench: Bench, fit: Fit) -> Fit:
     return bench.fit((fit.hypothesis.causes[-1],), fit.values[len(fit.values) - count :])
 
 
-def _of_pairs(bench: Bench, first: Ranking) -> Ranking:
+def _of_pairs(bench: Bench, first: Ranking, known: float) -> list[Ranking]:
+    """Search for pairs far from the axis; the best one is kept, and stepped to better places, if it beats a cost."""
     starts = spread(first.refined, 1)[:FIRSTS]
     pairs: list[tuple[Cause, Start]] = []
     for start in starts:
@@ -102,12 +128,11 @@ def _of_pairs(bench: Bench, first: Ranking) -> Ranking:
             pairs += [(start.cause, both) for both in _companions(bench, start)]
     exact = [bench.fit_from(fit) for fit in _early(bench, pairs)]
     best = max(exact, key=lambda fit: fit.log_evidence)
+    if best.cost > known:
+        return []
     if not best.is_hopeless:
         best = _climbed(bench, _climbed(bench, best))
-    base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
-    fits: Fits = {best.hypothesis.causes[-1].key: best}
-    climb_all(bench, base, fits)
-    return Ranking(base=base, fits=ranked(bench, fits), n_tried=first.n_tried * len(starts))
+    return [_around(bench, best, first.n_tried * len(starts))]
 
 
 def _early(bench: Bench, pairs: list[tuple[Cause, Start]]) -> list[Fit]:

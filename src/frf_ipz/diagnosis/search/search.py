@@ -25,15 +25,16 @@ Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
 
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
-PROMISING = 2.0  # nats that a linear step promises: with less, a hypothesis is not fitted
+PROMISING = 5.0  # nats that a linear step promises: with less, a hypothesis is not fitted
 MOST_OF_IT = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
 PROMISED_PART = 0.5  # of what a fit gains: what a linear step on fewer points must promise of it
-KEPT_PROMISE = 0.5  # of what a linear step promises: a fit that reaches less begins anew
+BROKEN, BROKEN_PART = 10.0, 0.5  # nats, and of what a linear step promises: a fit that lacks more begins anew
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
-CLIMBED = 6  # effects whose neighbours are looked at
+CLIMBED, CLIMBED_VAINLY = 6, 2  # effects whose neighbours are looked at, and where no further cause explains much
+VAIN = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
 HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
 GAIN = 0.5  # nats: a neighbour must be better by that
 SETTLED = 2  # fits that go on until they converge
@@ -116,7 +117,8 @@ def search(bench: Bench, base: Fit) -> Ranking:
         fits = _fitted(bench, base, refined)
     if not base.is_hopeless:
         n_tried += _add_close(bench, base, fits)
-    climb_all(bench, base, fits)
+    if fits and (n_effects := _how_many_climb(base, fits)):
+        climb_all(bench, base, fits, n_effects)
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
 
 
@@ -162,7 +164,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
     for start in _most_promising(found, PROMISED_PART * least):
         _keep(fits, _fit_close(bench, base, start))
     if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
-        climb_all(bench, base, fits)
+        climb_all(bench, base, fits, _how_many_climb(base, fits))
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=len(found))
 
 
@@ -175,7 +177,7 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     for start in starts:
         fit = _fit_close(bench, base, start)
         _keep(fits, fit)
-        if fit.cost > base.cost + KEPT_PROMISE * start.cost:
+        if fit.cost - base.cost - start.cost > max(BROKEN, -BROKEN_PART * start.cost):
             _keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values])))
     return len(found)
 
@@ -241,7 +243,7 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
             _keep(fits, bench.fit_from(fit))
 
 
-def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
+def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> None:
     """Step to neighbours as long as that makes an effect more probable.
 
     Parameters
@@ -252,6 +254,8 @@ def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
         What is supposed already.
     fits : dict
         By the key of their last cause, whose place is changed; new fits are added.
+    n_effects : int
+        The best ones that are stepped.
     """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     if ranked and not ranked[0].is_hopeless:
@@ -260,11 +264,20 @@ def climb_all(bench: Bench, base: Fit, fits: Fits) -> None:
     leaders: dict[str, Fit] = {}
     for fit in ranked:
         leaders.setdefault(fit.hypothesis.causes[-1].effect.name, fit)
-    for leader in list(leaders.values())[:CLIMBED]:
+    for leader in list(leaders.values())[:n_effects]:
         best = max(fits.values(), key=lambda fit: fit.log_evidence)
         behind = BEHIND if best.is_nearly_all else HOPELESS
         if leader.log_evidence > best.log_evidence - behind and not leader.is_hopeless:
             _climb(bench, base, leader, fits)
+
+
+def _how_many_climb(base: Fit, fits: Fits) -> int:
+    """Say how many effects are worth steps: few, where much is left beside known causes and none explains it."""
+    found = list(fits.values())
+    if base.is_nearly_all:
+        return CLIMBED if max(fit.log_evidence for fit in found) > base.log_evidence + GAIN else 0
+    is_vain = bool(base.hypothesis.causes) and min(fit.cost for fit in found) > VAIN * base.cost
+    return CLIMBED_VAINLY if is_vain else CLIMBED
 
 
 def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:

@@ -170,10 +170,14 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
 def _simulated(
     track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
 ) -> list[LawFit]:
-    """Fit by simulation; those that stay hopeless after a few steps, against the least cost, only so far."""
-    found = [track.shoot(fit, FIRST) for fit in fits]
-    least = min(least, *(fit.cost for fit in found)) if found else least
-    return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
+    """Fit by simulation, the best first; what is hopeless after a few steps, against the least cost, only so far."""
+    found = sorted((track.shoot(fit, FIRST) for fit in fits), key=lambda fit: fit.cost)
+    for index, fit in enumerate(found):
+        least = min(least, fit.cost)
+        if not fit.settled and fit.cost <= hopeless * least:
+            found[index] = track.shoot(fit, MORE)
+            least = min(least, found[index].cost)
+    return found
 
 
 def _settle(track: Track, fits: list[LawFit]) -> None:
