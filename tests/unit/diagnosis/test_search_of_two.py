@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.catalogue.together import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
-from frf_ipz.diagnosis.judging.verdict import LIMITS
+from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
@@ -103,6 +103,19 @@ def test_a_small_cause_beside_one_that_explains_nearly_all_is_named(nominal, mon
     found = decide(bench, silent)
     assert [cause.effect.name for cause in found.final.hypothesis.causes] == ["added_mass", "grounded_spring"]
     assert found.further[0].base.hypothesis.causes[0].place.location == {"nodes": [12]}
+
+
+@pytest.mark.parametrize(("part", "verdict"), [(0.95, "consistent"), (0.8, "explained")])
+def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is_asked(
+    nominal, monkeypatch, part, verdict
+):
+    """Errors that are underrated make something out of nothing: the piece is 1.13 times the expected misfit."""
+    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: 1.5 * LITTLE_KG})), ("added_mass",))
+    null = fit_nothing(bench)
+    gain = search(bench, null).best.log_evidence - null.log_evidence
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], found_nats=part * gain))
+    assert 1 / 0.95 < goodness(bench, null).worst_piece < 1 / 0.8
+    assert decide(bench, silent).verdict == verdict
 
 
 def test_nothing_is_added_to_a_cause_that_explains_all(nominal):
