@@ -20,7 +20,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
+from frf_ipz.diagnosis.search.search import CLOSE_EACH, Ranking, fit_nothing, search, search_beside
 from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
@@ -116,6 +116,15 @@ def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is
     monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], found_nats=part * gain))
     assert 1 / 0.95 < goodness(bench, null).worst_piece < 1 / 0.8
     assert decide(bench, silent).verdict == verdict
+
+
+def test_places_are_stepped_only_where_a_cause_explains_something(nominal):
+    names = ("added_mass", "grounded_spring")
+    nothing = bench_of(nominal, measured(nominal), names)
+    assert len(search(nothing, fit_nothing(nothing)).fits) <= len(names) * CLOSE_EACH
+    heavier = bench_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
+    found = {fit.hypothesis.causes[0].key for fit in search(heavier, fit_nothing(heavier)).fits}
+    assert {("added_mass", node, "z") for node in (11, 12, 13)} <= found
 
 
 def test_nothing_is_added_to_a_cause_that_explains_all(nominal):
