@@ -49,6 +49,8 @@ def read_text(path: Path) -> str:
         data = path.read_bytes()
     except FileNotFoundError:
         raise FileFormatError(path, "there is no such file") from None
+    except IsADirectoryError:
+        raise FileFormatError(path, "is a folder, but a file is expected: name one inside it") from None
     except OSError as error:
         raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
     try:

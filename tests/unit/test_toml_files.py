@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.toml_files import STRICT, read_toml
+from frf_ipz.toml_files import STRICT, read_text, read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,3 +71,8 @@ def test_a_missing_section_and_a_missing_file_are_said(tmp_path):
         read(tmp_path, "[fit]", required="pipeline")
     with pytest.raises(FileFormatError, match="no such file"):
         read_toml(tmp_path / "none.toml", File)
+
+
+def test_a_folder_in_the_place_of_a_file_is_said(tmp_path):
+    with pytest.raises(FileFormatError, match="is a folder, but a file is expected"):
+        read_text(tmp_path)
