@@ -175,6 +175,8 @@ def draw(frfs: frf_ipz.FrfSet, bench: object, fits: dict, path: Path) -> None:
         axis.semilogy(frfs.frequency_hz, np.abs(column), "k", lw=0.6, label="measured")
         axis.set_title(str(label), fontsize=9)
     axes.flat[0].legend()
+    figure.supxlabel("Frequency, Hz")
+    figure.supylabel(f"Magnitude of the {frfs.labels[0].quantity.value}, scaled as recorded")
     figure.tight_layout()
     figure.savefig(path, dpi=60)
     print(f"drawn: {path}")
