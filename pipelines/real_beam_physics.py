@@ -165,7 +165,7 @@ def where_it_is(bench: object, fit: object) -> pd.DataFrame:
 def draw(frfs: frf_ipz.FrfSet, bench: object, fits: dict, path: Path) -> None:
     """Draw measured FRFs and models, on the gains that fit best."""
     rows = -(-frfs.n_frfs // 3)
-    figure, axes = plt.subplots(rows, 3, figsize=(18, 3.2 * rows), squeeze=False)
+    figure, axes = plt.subplots(rows, 3, figsize=(18, 3.2 * rows), squeeze=False, layout="constrained")
     for name, fit in fits.items():
         gains = bench.data.gains(fit.hypothesis.respond(fit.values, fit.unknown, bench.data.measured.s))
         values = gains * fit.hypothesis.respond(fit.values, fit.unknown, frfs.s).values
@@ -177,7 +177,6 @@ def draw(frfs: frf_ipz.FrfSet, bench: object, fits: dict, path: Path) -> None:
     axes.flat[0].legend()
     figure.supxlabel("Frequency, Hz")
     figure.supylabel(f"Magnitude of the {frfs.labels[0].quantity.value}, scaled as recorded")
-    figure.tight_layout()
     figure.savefig(path, dpi=60)
     print(f"drawn: {path}")
 
