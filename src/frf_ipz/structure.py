@@ -238,6 +238,9 @@ class ReducedModel:
         DOFs whose residual flexibility is in the basis.
     choices : tuple of str
         What the program chose by itself, in words.
+    dashpots : (r, r) array
+        The part of `damping` that the full model states as a matrix beside damping ratios of its modes; (0, 0) where it
+        does not state both.
     """
 
     mass: FloatArray
@@ -249,9 +252,12 @@ class ReducedModel:
     n_modes: int
     residual_dofs: tuple[Dof, ...] = ()
     choices: tuple[str, ...] = ()
+    dashpots: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         order = len(self.dofs)
+        if self.dashpots.size:
+            require_shape("the reduced matrix of dashpots", self.dashpots, (order, order))
         for name in ("mass", "damping", "stiffness"):
             require_shape(f"the reduced {name} matrix", getattr(self, name), (order, order))
         require_shape("the expansion", self.expansion, (len(self.expanded_dofs), order))

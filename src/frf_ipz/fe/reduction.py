@@ -240,7 +240,9 @@ def _reduced(
     ratios = stated_ratios(model.modal_damping, len(ritz.eigenvalues), ritz.n_rigid)
     rates = 2 * ratios * np.sqrt(ritz.eigenvalues)
     viscous = ritz.shapes.T @ apply(model.damping, ritz.shapes)
-    damping = _gram(np.sqrt(rates)[:, None] * inverse) + inverse.T @ ((viscous + viscous.T) / 2) @ inverse
+    dashpots = inverse.T @ ((viscous + viscous.T) / 2) @ inverse
+    damping = _gram(np.sqrt(rates)[:, None] * inverse) + dashpots
+    states_both = np.any(rates) and np.any(viscous)
     dofs = model.dofs
     shown = np.arange(len(dofs)) if len(dofs) <= MAX_EXPANDED else _rows_asked_for(model, rows, plan, ritz)
     expansion = np.asarray(ritz.shapes[shown] @ inverse)
@@ -254,6 +256,7 @@ def _reduced(
         n_modes=ritz.n_modes,
         residual_dofs=ritz.residual,
         choices=notes,
+        dashpots=(dashpots + dashpots.T) / 2 if states_both else np.zeros((0, 0)),
     )
 
 

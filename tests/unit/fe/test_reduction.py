@@ -191,6 +191,19 @@ def test_a_strong_damper_bends_the_shapes():
     assert_allclose(nearest, whole[in_band], rtol=BENT)
 
 
+def test_dampers_are_told_apart_from_the_damping_of_modes(tmp_path):
+    """What remains without them is damping of modes: it couples none."""
+    model = read_text_model(tmp_path, LUMPED_TEXT)
+    options = {"actuators": ("1:x",), "sensors": ("2:x",), "points": ()}
+    assert reduce(model, **options).dashpots.shape == (0, 0)  # a matrix alone is all the damping there is
+    assert reduce(replace(model, damping_all=0 * model.damping_all), **options).dashpots.shape == (0, 0)
+    found = reduce(replace(model, modal_damping=np.array([0.01])), **options)
+    assert_allclose(found.dashpots, model.damping.toarray(), rtol=1e-9, atol=1e-9)
+    shapes = linalg.eigh(found.stiffness, found.mass)[1]
+    of_modes = shapes.T @ (found.damping - found.dashpots) @ shapes
+    assert_allclose(of_modes, np.diag(np.diagonal(of_modes)), rtol=0, atol=1e-9 * of_modes.max())
+
+
 def test_default_damping_is_said():
     plain = beam(left="clamped")
     for given, expected, words in ((None, 0.005, "nothing else"), (0.02, 0.02, "the test says")):

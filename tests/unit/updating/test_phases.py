@@ -12,11 +12,14 @@ from frf_ipz.updating.minimal.modal_frame import frame_of, modal_frame
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, structural_basis
 from frf_ipz.updating.problem import make_problem
+from frf_ipz.updating.updated_model import UpdateStatus
 from updating_study import set_up
 
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
 STRONG = 5e-3  # of what would stop the motion
+LESS = 0.7  # of the damping of the modes
+AS_MEASURED = 2e-3  # relative, of a real part: what is said not to be explained by damping is half of it
 UNTOUCHED = 1e-6  # of the largest stiffness
 SEEDS = (20, 12, 11)  # a plate and a frame with zeros off the axis, and a beam
 
@@ -59,9 +62,14 @@ def test_stiffness_slopes_against_differences(problem):
     assert np.abs(found - expected).max() < SLOPES * np.abs(expected).max()
 
 
-def test_damping_slopes_against_differences(bench):
+@pytest.mark.parametrize("has_damper", [False, True])
+def test_damping_slopes_against_differences(bench, has_damper):
     basis = structural_basis(bench.case.nominal, bench.reduced)
     problem = make_problem(bench.reduced, bench.fit, bench.pairs, basis)
+    if has_damper:
+        damper = damper_at(problem, STRONG / 10)
+        damped = replace(problem.model, damping=problem.model.damping + damper, dashpots=damper)
+        problem = replace(problem, model=damped)
     frame = frame_of(problem.model)
     phase = minimal_change._stiffness_phase(problem, frame)
     result = iterate(phase, phase.nominal_roots(problem.computed))
@@ -95,12 +103,31 @@ def test_roots_are_followed_through_a_crossing(problem):
         assert np.abs(moved - small * slope).max() < 0.2 * max(np.abs(small * slope).max(), small)
 
 
+def damper_at(problem, part):
+    row = problem.rows(problem.frfs[0])[0]
+    rate = part * np.sqrt(np.trace(problem.model.stiffness) * np.trace(problem.model.mass)) / (row @ row)
+    return rate * np.outer(row, row)
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_a_known_damper_stays_while_the_modes_are_damped_anew(seed):
+    """Scaled with the modes that it couples, it would keep them from losing damping of their own."""
+    bench = set_up(seed)
+    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    modal, damper = problem.model.damping, damper_at(problem, STRONG / 10)
+    there = problem.roots_near(replace(problem.model, damping=LESS * modal + damper), problem.computed)
+    nominal = replace(problem.model, damping=modal + damper, dashpots=damper)
+    found = minimal_change.update(replace(problem, model=nominal, values=there), UpdateOptions(ensemble=2), silent)
+    assert found.status is UpdateStatus.CONVERGED
+    off = np.abs(found.after.real / there.real - 1)
+    assert off[problem.frf < 0].max() < AS_MEASURED
+    assert np.median(off[problem.frf >= 0]) < AS_MEASURED
+
+
 def test_a_model_that_is_right_stays_as_it_is_however_it_is_damped(bench):
     """A damper bends shapes and moves moduli: that is no error of the stiffness."""
     problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
-    row = problem.rows(problem.frfs[0])[0]
-    rate = STRONG * np.sqrt(np.trace(problem.model.stiffness) * np.trace(problem.model.mass)) / (row @ row)
-    damped = replace(problem.model, damping=problem.model.damping + rate * np.outer(row, row))
+    damped = replace(problem.model, damping=problem.model.damping + damper_at(problem, STRONG))
     there = problem.roots_near(damped, problem.computed)
     kept = problem.frf < 0
     known = replace(

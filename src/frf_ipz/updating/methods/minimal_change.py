@@ -126,10 +126,17 @@ def _damping(
             frf=problem.frf, rows={number: (out @ inner.shapes, force @ inner.shapes) for number, (out, force) in rows}
         ),
         inner.inside(frame.inside(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
+        _dashpots(problem, frame, inner),
         problem.values,
         _projected(problem.covariance, real_part),
         np.exp(log_moduli(result.tracked, len(problem.values))),
     )
+
+
+def _dashpots(problem: UpdateProblem, frame: ModalFrame, inner: ModalFrame) -> FloatArray:
+    """Give the dampers of the model, which are no damping of its modes."""
+    dashpots = problem.model.dashpots
+    return inner.inside(frame.inside(dashpots)) if dashpots.size else np.zeros((len(inner.eigenvalues),) * 2)
 
 
 def _damping_by_stiffness(phase: StiffnessPhase, theta: FloatArray) -> FloatArray:

@@ -1,9 +1,11 @@
 """The smallest change of damping that brings the real parts of poles and zeros to their targets.
 
-In mass-normalised modal coordinates the damping matrix is ``E^1/2 (C + O) E^1/2``: E holds the modes' rates
+In mass-normalised modal coordinates the damping matrix is ``E^1/2 (C + O) E^1/2 + (1 + d) D``: E holds the modes' rates
 ``2 zeta omega``, each multiplied by a factor whose logarithm is a parameter (one more is common to all modes), C is the
 nominal matrix scaled to a unit diagonal, O couples modes. Rates stay positive whatever the parameters, and damping of
-a model is rarely known better than its order of magnitude, which is what the prior of the common factor says.
+a model is rarely known better than its order of magnitude, which is what the prior of the common factor says. D are the
+dampers of a model that states damping ratios besides: they couple modes far more than modes' own damping does, and are
+known better.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, wi
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
 MODE_STD = 0.3  # of the logarithm of each mode's own factor
+DASHPOT_STD = 0.1  # of the part by which all dampers are stronger
 COUPLING_STD = 0.1  # of a coupling, relative to the two modes' rates
 LARGEST_STEP = 1.5  # of a logarithm in one iteration: the real part is not linear in it
 SMALL_DAMPING = 0.2  # of the usual damping ratio: real parts below are not compared relative to themselves
@@ -43,8 +46,10 @@ class DampingPhase:
         Nominal ``2 zeta omega``, rad/s; 0 for rigid-body modes.
     shape : (r, r) array
         The nominal damping matrix scaled to a unit diagonal.
+    dashpots : (r, r) array
+        Damping that belongs to no mode.
     chosen : (q, r, r) array
-        Damping matrices for one unit of parameters that a diagnosis has chosen.
+        Damping matrices for one unit of parameters that a diagnosis has chosen; last that of the dashpots, if any.
     terms : tuple of PriorTerm
         Prior of all parameters: common, each mode's, couplings, chosen ones.
     undamped : TrackedRoots
@@ -64,6 +69,7 @@ class DampingPhase:
     eigenvalues: FloatArray
     rates: FloatArray
     shape: FloatArray
+    dashpots: FloatArray
     chosen: FloatArray
     terms: tuple[PriorTerm, ...]
     undamped: TrackedRoots
@@ -99,7 +105,7 @@ class DampingPhase:
         coupled[..., row, column] += couplings
         coupled[..., column, row] += couplings
         coupled *= roots[..., :, None] * roots[..., None, :]
-        return np.asarray(coupled + np.tensordot(theta[..., own + len(row) :], self.chosen, 1))
+        return np.asarray(coupled + self.dashpots + np.tensordot(theta[..., own + len(row) :], self.chosen, 1))
 
     def start(self) -> FloatArray:
         """Give whitened parameters to start from: the nominal damping times what the poles ask for on the whole."""
@@ -172,7 +178,8 @@ class DampingPhase:
             Over the sizes, per unit of the parameters.
         """
         row, column = self.pairs
-        own = self.damping(theta) - np.tensordot(theta[1 + len(self.rates) + len(row) :], self.chosen, 1)
+        chosen = np.tensordot(theta[1 + len(self.rates) + len(row) :], self.chosen, 1)
+        own = self.damping(theta) - self.dashpots - chosen
         rates = self._factors(theta)
         couplings = np.sqrt(rates[row] * rates[column])
         result = np.zeros((len(self.targets), len(theta)))
@@ -228,6 +235,7 @@ def damping_phase(
     inner: ModalFrame,
     wanted: WantedRoots,
     matrix: FloatArray,
+    dashpots: FloatArray,
     values: ComplexArray,
     covariance: FloatArray,
     moduli: FloatArray,
@@ -244,6 +252,8 @@ def damping_phase(
         Which roots are targets, with rows in the inner coordinates.
     matrix : (r, r) array
         The nominal damping matrix in the inner coordinates.
+    dashpots : (r, r) array
+        The part of it that belongs to no mode; zero where there is none.
     values : (n,) complex array
         Measured poles and zeros, rad/s.
     covariance : (n, n) array
@@ -258,24 +268,21 @@ def damping_phase(
     """
     usual = max(float(np.median(damping_ratio(values))), SMALLEST_RATIO)
     omega = np.sqrt(inner.eigenvalues)
+    matrix = matrix - dashpots
     nominal = np.diagonal(matrix)
     rates = np.where(nominal > NO_DAMPING * usual * omega, nominal, 2 * usual * omega)
     roots = np.sqrt(np.where(rates > 0, rates, 1.0))
     shape = matrix / roots[:, None] / roots
     np.fill_diagonal(shape, 1.0)
-    own = ~np.any(basis.stiffness, axis=(1, 2)) & ~np.any(basis.mass, axis=(1, 2)) & np.any(basis.damping, axis=(1, 2))
-    chosen = tuple(
-        PriorTerm(name=term.name, root=term.root[own], std=term.std, doubt=term.doubt)
-        for term in basis.terms
-        if np.any(term.root[own])
-    )
+    chosen, terms = _chosen(basis, inner, dashpots)
     sizes = np.maximum(np.abs(values.real), SMALL_DAMPING * usual * np.abs(values))
     return DampingPhase(
         eigenvalues=inner.eigenvalues,
         rates=rates,
         shape=shape,
-        chosen=inner.inside(basis.damping[own]) if chosen else np.zeros((0, len(rates), len(rates))),
-        terms=_make_terms(len(rates), chosen),
+        dashpots=dashpots,
+        chosen=chosen,
+        terms=_make_terms(len(rates), terms),
         undamped=first_roots(wanted, np.eye(len(rates)), np.diag(inner.eigenvalues), moduli.astype(complex)),
         wanted=wanted,
         targets=-values.real,
@@ -283,6 +290,23 @@ def damping_phase(
         pairs=np.triu_indices(len(rates), 1),
         noise=covariance / np.outer(sizes, sizes) + SMALLEST_NOISE**2 * np.eye(len(values)),
     )
+
+
+def _chosen(basis: ParameterBasis, inner: ModalFrame, dashpots: FloatArray) -> tuple[FloatArray, tuple[PriorTerm, ...]]:
+    """Give damping matrices that a diagnosis has chosen and that of the dashpots, and the prior of their factors."""
+    own = ~np.any(basis.stiffness, axis=(1, 2)) & ~np.any(basis.mass, axis=(1, 2)) & np.any(basis.damping, axis=(1, 2))
+    own &= np.any([np.any(term.root != 0, axis=1) for term in basis.terms], axis=0)
+    matrices = [*inner.inside(basis.damping[own]), *([dashpots] if np.any(dashpots) else [])]
+    places = np.eye(len(matrices))
+    count = int(own.sum())
+    terms = [
+        PriorTerm(name=term.name, root=places[:, :count] @ term.root[own], std=term.std, doubt=term.doubt)
+        for term in basis.terms
+        if np.any(term.root[own])
+    ]
+    if len(matrices) > count:
+        terms.append(PriorTerm(name="a factor on the dampers", root=places[:, count:], std=DASHPOT_STD, doubt=0.0))
+    return np.reshape(matrices, (len(matrices), *dashpots.shape)), tuple(terms)
 
 
 def _make_terms(order: int, chosen: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
