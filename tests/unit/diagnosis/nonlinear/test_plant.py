@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 from numpy.testing import assert_allclose
 
@@ -33,3 +35,10 @@ def test_a_spring_from_the_ground_is_named_with_its_node(chain, strike):
     locations = [dict(place.location) for place in make_plant(chain.model, strike()).places]
     assert locations[:2] == [{"nodes": [1], "springs": ["k1"]}, {"nodes": [2]}]
     assert [one["springs"] for one in locations if "nodes" not in one] == [["k2"], ["k3"], ["k4"]]
+
+
+def test_deviations_that_ran_away_leave_finite_receptances(chain, strike):
+    plant = make_plant(chain.model, strike())
+    start = no_deviations(plant)
+    away = replace(start, frequency=start.frequency + 1e4, damping=start.damping + 1e4)
+    assert np.isfinite(respond(plant, np.array([5.0 + 200j]), away).modes).all()

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, neighbours
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
 from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
@@ -177,5 +177,4 @@ def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> FloatA
     prior, right = np.ones(len(rows)), scaled @ misfit
     prior[n:] = RIDGE
     right[:n] -= unknowns
-    factor = linalg.cho_factor(scaled @ scaled.T + np.diag(prior), lower=True)
-    return np.asarray(linalg.cho_solve(factor, right)) / sizes
+    return solve_even(scaled @ scaled.T + np.diag(prior), right) / sizes

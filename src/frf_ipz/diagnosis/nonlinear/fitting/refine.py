@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
 
@@ -254,8 +254,7 @@ def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> tuple[
     # the law's force is in `rows` as a whole, not as a change: only the unknowns are counted from where they are
     right = scaled @ misfit
     right[:n] -= unknowns
-    factor = linalg.cho_factor(scaled @ scaled.T + np.diag(prior), lower=True)
     covariance, count = np.zeros((2, 2)), len(rows) - n
-    inverse = linalg.cho_solve(factor, np.eye(len(rows))[:, n:])[n:]
-    covariance[:count, :count] = inverse / sizes[n:] / sizes[n:, None]
-    return np.asarray(linalg.cho_solve(factor, right)) / sizes, covariance
+    found = solve_even(scaled @ scaled.T + np.diag(prior), np.column_stack([right, np.eye(len(rows))[:, n:]]))
+    covariance[:count, :count] = found[n:, 1:] / sizes[n:] / sizes[n:, None]
+    return found[:, 0] / sizes, covariance

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.march import AHEAD, March, Yielding, follow, march
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.place import PlaceInTime
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
 FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
 SETTLED = 3e-3  # relative drop of the cost
-ROUNDING = 1e-10  # added to normal equations of unit diagonal: they stay positive
 TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
 RUNAWAY = 1e100  # standard deviations: a change as large runs away, and is taken for none
 LONGEST = 0.5  # relative change of a law's number in one step
@@ -123,7 +122,7 @@ def gain_of_further(stretches: Stretches, freedom: Freedom, start: Start, kinds:
     sizes = np.linalg.norm(rows[n_plain:], axis=1)
     rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
     normal, right = _normal(shot, rows)
-    drops = [right[:n] @ _solve(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
+    drops = [right[:n] @ solve_even(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
     return float(drops[1] - drops[0])
 
 
@@ -188,20 +187,11 @@ def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rows @ rows.T + np.diag(prior), right
 
 
-def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve normal equations, however different the sizes of their unknowns are."""
-    scale = 1 / np.sqrt(np.diag(normal))
-    even = normal * scale * scale[:, None] + ROUNDING * np.eye(len(normal))
-    scaled = right * scale if right.ndim == 1 else right * scale[:, None]
-    found = linalg.cho_solve(linalg.cho_factor(even, lower=True), scaled)
-    return np.asarray(found * scale if right.ndim == 1 else found * scale[:, None])
-
-
 def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
     start, n = shot.start, len(shot.start.unknowns)
     normal, right = _normal(shot, rows)
     damped = normal + damping * np.diag(np.diag(normal))
-    step = _solve(damped, right)
+    step = solve_even(damped, right)
     step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
     shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
     return replace(
@@ -212,7 +202,7 @@ def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
 def _finish(shot: _Shot, rows: FloatArray, *, settled: bool) -> LawFit:
     start, n = shot.start, len(shot.start.unknowns)
     normal, _ = _normal(shot, rows)
-    inverse = _solve(normal, np.eye(len(rows))[:, n:])[n:]
+    inverse = solve_even(normal, np.eye(len(rows))[:, n:])[n:]
     sizes = np.array([start.strength, start.shape])[: len(rows) - n]
     covariance = np.zeros((2, 2))
     covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]

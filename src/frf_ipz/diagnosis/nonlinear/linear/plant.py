@@ -29,6 +29,7 @@ LEAST_MODES = 8
 CORD_PART = 0.01  # of the first elastic frequency: how a free structure hangs, where nothing else is known
 CORD_DAMPING = 0.03
 TRANSLATIONS = ("x", "y", "z")
+FARTHEST = 20.0  # of the logarithm of a frequency or damping ratio: a step that ran away must not overflow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -368,7 +369,7 @@ def respond(plant: Plant, s: ComplexArray, deviations: Deviations) -> PlantRespo
     PlantResponse
         Receptances between all points.
     """
-    omega = plant.omega_rad_s * np.exp(deviations.frequency)
-    ratio = plant.damping_ratio * np.exp(deviations.damping)
+    omega = plant.omega_rad_s * np.exp(np.clip(deviations.frequency, -FARTHEST, FARTHEST))
+    ratio = plant.damping_ratio * np.exp(np.clip(deviations.damping, -FARTHEST, FARTHEST))
     modes = 1 / (s**2 + (2 * ratio * omega)[:, None] * s + (omega**2)[:, None])
     return PlantResponse(plant=plant, s=s, deviations=deviations, modes=modes)
