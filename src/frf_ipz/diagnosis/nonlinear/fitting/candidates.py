@@ -28,7 +28,7 @@ OF_ALL = 5
 SIMULATED = 2  # places of each law that are simulated on short stretches
 TURNS = 6  # of the refinement
 FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
-HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost after as many steps, on short and on long stretches
+HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
 HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
@@ -170,14 +170,10 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
 def _simulated(
     track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
 ) -> list[LawFit]:
-    """Fit by simulation, the best first; those that stay hopeless after a few steps, only so far."""
-    found = sorted((track.shoot(fit, FIRST) for fit in fits), key=lambda fit: fit.cost)
-    least = reached = min(least, *(fit.cost for fit in found)) if found else least
-    for index, fit in enumerate(found):
-        if not fit.settled and fit.cost <= min(hopeless * least, HOPELESS * reached):
-            found[index] = track.shoot(fit, MORE)
-            reached = min(reached, found[index].cost)
-    return found
+    """Fit by simulation; those that stay hopeless after a few steps, against the least cost, only so far."""
+    found = [track.shoot(fit, FIRST) for fit in fits]
+    least = min(least, *(fit.cost for fit in found)) if found else least
+    return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
 
 
 def _settle(track: Track, fits: list[LawFit]) -> None:
