@@ -35,7 +35,6 @@ from frf_ipz.diagnosis.judging.one_place import COMPLAINT as OF_ANOTHER_KIND
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
-from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
@@ -183,7 +182,7 @@ def _linear(bench: Bench, found: Decision, proof: Proof, gates: tuple[Gate, ...]
         held=held,
         ambiguity=_ambiguity(bench, found, weighed),
         gates=gates,
-        detectability=detectable_sizes(bench, found.null, LIMITS[bench.kind].found_nats),
+        detectability=detectable_sizes(bench, found.null, found.null_good.needed_nats),
         curves=proof.curves,
         numbers=_numbers(found),
         warnings=tuple(gate.statement for gate in gates if not gate.passed),

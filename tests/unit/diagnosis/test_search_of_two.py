@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import beam, bench_of, labels, measured, observed
+from frf_ipz.diagnosis import diagnose as diagnosing
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
@@ -116,6 +117,16 @@ def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is
     monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], found_nats=part * gain))
     assert 1 / 0.95 < goodness(bench, null).worst_piece < 1 / 0.8
     assert decide(bench, silent).verdict == verdict
+
+
+def test_the_smallest_size_that_is_told_has_the_evidence_that_is_asked(nominal, monkeypatch):
+    frfs = measured(nominal)
+    bench = bench_of(nominal, frfs, ("added_mass",))
+    needed = goodness(bench, fit_nothing(bench)).needed_nats
+    assert needed > LIMITS["frf"].found_nats
+    monkeypatch.setattr(diagnosing, "detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
+    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    assert found.detectability["added_mass"]["nats"] == pytest.approx(needed)
 
 
 def test_places_are_stepped_only_where_a_cause_explains_something(nominal):

@@ -72,7 +72,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     null_good = goodness(bench, null)
     progress(0.3, "searching for one cause")
     ranking = search(bench, null)
-    needed = _needed(bench, null_good)
+    needed = null_good.needed_nats
     if not null_good.is_good or gain_over(ranking.best, null) >= needed:
         ranking = settle_ties(bench, ranking)
     best = ranking.best
@@ -98,12 +98,6 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search_beside(bench, second.best, STRONG_NATS))
     return three if three is not None and three.verdict == EXPLAINED else two
-
-
-def _needed(bench: Bench, null: Goodness) -> float:
-    """Evidence that the first cause must have, nats: the more, the more the errors of a good model are underrated."""
-    nats = LIMITS[bench.kind].found_nats
-    return nats * max(1.0, null.worst_piece) if null.is_good else nats
 
 
 def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:

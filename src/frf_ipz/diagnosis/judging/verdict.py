@@ -111,6 +111,12 @@ class Goodness:
         return f"the best explanation {worst}"
 
     @property
+    def needed_nats(self) -> float:
+        """Evidence that a cause beside this must have: the more, the more the errors of a good model are underrated."""
+        nats = self.limits.found_nats
+        return nats * max(1.0, self.worst_piece) if self.is_good else nats
+
+    @property
     def _over_limits(self) -> tuple[float, float, float, float]:
         return (
             self.misfit / self.limits.misfit,

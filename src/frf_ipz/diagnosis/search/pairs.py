@@ -2,8 +2,9 @@
 
 Where one cause explains nearly everything, the second is searched on top of it, and then the first anew. Where it does
 not, it may be the wrong one: then several first causes get companions far from the axis, where all is smooth, and the
-best pairs are fitted. What explains nearly all is compared with pairs of other first causes: one with parameters of its
-own, a resonator or a joint, may have stood for both.
+best pairs are fitted. Both causes of a pair that leaves little are then placed anew beside each other. What explains
+nearly all is compared with pairs of other first causes: one with parameters of its own, a resonator or a joint, may
+have stood for both.
 """
 
 from __future__ import annotations

@@ -97,6 +97,11 @@ class DampingPhase:
         (..., r, r) array
             Damping matrix.
         """
+        chosen = theta[..., 1 + len(self.rates) + len(self.pairs[0]) :]
+        return np.asarray(self._of_modes(theta) + self.dashpots + np.tensordot(chosen, self.chosen, 1))
+
+    def _of_modes(self, theta: FloatArray) -> FloatArray:
+        """Damping that belongs to modes, (..., r, r) array."""
         own = 1 + len(self.rates)
         row, column = self.pairs
         roots = np.sqrt(self._factors(theta))
@@ -104,8 +109,7 @@ class DampingPhase:
         couplings = theta[..., own : own + len(row)]
         coupled[..., row, column] += couplings
         coupled[..., column, row] += couplings
-        coupled *= roots[..., :, None] * roots[..., None, :]
-        return np.asarray(coupled + self.dashpots + np.tensordot(theta[..., own + len(row) :], self.chosen, 1))
+        return np.asarray(coupled * roots[..., :, None] * roots[..., None, :])
 
     def start(self) -> FloatArray:
         """Give whitened parameters to start from: the nominal damping times what the poles ask for on the whole."""
@@ -178,8 +182,7 @@ class DampingPhase:
             Over the sizes, per unit of the parameters.
         """
         row, column = self.pairs
-        chosen = np.tensordot(theta[1 + len(self.rates) + len(row) :], self.chosen, 1)
-        own = self.damping(theta) - self.dashpots - chosen
+        own = self._of_modes(theta)
         rates = self._factors(theta)
         couplings = np.sqrt(rates[row] * rates[column])
         result = np.zeros((len(self.targets), len(theta)))
@@ -282,7 +285,7 @@ def damping_phase(
         shape=shape,
         dashpots=dashpots,
         chosen=chosen,
-        terms=_make_terms(len(rates), terms),
+        terms=_make_terms(len(rates), len(chosen), terms),
         undamped=first_roots(wanted, np.eye(len(rates)), np.diag(inner.eigenvalues), moduli.astype(complex)),
         wanted=wanted,
         targets=-values.real,
@@ -295,7 +298,6 @@ def damping_phase(
 def _chosen(basis: ParameterBasis, inner: ModalFrame, dashpots: FloatArray) -> tuple[FloatArray, tuple[PriorTerm, ...]]:
     """Give damping matrices that a diagnosis has chosen and that of the dashpots, and the prior of their factors."""
     own = ~np.any(basis.stiffness, axis=(1, 2)) & ~np.any(basis.mass, axis=(1, 2)) & np.any(basis.damping, axis=(1, 2))
-    own &= np.any([np.any(term.root != 0, axis=1) for term in basis.terms], axis=0)
     matrices = [*inner.inside(basis.damping[own]), *([dashpots] if np.any(dashpots) else [])]
     places = np.eye(len(matrices))
     count = int(own.sum())
@@ -309,11 +311,10 @@ def _chosen(basis: ParameterBasis, inner: ModalFrame, dashpots: FloatArray) -> t
     return np.reshape(matrices, (len(matrices), *dashpots.shape)), tuple(terms)
 
 
-def _make_terms(order: int, chosen: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
-    """Prior of all parameters, given that of the chosen ones alone."""
+def _make_terms(order: int, extra: int, chosen: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
+    """Prior of all parameters, given that of the extra, chosen ones alone."""
     couplings = order * (order - 1) // 2
     own = 1 + order + couplings
-    extra = chosen[0].root.shape[0] if chosen else 0
     places = np.eye(own + extra)
     terms = [
         PriorTerm(name="a factor on the damping", root=places[:, :1], std=COMMON_STD, doubt=0.0),

@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, neighbours
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
 from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
@@ -31,7 +31,6 @@ FINALISTS = 4  # places that are fitted on long stretches
 NEIGHBOURS = 2
 CLIMBS = 6  # steps to better neighbours
 RIDGE = 1e-6  # of a column's own square: many of the laws are nearly alike
-LEAST_COLUMN = 1e-100  # norm of a column: nothing is touched
 SETTLED = 1e-3  # relative change of the cost between turns
 
 
@@ -106,7 +105,7 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
         response, w, v = motion_at(stretches, freedom, start, clock, force)
         forces = clock.at_lines(simple_forces(w, v))
         rows, misfit = _rows(stretches, linear, response, start, forces, force)
-        step = _solve(rows, misfit, unknowns)
+        step, _ = step_to(rows, misfit, unknowns, RIDGE)
         left = misfit - step @ rows
         n = len(unknowns)
         unknowns = unknowns + step[:n]
@@ -166,15 +165,3 @@ def _rows(
     by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, start.place))
     to_sensors = response.to_sensors(start.place)[:, used]
     return np.concatenate([by_unknowns, as_real(-to_sensors * forces[:, :, None, used] * weight)]), misfit
-
-
-def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> FloatArray:
-    """Step of the unknowns, and the strengths."""
-    n = len(unknowns)
-    sizes = np.ones(len(rows))
-    sizes[n:] = np.maximum(np.linalg.norm(rows[n:], axis=1), LEAST_COLUMN)
-    scaled = rows / sizes[:, None]
-    prior, right = np.ones(len(rows)), scaled @ misfit
-    prior[n:] = RIDGE
-    right[:n] -= unknowns
-    return solve_even(scaled @ scaled.T + np.diag(prior), right) / sizes

@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
 
@@ -26,7 +26,6 @@ SETTLED = 1e-3  # relative change of the cost between turns
 DIFFERENCE = 1e-4  # of the shape: its derivative; kinks average out over many samples
 RIDGE = 1e-8  # of a column's own square: strength and shape may be one and the same where nothing is touched
 LARGEST_STEP = 0.3  # of the shape, a turn
-LEAST_COLUMN = 1e-100  # norm of a column: nothing is touched
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -191,7 +190,7 @@ def _turn(
     law = start.law
     response, w, v = motion_at(stretches, freedom, start, clock, force)
     rows, misfit = _rows(stretches, freedom, start, response, _unit_forces(start, clock, w, v))
-    step, covariance = _solve(rows, misfit, start.unknowns)
+    step, covariance = step_to(rows, misfit, start.unknowns, RIDGE)
     n = freedom.n_unknowns
     strength = float(step[n]) if law.strength_can_be_negative else max(float(step[n]), 0.0)
     shape = start.shape
@@ -208,7 +207,7 @@ def _turn(
         unknowns=unknowns,
         cost=float(left @ left + unknowns @ unknowns),
         n_rows=len(left),
-        covariance=covariance,
+        covariance=np.pad(covariance, (0, 2 - len(covariance))),
         motion=w,
         velocity=v,
         force=strength * clock.at_lines(law.unit_force(w, v, shape)),
@@ -241,20 +240,3 @@ def _rows(
     by_law = [as_real(-to_sensors * force[:, None, used] * weight)[None] for force in forces]
     rows = [as_real(freedom.columns(stretches, on_used, -start.strength * forces[0][:, used], start.place)), *by_law]
     return np.concatenate(rows), misfit
-
-
-def _solve(rows: FloatArray, misfit: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Step of the unknowns, new strength and step of the shape; covariance of the last two, (2, 2)."""
-    n = len(unknowns)
-    sizes = np.ones(len(rows))
-    sizes[n:] = np.maximum(np.linalg.norm(rows[n:], axis=1), LEAST_COLUMN)
-    scaled = rows / sizes[:, None]
-    prior = np.full(len(rows), RIDGE)
-    prior[:n] = 1.0
-    # the law's force is in `rows` as a whole, not as a change: only the unknowns are counted from where they are
-    right = scaled @ misfit
-    right[:n] -= unknowns
-    covariance, count = np.zeros((2, 2)), len(rows) - n
-    found = solve_even(scaled @ scaled.T + np.diag(prior), np.column_stack([right, np.eye(len(rows))[:, n:]]))
-    covariance[:count, :count] = found[n:, 1:] / sizes[n:] / sizes[n:, None]
-    return found[:, 0] / sizes, covariance
