@@ -9,6 +9,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
+from frf_ipz.diagnosis.search.elsewhere import look_elsewhere
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
@@ -75,6 +76,8 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     needed = null_good.needed_nats
     if not null_good.is_good or gain_over(ranking.best, null) >= needed:
         ranking = settle_ties(bench, ranking)
+    if ranking.best.is_nearly_all and not goodness(bench, ranking.best).is_good:
+        ranking = settle_ties(bench, look_elsewhere(bench, ranking))
     best = ranking.best
     good = goodness(bench, best)
     one = Decision(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 AT_ONCE = 400  # motions: keeps arrays within some ten MB
 AMPLITUDES = np.geomspace(1e-3, 300.0, 20)  # over the stiffness of the structure against the motion
+CLOSER = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
 LARGEST_FLEXIBILITY = 2500  # DOFs up to which the static flexibility of all of them is found
+
+Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
+"""Of the misfit of each line with a dynamic stiffness on a motion: constant, linear, square; and R_pp."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -177,19 +181,30 @@ def _by_motion(sketches: Sequence[Sketch]) -> Iterator[list[list[int]]]:
         yield groups[start : start + AT_ONCE]
 
 
-def _best(cause: Cause, sketch: Sketch, terms: tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]) -> Start:
-    constant, linear, square, own = terms
+def _best(cause: Cause, sketch: Sketch, terms: Terms) -> Start:
+    own = terms[3]
     if sketch.amplitudes is None:
         scale = np.median(np.abs(own)) * np.median(np.abs(sketch.shapes), axis=1)
         amplitudes = AMPLITUDES[None, :] / scale[:, None]
     else:
         amplitudes = np.broadcast_to(sketch.amplitudes, (len(sketch.shapes), len(sketch.amplitudes)))
-    stiffness = amplitudes[:, :, None] * sketch.shapes[:, None, :]
-    effective = stiffness / (1 + own * stiffness)
-    squares = constant + 2 * (effective * linear).real + np.abs(effective) ** 2 * square
-    costs = np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2)
+    costs = _costs(sketch.shapes, amplitudes, terms)
     shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    best = amplitudes[shape, size]
+    for closer in CLOSER if amplitudes.shape[1] > 1 else ():
+        around = best * closer
+        best = around[int(np.argmin(_costs(sketch.shapes[shape, None], around[None], terms)))]
+    cost = _costs(sketch.shapes[shape, None], best[None, None], terms)[0, 0]
     values = sketch.values[shape].copy()
     if len(values):
-        values[sketch.amplitude] *= amplitudes[shape, size]
-    return Start(cause=cause, values=values, cost=float(costs[shape, size]))
+        values[sketch.amplitude] *= best
+    return Start(cause=cause, values=values, cost=float(cost))
+
+
+def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
+    """Robust misfits of shapes times amplitudes, (n_shapes, n_amplitudes)."""
+    constant, linear, square, own = terms
+    stiffness = amplitudes[:, :, None] * shapes[:, None, :]
+    effective = stiffness / (1 + own * stiffness)
+    squares = constant + 2 * (effective * linear).real + np.abs(effective) ** 2 * square
+    return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2))

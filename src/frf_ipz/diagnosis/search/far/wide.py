@@ -5,6 +5,8 @@ Everything is smooth there, and misfits count by their logarithm.
 
 from __future__ import annotations
 
+from collections import Counter
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,12 +18,16 @@ from frf_ipz.diagnosis.search.far.sketches import Start, search_sketches
 from frf_ipz.diagnosis.search.hypothesis import Cause
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.fit import Fit
 
 WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
+LOOKED_AROUND = 16  # places of each effect: where not all places are looked at, those beside the best are
 
 
 def wide_search(bench: Bench, base: Fit) -> list[Start]:
@@ -65,22 +71,44 @@ def _search(
     bench: Bench, specimen: Specimen, measured: Measured, base: Fit, unknown: FloatArray, error: float
 ) -> list[Start]:
     causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
-    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
     weights = weights_of(measured, error)
     response = base.hypothesis.respond(base.values, unknown, measured.s)
-    sketched = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
-    found = search_sketches(
-        [cause for cause, _ in sketched],
-        [sketch for _, sketch in sketched],
-        response,
-        base.hypothesis.basis,
-        specimen.layout,
-        measured,
-        weights,
-    )
-    direct = [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    sketch = partial(_sketched, specimen, measured, base, response, weights)
+    found, direct = sketch(causes)
+    found.sort(key=lambda start: start.cost)
+    found += sketch(_between(specimen, causes, found))[0]
     found += [best_start(bench, base, cause, measured, weights, unknown) for cause in direct]
     return sorted(found, key=lambda start: start.cost)
+
+
+def _sketched(
+    specimen: Specimen, measured: Measured, base: Fit, response: Response, weights: FloatArray, causes: Sequence[Cause]
+) -> tuple[list[Start], list[Cause]]:
+    """Find the best values of causes that can be sketched, and which ones cannot."""
+    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
+    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
+    found = search_sketches(
+        [cause for cause, _ in drawn], [sketch for _, sketch in drawn], response, base.hypothesis.basis,
+        specimen.layout, measured, weights,
+    )  # fmt: skip
+    return found, [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+
+
+def _between(specimen: Specimen, causes: Sequence[Cause], starts: Sequence[Start]) -> list[Cause]:
+    """Give the places beside the best of each effect that are none of those where it was looked for."""
+    seen = {cause.key for cause in causes}
+    counts, found = Counter[str](), list[Cause]()
+    for start in starts:
+        effect = start.cause.effect
+        counts[effect.name] += 1
+        if counts[effect.name] > LOOKED_AROUND:
+            continue
+        for place in effect.neighbours(specimen, start.cause.place):
+            cause = Cause(effect=effect, place=place, n_places=start.cause.n_places)
+            if cause.key not in seen:
+                seen.add(cause.key)
+                found.append(cause)
+    return found
 
 
 def best_start(

@@ -1,0 +1,51 @@
+"""Other places of a cause that explains the test but needs too much of the tolerances.
+
+A short stiff spring between two nodes does nearly what a softer one between nodes farther apart does, and on the way
+from one to the other everything is worse. The frequencies of what explains the test already are right, whatever
+the place: every likely place is fitted from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.search.far.wide import wide_search
+from frf_ipz.diagnosis.search.polish import polish, same_modes
+from frf_ipz.diagnosis.search.search import Fits, Ranking, climb_all, ranked
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.search.bench import Bench
+
+FITTED = 30  # places, by what a wide search says of them
+ITERATIONS = 20
+
+
+def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
+    """Fit the most probable cause at other places.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    ranking : Ranking
+        Of a search.
+
+    Returns
+    -------
+    Ranking
+        With more fits.
+    """
+    best, base = ranking.best, ranking.base
+    effect = best.hypothesis.causes[-1].effect
+    starts = wide_search(replace(bench, effects={effect.name: effect}), base)
+    fits: Fits = {fit.hypothesis.causes[-1].key: fit for fit in ranking.fits}
+    for start in [start for start in starts if start.cause.key not in fits][:FITTED]:
+        hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
+        values = np.concatenate([base.values, start.values])
+        unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
+        fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS)
+    climb_all(bench, base, fits)
+    return replace(ranking, fits=ranked(bench, fits), n_tried=ranking.n_tried + len(starts))
