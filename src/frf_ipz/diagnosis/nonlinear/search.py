@@ -71,6 +71,7 @@ NEARLY = 0.02  # or so much of the response is left
 MOST_LEFT = 0.1  # of the response: with more, noise hides much of how another law bends, and any bend is too much
 FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
+EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to explain, where later ones are not reached
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
 NEARLY_ALL = 0.01  # or so much of the linear model's: what the forces lack is then their law, not their place
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
@@ -196,7 +197,7 @@ def search_laws(
         found = replace(found, verdict=EXPLAINED, statement=f"{found.findings[0].statement} {grown}")
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
-        found = _with_place(found, plant, _anywhere(short, long, fits, bend_of), long)
+        found = _with_place(found, plant, _anywhere(short, long, fits, bend_of))
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
@@ -226,9 +227,12 @@ def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, 
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:
     """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
     near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost][:MOST_NEAR]
-    bent = [AnyForce(place=fit.place, cost=fit.cost - bend_of(fit)) for fit in near if bend_of(fit) < SMALL * fit.cost]
-    found = find_place(short, long)[0]
-    return min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
+    small = [fit for fit in near if bend_of(fit) < SMALL * fit.cost]
+    bent = [AnyForce.on(long, fit.place, fit.cost - bend_of(fit)) for fit in small]
+    of_each_law = {fit.law.name: fit.place for fit in reversed(fits)}
+    found, first = find_place(short, long, of_each_law.values())
+    best = min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
+    return first if best.left > PLACED and first.left < EXPLAINED_FIRST else best
 
 
 def _bend(track: Track, fit: LawFit) -> float:
@@ -236,10 +240,10 @@ def _bend(track: Track, fit: LawFit) -> float:
     return gain_of_further(track.stretches, track.linear.freedom, fit.start(), simple_forces)
 
 
-def _with_place(found: LawSearch, plant: Plant, best: AnyForce, track: Track) -> LawSearch:
+def _with_place(found: LawSearch, plant: Plant, best: AnyForce) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
-    left = best.cost / track.linear.n_rows
-    if left > max(min(PLACED, HALVED * track.missed), NEARLY_ALL * track.missed):
+    left = best.left
+    if left > max(min(PLACED, HALVED * best.missed), NEARLY_ALL * best.missed):
         return found
     place = plant.places[best.place]
     where = (

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
-OTHERS = 3  # first causes that are tried where a pair explains nearly all
+OTHERS, ALL_OTHERS = 3, 5  # first causes that are tried where a pair explains all, and where it lacks a little
 MOST_LEFT = 0.8  # of the cost of one cause: where a second leaves more, the first is not searched anew beside it
 NEAR_NATS = 100.0  # behind the best pair: such a pair's causes are stepped to better places
 PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
@@ -77,7 +77,9 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     best = _likeliest(found)
     if best.fits and best.best.mean_misfit <= VERY_NEARLY:
         best = _settled(bench, best)
-    return _likeliest([best, *_from_others(bench, first, best.best)]) if best.best.is_nearly_all else best
+    if not best.best.is_nearly_all:
+        return best
+    return _likeliest([best, *_from_others(bench, first, best.best, OTHERS if is_good(best.best) else ALL_OTHERS)])
 
 
 def _likeliest(found: list[Ranking]) -> Ranking:
@@ -88,9 +90,9 @@ def _likeliest(found: list[Ranking]) -> Ranking:
     return best
 
 
-def _from_others(bench: Bench, first: Ranking, best: Fit) -> list[Ranking]:
+def _from_others(bench: Bench, first: Ranking, best: Fit, count: int) -> list[Ranking]:
     """Search beside other first causes: one with parameters of its own may have stood for both."""
-    others = [fits[0] for fits in by_effect(first.fits)[1 : 1 + OTHERS] if fits[0].is_nearly_right]
+    others = [fits[0] for fits in by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
     found = [search_beside(bench, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others]
     return [_settled(bench, pairs) if _is_near(pairs.best, best) else pairs for pairs in found]
 

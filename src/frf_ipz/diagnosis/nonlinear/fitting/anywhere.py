@@ -20,6 +20,8 @@ from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, as_real, linea
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
@@ -44,29 +46,40 @@ class AnyForce:
         Index in `Plant.places`.
     cost : float
         Weighted sum of squared misfits, and of squared unknowns.
+    left, missed : float
+        The cost, and that of the linear model, over the number of data.
     """
 
     place: int
     cost: float
+    left: float
+    missed: float
+
+    @classmethod
+    def on(cls, track: Track, place: int, cost: float) -> AnyForce:
+        """Put down what a force at a place leaves."""
+        return cls(place=place, cost=cost, left=cost / track.linear.n_rows, missed=track.missed)
 
 
-def find_place(short: Track, long: Track) -> list[AnyForce]:
+def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyForce, AnyForce]:
     """Find the place of a force whose law is not known.
 
     Parameters
     ----------
     short, long : Track
         The data.
+    likely : iterable of int
+        Places that are fitted to the long stretches, whatever the short ones say.
 
     Returns
     -------
-    list of AnyForce
-        The best places, fitted to the long stretches, the smallest cost first.
+    on_long, on_short : AnyForce
+        The best place by the long stretches, and by the short ones, on which any force is known better.
     """
     n_places = len(short.linear.freedom.plant.places)
     rough = sorted((fit_anything(short, place, FEW_TURNS) for place in range(n_places)), key=lambda one: one.cost)
-    fits = [fit_anything(long, one.place, MANY_TURNS) for one in rough[:FINALISTS]]
-    done = {one.place for one in fits}
+    done = {*likely, *(one.place for one in rough[:FINALISTS])}
+    fits = [fit_anything(long, place, MANY_TURNS) for place in sorted(done)]
     for _ in range(CLIMBS):
         best = min(fits, key=lambda one: one.cost)
         near = [place for place in neighbours(short.linear.freedom.plant, best.place, NEIGHBOURS) if place not in done]
@@ -74,7 +87,7 @@ def find_place(short: Track, long: Track) -> list[AnyForce]:
             break
         done.update(near)
         fits += [fit_anything(long, place, MANY_TURNS) for place in near]
-    return sorted(fits, key=lambda one: one.cost)
+    return min(fits, key=lambda one: one.cost), fit_anything(short, rough[0].place, MANY_TURNS)
 
 
 def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
@@ -113,7 +126,7 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
         before, best = best, min(best, float(left @ left + unknowns @ unknowns))
         if best > (1 - SETTLED) * before:
             break
-    return AnyForce(place=place, cost=best)
+    return AnyForce.on(track, place, best)
 
 
 def simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:

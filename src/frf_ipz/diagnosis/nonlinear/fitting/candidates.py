@@ -35,6 +35,7 @@ MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more
 BETTER = 0.02  # relative drop of the cost on short stretches, by a start from still shorter ones, that is worth more
 NEIGHBOURS = 2
 CLIMBS = 8  # steps to better neighbours
+EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
 ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
 
 
@@ -132,6 +133,8 @@ def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
     _climb(track, fits)
     if fits:
         _settle(track, fits)
+        if _exchange(track, fits):
+            _settle(track, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
 
@@ -188,6 +191,16 @@ def _settle(track: Track, fits: list[LawFit]) -> None:
         else:  # what is strongly nonlinear has other minima, in which starts of stretches are taken for the law
             again, is_fresh = track.shoot_afresh(fit, FRESH), True
             fits[best] = min(fit, again, key=lambda one: one.cost)
+
+
+def _exchange(track: Track, fits: list[LawFit]) -> bool:
+    """Fit a law once more at its next best places, from its numbers at the best; true if that is better than all."""
+    best = min(fits, key=lambda fit: fit.cost)
+    others = [i for i, fit in enumerate(fits) if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
+    for i in sorted(others, key=lambda i: fits[i].cost)[:EXCHANGED]:
+        again = track.shoot(_moved(track, best, fits[i].place), MORE)
+        fits[i] = min(fits[i], again, key=lambda fit: fit.cost)
+    return min(fits, key=lambda fit: fit.cost) is not best
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:
