@@ -6,7 +6,7 @@ import pytest
 
 from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
-from frf_ipz.diagnosis.nonlinear.fitting import candidates
+from frf_ipz.diagnosis.nonlinear.fitting import anywhere, candidates
 
 
 def cutter(missed, most=float("inf")):
@@ -71,21 +71,63 @@ def test_a_small_bend_is_too_much_only_where_noise_may_hide_a_larger_one(drop, l
     assert search._is_bent(track, fit, drop, least=least) == bent
 
 
+def a_force(place, cost, *, n_rows=100, missed=50.0):
+    return search.AnyForce(place=place, cost=cost, left=cost / n_rows, missed=missed)
+
+
+def a_track(n_rows=100, missed=50.0):
+    return SimpleNamespace(linear=SimpleNamespace(n_rows=n_rows), missed=missed)
+
+
 @pytest.mark.parametrize(("drop", "place"), [(300.0, 7), (950.0, 3)])
 def test_only_a_small_force_besides_a_law_is_believed_without_being_fitted(monkeypatch, drop, place):
     """A law at place 7 leaves 1000; any force, fitted, leaves 2000 at place 3."""
-    monkeypatch.setattr(search, "find_place", lambda *_: [search.AnyForce(place=3, cost=2000.0)])
-    fit = SimpleNamespace(place=7, cost=1000.0)
-    assert search._anywhere(None, None, [fit], lambda _: drop).place == place
+    monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, 2000.0), a_force(5, 2000.0)))
+    assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: drop).place == place
+
+
+@pytest.mark.parametrize(("left", "first", "place"), [(500.0, 20.0, 5), (500.0, 150.0, 3), (300.0, 20.0, 3)])
+def test_first_moments_place_a_law_where_later_ones_are_not_reached(monkeypatch, left, first, place):
+    """Long stretches say place 3, the first moments place 5: they are believed where they leave nothing."""
+    monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, left), a_force(5, first)))
+    assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: 950.0).place == place
+
+
+def test_places_of_the_best_laws_are_asked_for_whatever_the_first_moments_say(monkeypatch):
+    costs = {("short", place): 10.0 + place for place in range(8)} | {("long", place): 50.0 for place in range(8)}
+    costs["long", 7] = 20.0
+    tracks = {name: SimpleNamespace(name=name, linear=a_plant_of(8), missed=9.0) for name in ("short", "long")}
+    monkeypatch.setattr(anywhere, "neighbours", lambda *_: [])
+    monkeypatch.setattr(
+        anywhere, "fit_anything", lambda track, place, _: a_force(place, costs[track.name, place], missed=track.missed)
+    )
+    by_long, by_short = anywhere.find_place(tracks["short"], tracks["long"], [7])
+    assert (by_long.place, by_short.place) == (7, 0)
+    assert anywhere.find_place(tracks["short"], tracks["long"], [])[0].place != 7
+
+
+def a_plant_of(n_places):
+    return SimpleNamespace(freedom=SimpleNamespace(plant=SimpleNamespace(places=range(n_places))))
 
 
 @pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 2600.0, True)])
 def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
-    track = SimpleNamespace(linear=SimpleNamespace(n_rows=100), missed=linear)
     plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
-    again = search._with_place(found, plant, search.AnyForce(place=0, cost=100 * left), track)
+    again = search._with_place(found, plant, a_force(0, 100 * left, missed=linear))
     assert bool(again.place) == said
+
+
+@pytest.mark.parametrize(("again", "best"), [(6.0, 3), (30.0, 7)])
+def test_the_numbers_of_the_best_place_are_tried_at_the_next_best(monkeypatch, again, best):
+    """A law leaves 10 at place 7, 15 at place 3 and 50 at place 4, each from its own start."""
+    law = SimpleNamespace(name="friction")
+    fits = [SimpleNamespace(law=law, place=place, cost=cost) for place, cost in ((7, 10.0), (3, 15.0), (4, 50.0))]
+    monkeypatch.setattr(candidates, "_moved", lambda _, fit, place: SimpleNamespace(law=fit.law, place=place))
+    track = SimpleNamespace(shoot=lambda fit, _: SimpleNamespace(law=law, place=fit.place, cost=again))
+    assert candidates._exchange(track, fits) == (best == 3)
+    assert min(fits, key=lambda fit: fit.cost).place == best
+    assert [fit.cost for fit in fits] == [10.0, min(15.0, again), 50.0]
 
 
 def a_law_at(place, cost):

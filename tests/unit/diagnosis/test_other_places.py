@@ -1,0 +1,60 @@
+"""A spring between two nodes, which softer and stiffer ones between other nodes imitate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from diagnosed import beam, bench_of, labels, measured
+from frf_ipz.diagnosis.catalogue.supports import coupling_spring
+from frf_ipz.diagnosis.judging import decision
+from frf_ipz.diagnosis.search.far.wide import wide_search
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
+from frf_ipz.dofs import Dof
+from frf_ipz.progress import silent
+
+ENDS, WRONG = (6, 13), (7, 12)
+STIFFNESS_N_M = 3e3
+ROUGHLY, EXACTLY = 0.05, 0.01  # relative: amplitudes of the first look are a factor of two apart
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
+    motion = np.zeros(len(nominal.all_dofs))
+    motion[[nominal.places[Dof(node, "z")] for node in ENDS]] = 1.0, -1.0
+    added = STIFFNESS_N_M * np.outer(motion, motion)
+    true = replace(nominal, stiffness_all=sparse.csr_array(nominal.stiffness_all + added))
+    return bench_of(nominal, measured(true, labels(outputs=("25:+z", "10:-z"))), ("coupling_spring",))
+
+
+def nodes_of(cause):
+    return tuple(cause.place.location["nodes"])
+
+
+def test_a_wide_search_finds_values_closer_than_its_amplitudes_are_apart(bench):
+    best = wide_search(bench, fit_nothing(bench))[0]
+    assert nodes_of(best.cause) == ENDS
+    assert best.values[0] == pytest.approx(STIFFNESS_N_M, rel=ROUGHLY)
+
+
+def test_a_wide_search_looks_between_the_places_of_a_thinned_row(bench, monkeypatch):
+    monkeypatch.setattr(coupling_spring, "MOST_IN_A_ROW", 12)
+    places = bench.effects["coupling_spring"].places(bench.specimen)
+    assert ENDS not in [tuple(place.location["nodes"]) for place in places]
+    best = wide_search(bench, fit_nothing(bench))[0]
+    assert nodes_of(best.cause) == ENDS
+
+
+def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(bench, monkeypatch):
+    null = fit_nothing(bench)
+    start = next(start for start in wide_search(bench, null) if nodes_of(start.cause) == WRONG)
+    wrong = bench.fit((start.cause,), start.values)
+    assert wrong.is_nearly_all
+    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
+    found = decision.decide(bench, silent)
+    assert found.verdict == "explained"
+    (cause,) = found.final.hypothesis.causes
+    assert nodes_of(cause) == ENDS
+    assert found.final.values[0] == pytest.approx(STIFFNESS_N_M, rel=EXACTLY)
