@@ -53,6 +53,7 @@ def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(benc
     wrong = bench.fit((start.cause,), start.values)
     assert wrong.is_nearly_all
     monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
+    monkeypatch.setattr(decision, "search_second", lambda *_: Ranking(base=wrong, fits=(), n_tried=0))
     found = decision.decide(bench, silent)
     assert found.verdict == "explained"
     (cause,) = found.final.hypothesis.causes
