@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search import pairs
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.pairs import search_second
@@ -272,6 +273,25 @@ def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(n
     assert first.best.hypothesis.causes[0].effect.name == "attached_resonator"
     found = search_second(bench, first, lambda _: True)
     assert [cause.effect.name for cause in found.best.hypothesis.causes] == ["added_mass", "grounded_spring"]
+
+
+@pytest.mark.parametrize(("is_good", "count"), [(True, pairs.OTHERS), (False, pairs.ALL_OTHERS)])
+def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
+    tried = []
+    monkeypatch.setattr(pairs, "search", lambda _, base: Ranking(base=base, fits=(), n_tried=0))
+    monkeypatch.setattr(
+        pairs, "search_beside", lambda _, base, __: tried.append(base) or Ranking(base=base, fits=(), n_tried=0)
+    )
+    monkeypatch.setattr(pairs, "_settled", lambda _, ranking: ranking)
+    fits = [one_of(f"effect_{number}", -number) for number in range(10)]
+    search_second(None, Ranking(base=fits[-1], fits=tuple(fits), n_tried=0), lambda _: is_good)
+    assert tried == fits[1 : 1 + count]
+
+
+def one_of(name, log_evidence):
+    cause = SimpleNamespace(effect=SimpleNamespace(name=name))
+    near = {"is_nearly_right": True, "is_nearly_all": True, "mean_misfit": 1.0}
+    return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence, **near)
 
 
 def test_the_first_of_two_causes_is_placed_anew_beside_the_second(nominal):
