@@ -275,6 +275,16 @@ def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(n
     assert [cause.effect.name for cause in found.best.hypothesis.causes] == ["added_mass", "grounded_spring"]
 
 
+def test_a_resonator_of_much_damping_is_less_likely_than_a_damper_that_explains_as_much(nominal):
+    values = [np.array([0.01, 100.0, ratio]) for ratio in (0.005, 0.05, 0.15, 0.4)]
+    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
+    place = ATTACHED.places(bench.specimen)[0]
+    little, usual, much, most = (ATTACHED.log_prior(bench.specimen, place, one) for one in values)
+    assert little == usual == 0
+    assert -3 < much < -1  # nats: still easily named
+    assert most < -6
+
+
 @pytest.mark.parametrize(("is_good", "count"), [(True, pairs.OTHERS), (False, pairs.ALL_OTHERS)])
 def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
     tried = []

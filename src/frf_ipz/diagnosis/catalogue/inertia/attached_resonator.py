@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray
+from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
 LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, a damper or a mass
 RATIOS = 1e-3, 0.5
+USUAL_RATIO, WITHIN = 0.05, 1.7  # the most of what swings by itself, and the factor by which it may be more
 FREQUENCY_STEP = 1.06
 TRIED_RATIOS = (0.01, 0.06)
 
@@ -76,6 +77,12 @@ class AttachedResonator(Effect):
     def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
         """Nodes beside."""
         return beside_node(specimen, place)
+
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Expect what swings by itself to be little damped: with much damping it is a damper with a mass behind it."""
+        del specimen, place
+        beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
+        return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say what swings where."""
