@@ -42,3 +42,4 @@ def test_deviations_that_ran_away_leave_finite_receptances(chain, strike):
     start = no_deviations(plant)
     away = replace(start, frequency=start.frequency + 1e4, damping=start.damping + 1e4)
     assert np.isfinite(respond(plant, np.array([5.0 + 200j]), away).modes).all()
+    assert np.isfinite([size**2 for size in plant.poles(away)]).all()

@@ -188,14 +188,13 @@ class Freedom:
         (n_unknowns, n_blows, n_sensors, n_used) complex array
             Per prior standard deviation, over the standard deviation of the data.
         """
-        plant, modes = self.plant, self.modes
+        modes = self.modes
         own = response.modes[modes]
         force = stretches.force[:, stretches.used]
         motion = response.input_shapes[stretches.input_of][:, modes, None] * force[:, None] * own  # blow, mode, line
         if place is not None:
             motion = motion + response.place_shapes(place)[modes, None] * place_force[:, None] * own
-        omega = plant.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes])
-        ratio = plant.damping_ratio[modes] * np.exp(response.deviations.damping[modes])
+        omega, ratio = (part[modes] for part in self.plant.poles(response.deviations))
         by_damping = -own * (2 * ratio * omega)[:, None] * response.s * self.damping[:, None]
         by_frequency = -own * ((2 * omega**2)[:, None] + (2 * ratio * omega)[:, None] * response.s)
         weight = 1 / np.sqrt(stretches.variance[:, :, stretches.used])
@@ -207,7 +206,7 @@ class Freedom:
 
         parts = [seen(motion * by_frequency * self.frequency[:, None]), seen(motion * by_damping)]
         parts.append(_one_by_one(motion.swapaxes(0, 1), self.sensors, weight))
-        for number in range(len(plant.inputs)):
+        for number in range(len(self.plant.inputs)):
             mine = (stretches.input_of == number)[:, None, None]
             parts.append(seen(np.where(mine, force[:, None] * own, 0.0) * self.inputs[number][:, None]))
         spread = np.zeros(len(modes)) if place is None else self.places[place]

@@ -59,15 +59,12 @@ class PlaceInTime:
 
     def modes(self) -> Modes:
         """Give the modes that are followed."""
-        plant, deviations = self.freedom.plant, self.deviations
-        omega = plant.omega_rad_s * np.exp(deviations.frequency)
-        return make_modes(omega, plant.damping_ratio * np.exp(deviations.damping), self.step_s)
+        return make_modes(*self.freedom.plant.poles(self.deviations), self.step_s)
 
     def yielding(self, *, constant: bool) -> Yielding:
         """Say how the place gives way to a force; see `make_modes` for `constant`."""
-        plant, deviations, points = self.freedom.plant, self.deviations, self.freedom.plant.at_places
-        omega = plant.omega_rad_s * np.exp(deviations.frequency)
-        ratio = plant.damping_ratio * np.exp(deviations.damping)
+        points = self.freedom.plant.at_places
+        omega, ratio = self.freedom.plant.poles(self.deviations)
         weights = self.shapes**2
         static, inertial = (
             points.weights[self.place] @ part[:, self.place] for part in (points.static, points.inertial)
@@ -134,16 +131,15 @@ class PlaceInTime:
 
     def _by_pole(self, total: FloatArray, which: int) -> FloatArray:
         """(n_blows, 2, n_free, n_times) change by frequencies (0) or damping ratios (1)."""
-        freedom, plant, deviations = self.freedom, self.freedom.plant, self.deviations
+        freedom = self.freedom
         free = freedom.modes
+        omega, ratio = freedom.plant.poles(self.deviations)
         sizes = (freedom.frequency, freedom.damping)[which]
         ends = []
         for sign in (1, -1):
             factor = np.ones((2, len(free)))
             factor[which] += sign * DIFFERENCE
-            omega = plant.omega_rad_s[free] * np.exp(deviations.frequency[free]) * factor[0]
-            ratio = plant.damping_ratio[free] * np.exp(deviations.damping[free]) * factor[1]
-            modes = make_modes(omega, ratio, self.step_s)
+            modes = make_modes(omega[free] * factor[0], ratio[free] * factor[1], self.step_s)
             z = modes.drive(total)
             if len(freedom.moving):
                 z[freedom.moving] += self._free(modes)

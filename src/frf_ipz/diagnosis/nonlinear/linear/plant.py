@@ -113,6 +113,11 @@ class Plant:
         """Number of modes that are followed."""
         return len(self.omega_rad_s)
 
+    def poles(self, deviations: Deviations) -> tuple[FloatArray, FloatArray]:
+        """Natural frequencies, rad/s, and damping ratios of the real structure, (n_modes,) each."""
+        frequency, damping = (np.clip(one, -FARTHEST, FARTHEST) for one in (deviations.frequency, deviations.damping))
+        return self.omega_rad_s * np.exp(frequency), self.damping_ratio * np.exp(damping)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Deviations:
@@ -369,7 +374,6 @@ def respond(plant: Plant, s: ComplexArray, deviations: Deviations) -> PlantRespo
     PlantResponse
         Receptances between all points.
     """
-    omega = plant.omega_rad_s * np.exp(np.clip(deviations.frequency, -FARTHEST, FARTHEST))
-    ratio = plant.damping_ratio * np.exp(np.clip(deviations.damping, -FARTHEST, FARTHEST))
+    omega, ratio = plant.poles(deviations)
     modes = 1 / (s**2 + (2 * ratio * omega)[:, None] * s + (omega**2)[:, None])
     return PlantResponse(plant=plant, s=s, deviations=deviations, modes=modes)
