@@ -20,9 +20,18 @@ from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pairs
 from frf_ipz.diagnosis.search.close import close_search
+from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.search import CLOSE_EACH, Ranking, fit_nothing, search, search_beside
+from frf_ipz.diagnosis.search.search import (
+    CLOSE_EACH,
+    CLOSE_FITTED,
+    Ranking,
+    _most_promising,
+    fit_nothing,
+    search,
+    search_beside,
+)
 from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
@@ -296,6 +305,20 @@ def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_
     fits = [one_of(f"effect_{number}", -number) for number in range(10)]
     search_second(None, Ranking(base=fits[-1], fits=tuple(fits), n_tried=0), lambda _: is_good)
     assert tried == fits[1 : 1 + count]
+
+
+def test_the_best_place_of_each_effect_is_fitted_before_others_of_better_ones():
+    """A linear step promises a small part of what some effects explain."""
+    promised = [(number, place, 100.0 - 12 * number - place / 10) for number in range(6) for place in (0, 10, 20)]
+    starts = [Start(cause=a_cause(number, place), values=np.ones(1), cost=-nats) for number, place, nats in promised]
+    chosen = [(one.cause.effect.name, one.cause.place.key[0]) for one in _most_promising(starts, 45.0)]
+    assert chosen[:5] == [(number, 0) for number in range(5)]  # the sixth promises less
+    assert len(chosen) == CLOSE_FITTED - 1
+    assert (4, 10) not in chosen
+
+
+def a_cause(name, place):
+    return SimpleNamespace(effect=SimpleNamespace(name=name), place=SimpleNamespace(key=(place, "z")))
 
 
 def one_of(name, log_evidence):

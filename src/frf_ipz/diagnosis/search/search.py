@@ -183,9 +183,14 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
 
 
 def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
-    """Take the best places of each effect that promise so much, nats, and are not far behind the best of all."""
-    starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)[:CLOSE_FITTED]
-    return [start for start in starts if -start.cost > max(least, -starts[0].cost - HOPELESS)]
+    """Take the best places of each effect that promise so much, nats, and are not far behind the best of all.
+
+    The best place of each comes first: a linear step may promise a small part of what an effect explains.
+    """
+    starts = sorted(spread(found, CLOSE_EACH), key=lambda start: start.cost)
+    firsts = {start.cause.effect.name: start for start in reversed(starts)}
+    starts.sort(key=lambda start: start is not firsts[start.cause.effect.name])
+    return [start for start in starts[:CLOSE_FITTED] if -start.cost > max(least, -starts[0].cost - HOPELESS)]
 
 
 def _fit_close(bench: Bench, base: Fit, start: Start) -> Fit:
