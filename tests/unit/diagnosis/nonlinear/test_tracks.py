@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear import search
@@ -116,6 +117,19 @@ def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
     again = search._with_place(found, plant, a_force(0, 100 * left, missed=linear))
     assert bool(again.place) == said
+
+
+@pytest.mark.parametrize(("there", "strength"), [((0.5, 0.0), 16.0), ((1e-9, 1.0), 2.0), ((-0.5, 0.0), 2.0)])
+def test_a_law_is_scaled_to_a_place_that_moves_alike_only(there, strength):
+    """A cubic spring of 2 at a place of shapes (1, 0)."""
+    points = SimpleNamespace(shapes=np.array([(1.0, 0.0), there]))
+    freedom = SimpleNamespace(plant=SimpleNamespace(at_places=points), of_no_place=lambda unknowns: unknowns)
+    nothing = dict.fromkeys(("unknowns", "covariance", "motion", "velocity", "force", "misfit"), np.zeros(0))
+    law = SimpleNamespace(degree=3)
+    fit = candidates.LawFit(law=law, place=0, strength=2.0, shape=0.0, cost=1.0, n_rows=1, **nothing)
+    moved = candidates._moved(SimpleNamespace(linear=SimpleNamespace(freedom=freedom)), fit, 1)
+    assert moved.place == 1
+    assert moved.strength == pytest.approx(strength)
 
 
 @pytest.mark.parametrize(("again", "best"), [(6.0, 3), (30.0, 7)])

@@ -34,6 +34,7 @@ FINALISTS = 3  # that are simulated on long stretches
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
 BETTER = 0.02  # relative drop of the cost on short stretches, by a start from still shorter ones, that is worth more
 NEIGHBOURS = 2
+LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighbours, and a law would grow without end
 CLIMBS = 8  # steps to better neighbours
 EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
 ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
@@ -224,7 +225,7 @@ def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
     here, there = freedom.plant.at_places.shapes[[fit.place, place]]
     fit = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
     ratio = float(here @ there / max(float(here @ here), 1e-300))
-    if ratio <= 0:
+    if ratio < LEAST_RATIO:
         return fit
     return replace(fit, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
