@@ -190,11 +190,12 @@ def _best(cause: Cause, sketch: Sketch, terms: Terms) -> Start:
         amplitudes = np.broadcast_to(sketch.amplitudes, (len(sketch.shapes), len(sketch.amplitudes)))
     costs = _costs(sketch.shapes, amplitudes, terms)
     shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
-    best = amplitudes[shape, size]
+    best, cost = amplitudes[shape, size], costs[shape, size]
     for closer in CLOSER if amplitudes.shape[1] > 1 else ():
         around = best * closer
-        best = around[int(np.argmin(_costs(sketch.shapes[shape, None], around[None], terms)))]
-    cost = _costs(sketch.shapes[shape, None], best[None, None], terms)[0, 0]
+        costs = _costs(sketch.shapes[shape, None], around[None], terms)[0]
+        nearest = int(np.argmin(costs))
+        best, cost = around[nearest], costs[nearest]
     values = sketch.values[shape].copy()
     if len(values):
         values[sketch.amplitude] *= best
