@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
+PARALLEL := -n auto --dist loadfile
 
 .PHONY: help demo test slow check bench proof clean
 
@@ -33,10 +34,10 @@ demo: .venv/run
 	$(BIN)/python pipelines/cantilever.py
 
 test: .venv/test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PARALLEL)
 
 slow: .venv/test
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest $(PARALLEL) -m slow
 
 check: .venv/test
 	$(BIN)/python -m pytest tests/architecture

@@ -43,7 +43,7 @@ def diagnosed(model, stiffness):
     return diagnose(model, observed(frfs), DiagnoseOptions(effects=IMITATORS))
 
 
-@pytest.mark.parametrize("order", [0.3, 0.5])
+@pytest.mark.parametrize("order", [pytest.param(0.3, marks=pytest.mark.slow), 0.5])
 def test_a_fractional_damper_is_not_named_by_what_imitates_it(nominal, order):
     middle = 2 * np.pi * np.sqrt(np.prod(BAND_HZ))
     found = diagnosed(nominal, lambda s: 300.0 * (s / middle) ** order)

@@ -274,6 +274,7 @@ def test_a_small_gain_is_not_taken_for_a_wrong_sign(nominal):
     assert all(start.cost > 0 for start in starts if start.cause.place.key[1] == -1)
 
 
+@pytest.mark.slow
 def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(nominal):
     """A resonator stands for a mass and a spring as long as nothing stands beside it."""
     true = with_springs(with_point_masses(nominal, {12: 0.005}), {Dof(8, "z"): 3 * WEAK_N_M})

@@ -128,6 +128,7 @@ def test_signs_of_sensors_and_blows_turn_the_frf_round():
     assert_allclose(other.measured_frf(lines), expected, rtol=ALGEBRA)
 
 
+@pytest.mark.slow
 def test_locations_and_parameters_are_those_of_the_contract():
     for effect, (places, names) in TABLE.items():
         truth = concealed(effect).truth

@@ -111,6 +111,12 @@ def a_plant_of(n_places):
     return SimpleNamespace(freedom=SimpleNamespace(plant=SimpleNamespace(places=range(n_places))))
 
 
+def test_neighbours_move_alike_or_the_other_way_round():
+    """Four places of two modes: the fourth is a spring that is counted the other way round."""
+    shapes = np.array([(1.0, 0.0), (0.2, 1.0), (1.0, 0.8), (-0.5, 0.02)])
+    assert candidates.neighbours(SimpleNamespace(at_places=SimpleNamespace(shapes=shapes)), 0, 2) == [3, 2]
+
+
 @pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 2600.0, True)])
 def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
     plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
@@ -119,7 +125,7 @@ def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly
     assert bool(again.place) == said
 
 
-@pytest.mark.parametrize(("there", "strength"), [((0.5, 0.0), 16.0), ((1e-9, 1.0), 2.0), ((-0.5, 0.0), 2.0)])
+@pytest.mark.parametrize(("there", "strength"), [((0.5, 0.0), 16.0), ((1e-9, 1.0), 2.0), ((-0.5, 0.0), 16.0)])
 def test_a_law_is_scaled_to_a_place_that_moves_alike_only(there, strength):
     """A cubic spring of 2 at a place of shapes (1, 0)."""
     points = SimpleNamespace(shapes=np.array([(1.0, 0.0), there]))
@@ -132,16 +138,24 @@ def test_a_law_is_scaled_to_a_place_that_moves_alike_only(there, strength):
     assert moved.strength == pytest.approx(strength)
 
 
-@pytest.mark.parametrize(("again", "best"), [(6.0, 3), (30.0, 7)])
-def test_the_numbers_of_the_best_place_are_tried_at_the_next_best(monkeypatch, again, best):
-    """A law leaves 10 at place 7, 15 at place 3 and 50 at place 4, each from its own start."""
+@pytest.mark.parametrize(("place", "best"), [(3, 3), (9, 9), (4, 7)])
+def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(monkeypatch, place, best):
+    """A law leaves 10 at place 7, 15 at place 3, and 50 at places 4 and 9, from its own start; 6 from better numbers."""
     law = SimpleNamespace(name="friction")
-    fits = [SimpleNamespace(law=law, place=place, cost=cost) for place, cost in ((7, 10.0), (3, 15.0), (4, 50.0))]
-    monkeypatch.setattr(candidates, "_moved", lambda _, fit, place: SimpleNamespace(law=fit.law, place=place))
-    track = SimpleNamespace(shoot=lambda fit, _: SimpleNamespace(law=law, place=fit.place, cost=again))
-    assert candidates._exchange(track, fits) == (best == 3)
-    assert min(fits, key=lambda fit: fit.cost).place == best
-    assert [fit.cost for fit in fits] == [10.0, min(15.0, again), 50.0]
+    costs = {7: 10.0, 3: 15.0, 4: 50.0, 9: 50.0}
+    fits = [SimpleNamespace(law=law, place=one, cost=cost, strength=1.0) for one, cost in costs.items()]
+    costs[place] = 6.0
+    monkeypatch.setattr(candidates, "_moved", lambda _, fit, there: SimpleNamespace(law=fit.law, place=there))
+    monkeypatch.setattr(candidates, "neighbours", lambda *_: [9])
+    track = SimpleNamespace(
+        linear=a_plant_of(10),
+        shoot=lambda fit, _: SimpleNamespace(
+            law=law, place=fit.place, cost=costs[fit.place], strength=1.0, settled=True
+        ),
+    )
+    assert candidates._exchange(track, fits) == (best != 7)
+    assert fits[0].place == best
+    assert len(fits) == 4  # each place once
 
 
 def a_law_at(place, cost):
@@ -174,6 +188,7 @@ def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, b
     monkeypatch.setattr(candidates, "_different", lambda fits: list({fit.place: fit for fit in fits}.values()))
     monkeypatch.setattr(candidates, "_climb", lambda *_: None)
     monkeypatch.setattr(candidates, "_settle", lambda *_: None)
+    monkeypatch.setattr(candidates, "_exchange", lambda *_: False)
     found = candidates.find_candidates(tracks["short"], tracks["long"], ["cubic"], first=lambda: tracks["first"])
     assert [fit.place for fit in found] == expected
 

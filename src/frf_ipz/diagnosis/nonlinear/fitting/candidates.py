@@ -37,6 +37,7 @@ NEIGHBOURS = 2
 LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighbours, and a law would grow without end
 CLIMBS = 8  # steps to better neighbours
 EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
+EXCHANGES = 3  # times that this may lead to a better place
 ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
 
 
@@ -134,7 +135,9 @@ def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
     _climb(track, fits)
     if fits:
         _settle(track, fits)
-        if _exchange(track, fits):
+        for _ in range(EXCHANGES):
+            if not _exchange(track, fits):
+                break
             _settle(track, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
@@ -195,13 +198,17 @@ def _settle(track: Track, fits: list[LawFit]) -> None:
 
 
 def _exchange(track: Track, fits: list[LawFit]) -> bool:
-    """Fit a law once more at its next best places, from its numbers at the best; true if that is better than all."""
+    """Fit a law once more at its next best places and at those beside it, from its numbers at the best.
+
+    They were fitted from numbers that were less good, and may have been led astray. True if one is better than all.
+    """
     best = min(fits, key=lambda fit: fit.cost)
-    others = [i for i, fit in enumerate(fits) if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
-    for i in sorted(others, key=lambda i: fits[i].cost)[:EXCHANGED]:
-        again = track.shoot(_moved(track, best, fits[i].place), MORE)
-        fits[i] = min(fits[i], again, key=lambda fit: fit.cost)
-    return min(fits, key=lambda fit: fit.cost) is not best
+    likely = [fit for fit in fits if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
+    others = [fit.place for fit in sorted(likely, key=lambda fit: fit.cost)[:EXCHANGED]]
+    others += [place for place in neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS) if place not in others]
+    again = _simulated(track, [_moved(track, best, place) for place in others], least=best.cost)
+    fits[:] = _best_of_each(fits + again)
+    return fits[0] is not best
 
 
 def _climb(track: Track, fits: list[LawFit]) -> None:
@@ -224,14 +231,15 @@ def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
     freedom = track.linear.freedom
     here, there = freedom.plant.at_places.shapes[[fit.place, place]]
     fit = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
-    ratio = float(here @ there / max(float(here @ here), 1e-300))
-    if ratio < LEAST_RATIO:
+    own = max(float(np.linalg.norm(here)), 1e-300)
+    if abs(float(here @ there)) < LEAST_RATIO * own**2:
         return fit
+    ratio = float(np.linalg.norm(there)) / own
     return replace(fit, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
 
 def neighbours(plant: Plant, place: int, count: int) -> list[int]:
-    """List the places whose mode shapes are most like those of a place.
+    """List the places whose mode shapes are most like those of a place, or most like their opposite.
 
     Parameters
     ----------
@@ -249,4 +257,5 @@ def neighbours(plant: Plant, place: int, count: int) -> list[int]:
     """
     shapes = plant.at_places.shapes
     alike = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
-    return [int(i) for i in np.argsort(np.linalg.norm(alike - alike[place], axis=1))[1 : count + 1]]
+    nearest = np.argsort(-np.abs(alike @ alike[place]), kind="stable")
+    return [int(i) for i in nearest if i != place][:count]
