@@ -140,7 +140,7 @@ def test_a_law_is_scaled_to_a_place_that_moves_alike_only(there, strength):
 
 @pytest.mark.parametrize(("place", "best"), [(3, 3), (9, 9), (4, 7)])
 def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(monkeypatch, place, best):
-    """A law leaves 10 at place 7, 15 at place 3, and 50 at places 4 and 9, from its own start; 6 from better numbers."""
+    """A law leaves 10 at place 7, 15 at place 3 and 50 at 4 and 9, each from its own start; 6 from better numbers."""
     law = SimpleNamespace(name="friction")
     costs = {7: 10.0, 3: 15.0, 4: 50.0, 9: 50.0}
     fits = [SimpleNamespace(law=law, place=one, cost=cost, strength=1.0) for one, cost in costs.items()]
