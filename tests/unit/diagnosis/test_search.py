@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.diagnosis.physics.response import modify
+from frf_ipz.diagnosis.physics.response import modify, scatter
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import parse_dof
@@ -86,7 +86,7 @@ def test_an_unstable_structure_has_modes_too(bench):
     basis, nuisance = bench.specimen.basis, bench.nuisance
     hypothesis = bench.suppose(())
     softer = Change(stiffness=-1.5 * basis.model.stiffness_all)
-    modes = modify(basis, softer, hypothesis.rows, nuisance.unpack(np.zeros(nuisance.size)))
+    modes = scatter(basis, modify(basis, softer), hypothesis.rows, nuisance.unpack(np.zeros(nuisance.size)))
     assert modes.squares.min() < 0
     assert np.isfinite(modes.vectors).all()
 

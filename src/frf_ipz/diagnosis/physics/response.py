@@ -148,8 +148,30 @@ def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) ->
     )
 
 
-def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Modes:
-    """Solve for the modes of a modified structure, with scatter.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modified:
+    """A modified structure without scatter.
+
+    Parameters
+    ----------
+    change : Change
+        What is different.
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2; 0 for rigid-body modes.
+    vectors : (q_basis, q) array
+        The modes in terms of the basis.
+    stated_ratio : (q,) array
+        Damping ratios.
+    """
+
+    change: Change
+    squares: FloatArray
+    vectors: FloatArray
+    stated_ratio: FloatArray
+
+
+def modify(basis: Basis, change: Change) -> Modified:
+    """Solve for the modes of a modified structure.
 
     Parameters
     ----------
@@ -157,15 +179,11 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
         Coordinates.
     change : Change
         What is different in structure and damping.
-    rows : Rows
-        Sensors and blows.
-    unknowns : Unknowns
-        What cannot be known.
 
     Returns
     -------
-    Modes
-        By ascending frequency.
+    Modified
+        Its modes, by ascending frequency.
     """
     squares, vectors = solved(basis, change)
     largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
@@ -175,20 +193,42 @@ def modify(basis: Basis, change: Change, rows: Rows, unknowns: Unknowns) -> Mode
     squares = np.where(np.abs(squares) <= RIGID * abs(elastic), 0.0, squares)
     if change.floating:
         squares[:n_rigid] = 0.0
-    omega = np.sqrt(np.abs(squares))
-    scattered, rotation = _scatter(squares, omega, unknowns)
-    m = len(rotation)
-    turned = vectors.copy()
-    turned[:, :m] = vectors[:, :m] @ rotation
     stated = _ratios(basis, change, squares)
-    stated[: basis.modes.n_rigid] = SUSPENSION_RATIO
-    ratio = stated.copy()
+    stated[:n_rigid] = SUSPENSION_RATIO
+    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated)
+
+
+def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) -> Modes:
+    """Add to a modified structure what cannot be known.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    modified : Modified
+        The structure.
+    rows : Rows
+        Sensors and blows.
+    unknowns : Unknowns
+        What cannot be known.
+
+    Returns
+    -------
+    Modes
+        By ascending frequency without scatter.
+    """
+    omega = np.sqrt(np.abs(modified.squares))
+    scattered, rotation = _scatter(modified.squares, omega, unknowns)
+    m = len(rotation)
+    turned = modified.vectors.copy()
+    turned[:, :m] = modified.vectors[:, :m] @ rotation
+    ratio = modified.stated_ratio.copy()
     ratio[:m] *= 1 + unknowns.damping
     viscous = turned.T @ basis.damping @ turned if basis.damping.any() else None
     return Modes(
         omega=omega,
         squares=scattered,
-        stated_ratio=stated,
+        stated_ratio=modified.stated_ratio,
         ratio=ratio,
         rotation=rotation,
         outputs=rows.outputs @ turned,

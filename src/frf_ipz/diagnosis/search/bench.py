@@ -58,27 +58,31 @@ class Bench:
         """Make a hypothesis."""
         return suppose(self.specimen, self.nuisance, causes, exact=exact)
 
-    def fit(self, causes: tuple[Cause, ...], values: FloatArray) -> Fit:
-        """Fit causes, from values of their parameters."""
-        return self.fit_from(self.fit_early(causes, values))
+    def fit(self, causes: tuple[Cause, ...], values: FloatArray, *, bar: float = np.inf) -> Fit:
+        """Fit causes, from values of their parameters; given up where the cost does not come below a bar."""
+        return self.fit_from(self.fit_early(causes, values), bar=bar)
 
     def fit_early(self, causes: tuple[Cause, ...], values: FloatArray) -> Fit:
         """Fit causes with large errors, from values of their parameters."""
         return polish(self.suppose(causes), self.early, values, iterations=6, tolerance=1.0)
 
-    def fit_from(self, fit: Fit) -> Fit:
-        """Fit exactly, from a fit with large errors."""
-        freely = replace(self.data, is_bounded=False)
-        near = polish(fit.hypothesis, freely, fit.values, unknown=fit.unknown, iterations=16)
-        return polish(fit.hypothesis, self.data, near.values, unknown=near.unknown, iterations=12)
+    def fit_from(self, fit: Fit, *, bar: float = np.inf) -> Fit:
+        """Fit exactly, from a fit with large errors; given up where the cost does not come below a bar."""
+        freely = replace(self.data, is_bounded=False)  # costs no more than with bounds
+        near = polish(fit.hypothesis, freely, fit.values, unknown=fit.unknown, iterations=16, bar=bar)
+        iterations = 12 if near.cost < bar else 0
+        return polish(fit.hypothesis, self.data, near.values, unknown=near.unknown, iterations=iterations, bar=bar)
 
-    def fit_beside(self, hypothesis: Hypothesis, values: FloatArray, base: Fit) -> Fit:
-        """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies."""
+    def fit_beside(self, hypothesis: Hypothesis, values: FloatArray, base: Fit, *, bar: float = np.inf) -> Fit:
+        """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies.
+
+        It is given up where the cost does not come below a bar.
+        """
         inside = hypothesis.physical(hypothesis.start_at(values))
         starts = (base.unknown, same_modes(hypothesis, inside, base))
         costs = [self._cost(hypothesis, inside, unknown) for unknown in starts]
         unknown = starts[int(np.argmin(costs))]
-        return polish(hypothesis, self.data, inside, unknown=unknown, iterations=8, tolerance=0.2)
+        return polish(hypothesis, self.data, inside, unknown=unknown, iterations=8, tolerance=0.2, bar=bar)
 
     def _cost(self, hypothesis: Hypothesis, values: FloatArray, unknown: FloatArray) -> float:
         white = self.data.misfit(hypothesis.respond(values, unknown, self.data.measured.s))

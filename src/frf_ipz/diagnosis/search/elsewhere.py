@@ -14,7 +14,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.polish import polish, same_modes
-from frf_ipz.diagnosis.search.search import Fits, Ranking, climb_all, ranked
+from frf_ipz.diagnosis.search.search import Fits, Ranking, bar_of, climb_all, ranked
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -45,7 +45,10 @@ def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
     for start in [start for start in starts if start.cause.key not in fits][:FITTED]:
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
         values = np.concatenate([base.values, start.values])
-        unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
-        fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS)
+        unknown, bar = (
+            same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best),
+            bar_of(fits.values()),
+        )
+        fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
     climb_all(bench, base, fits)
     return replace(ranking, fits=ranked(bench, fits), n_tried=ranking.n_tried + len(starts))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,11 +12,14 @@ from frf_ipz.diagnosis.catalogue.together import build_together, typical_change
 from frf_ipz.diagnosis.physics.basis import Basis, enrich
 from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.nuisance import Nuisance
-from frf_ipz.diagnosis.physics.response import Modes, Response, Rows, modify, respond, rows_of
+from frf_ipz.diagnosis.physics.response import Modes, Modified, Response, Rows, modify, respond, rows_of, scatter
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
+
+
+REMEMBERED = 4  # sets of values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +78,7 @@ class Hypothesis:
     rows: Rows
     specimen: Specimen
     nuisance: Nuisance
+    _latest: dict[bytes, Modified] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def key(self) -> tuple[tuple[object, ...], ...]:
@@ -134,13 +138,22 @@ class Hypothesis:
 
     def modes(self, values: FloatArray, unknown: FloatArray) -> Modes:
         """Modes for physical values of the parameters, and of what cannot be known in standard deviations."""
-        return modify(self.basis, self.change(values), self.rows, self.nuisance.unpack(unknown))
+        return scatter(self.basis, self._modified(values), self.rows, self.nuisance.unpack(unknown))
 
     def respond(self, values: FloatArray, unknown: FloatArray, s: ComplexArray) -> Response:
         """FRFs for physical values of the parameters, and of what cannot be known in standard deviations."""
-        change, unknowns = self.change(values), self.nuisance.unpack(unknown)
-        modes = modify(self.basis, change, self.rows, unknowns)
-        return respond(modes, change, self.specimen.layout, unknowns, s, self.basis)
+        modified, unknowns = self._modified(values), self.nuisance.unpack(unknown)
+        modes = scatter(self.basis, modified, self.rows, unknowns)
+        return respond(modes, modified.change, self.specimen.layout, unknowns, s, self.basis)
+
+    def _modified(self, values: FloatArray) -> Modified:
+        """Solve without scatter, once for the latest values: steps try several scatters for the same."""
+        key = values.tobytes()
+        if key not in self._latest:
+            if len(self._latest) >= REMEMBERED:
+                self._latest.pop(next(iter(self._latest)))
+            self._latest[key] = modify(self.basis, self.change(values))
+        return self._latest[key]
 
 
 def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:

@@ -24,6 +24,7 @@ from frf_ipz.diagnosis.search.search import (
     GAIN,
     Fits,
     Ranking,
+    bar_of,
     by_effect,
     climb_all,
     how_many,
@@ -129,7 +130,9 @@ def _of_pairs(bench: Bench, first: Ranking, known: float) -> list[Ranking]:
     for start in starts:
         if start.cost < NOT_FAR * starts[0].cost:
             pairs += [(start.cause, both) for both in _companions(bench, start)]
-    exact = [bench.fit_from(fit) for fit in _early(bench, pairs)]
+    exact: list[Fit] = []
+    for fit in _early(bench, pairs):
+        exact.append(bench.fit_from(fit, bar=bar_of(exact)))
     best = max(exact, key=lambda fit: fit.log_evidence)
     if best.cost > known:
         return []

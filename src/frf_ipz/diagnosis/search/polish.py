@@ -34,6 +34,9 @@ FARTHEST = 0.1  # of a squared frequency: more is no small correction
 LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
 MATTERS = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
+PATIENCE = 3  # steps after which a fit may be given up
+MANY = 0.3  # of the longest step: parameters that move so much are still on their way
+FURTHER = 6.0  # times the last gain: what further steps may gain together
 ROUNDING = 1e-9  # of a diagonal entry: what a sum of squares of many lines is exact to
 
 
@@ -61,6 +64,7 @@ def polish(
     unknown: FloatArray | None = None,
     iterations: int = 8,
     tolerance: float = 0.02,
+    bar: float = np.inf,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -78,6 +82,8 @@ def polish(
         At most that many.
     tolerance : float
         Stop when a step changes the objective by less, in squared standard deviations.
+    bar : float
+        Cost, half the objective, that a fit is wanted below: one whose last step does not lead there is given up.
 
     Returns
     -------
@@ -88,7 +94,7 @@ def polish(
     point = _at(hypothesis, data, start, np.zeros(hypothesis.nuisance.size) if unknown is None else unknown)
     slope = _linearise(hypothesis, data, point)
     damping, converged = FIRST_DAMPING, False
-    for _ in range(iterations):
+    for done in range(iterations):
         gain = 0.0
         while damping < MOST_DAMPING:
             trial = _step(hypothesis, data, point, slope, damping)
@@ -96,11 +102,14 @@ def polish(
             if gain > 0 or abs(gain) < tolerance:
                 break
             damping *= SLOWER
+        is_far = bool(np.any(np.abs(trial.searched - point.searched) > MANY * _longest_step(hypothesis)))
         if gain > 0:
             point, damping = trial, max(FASTER * damping, LEAST_DAMPING)
             slope = _linearise(hypothesis, data, point)
         if gain < tolerance:
             converged = True
+            break
+        if done >= PATIENCE and not is_far and point.objective - FURTHER * gain > 2 * bar:
             break
     return _finish(hypothesis, point, slope, converged=converged)
 
@@ -134,7 +143,7 @@ def _at(hypothesis: Hypothesis, data: Data, searched: FloatArray, unknown: Float
 
 def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
     m = hypothesis.nuisance.n_modes
-    columns, squares, ratios = [], [], []
+    changes, squares, ratios = [], [], []
     for index in range(len(hypothesis.parameters)):
         low, high = point.searched.copy(), point.searched.copy()
         low[index] = max(low[index] - STEP, hypothesis.low[index])
@@ -144,18 +153,18 @@ def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Slope:
             for searched in (low, high)
         )
         step = high[index] - low[index]
-        columns.append(data.slopes(point.response, ((after.values - before.values) / step)[:, :, None]))
+        changes.append((after.values - before.values) / step)
         squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
         ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
     by_unknown = nuisance_jacobian(point.response, hypothesis.nuisance, hypothesis.specimen.layout)
-    white = data.slopes(point.response, by_unknown)
-    used = np.sum(white**2, 0) > MATTERS
+    white = data.slopes(point.response, np.dstack([*changes, by_unknown]))
+    used = np.sum(white[:, len(changes) :] ** 2, 0) > MATTERS
     return _Slope(
-        jacobian=np.hstack([*columns, white[:, used]]),
+        jacobian=white[:, np.concatenate([np.ones(len(changes), bool), used])],
         used=used,
-        squares=np.reshape(squares, (len(columns), m)).T,
+        squares=np.reshape(squares, (len(changes), m)).T,
         scatter=_scatter_of_squares(point.response.modes, hypothesis.nuisance),
-        ratios=np.reshape(ratios, (len(columns), m)).T,
+        ratios=np.reshape(ratios, (len(changes), m)).T,
         slopes=point.slopes[used],
     )
 
@@ -167,14 +176,19 @@ def _step(hypothesis: Hypothesis, data: Data, point: _Point, slope: _Slope, damp
     gradient[n_parameters:] -= (point.pulls * point.slopes)[slope.used]
     damped = curvature + damping * np.diag(np.diag(curvature))
     step = linalg.cho_solve(linalg.cho_factor(damped, lower=True, check_finite=False), gradient, check_finite=False)
-    longest = np.where([parameter.is_log for parameter in hypothesis.parameters], LONGEST_STEP, 0.1)
     if n_parameters:
+        longest = _longest_step(hypothesis)
         step *= min(1.0, float(np.min(longest / np.maximum(np.abs(step[:n_parameters]), 1e-300))))
     searched = np.clip(point.searched + step[:n_parameters], hypothesis.low, hypothesis.high)
     unknown = point.unknown.copy()
     unknown[slope.used] += step[n_parameters:]
     unknown = _keep_modes(hypothesis, point, slope, searched, unknown)
     return _at(hypothesis, data, searched, unknown)
+
+
+def _longest_step(hypothesis: Hypothesis) -> FloatArray:
+    """How far each parameter may be moved at once, as searched."""
+    return np.where([parameter.is_log for parameter in hypothesis.parameters], LONGEST_STEP, 0.1)
 
 
 def _keep_modes(

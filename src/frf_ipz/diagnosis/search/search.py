@@ -32,10 +32,11 @@ BROKEN, BROKEN_PART = 10.0, 0.5  # nats, and of what a linear step promises: a f
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
-FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
+FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted to the end
 CLIMBED, CLIMBED_VAINLY = 6, 2  # effects whose neighbours are looked at, and where no further cause explains much
 VAIN = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
 HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
+WANTED = 2.0  # times the cost of one that explains all: a fit on its way there may have reached that much
 GAIN = 0.5  # nats: a neighbour must be better by that
 SETTLED = 2  # fits that go on until they converge
 MOST_STEPS = 12
@@ -137,9 +138,29 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
     tuple of Fit
         The best first.
     """
-    order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    settled = [fit if fit.converged or fit.is_hopeless else bench.go_on(fit) for fit in order[:SETTLED]]
+    order, bar = sorted(fits.values(), key=lambda fit: -fit.log_evidence), bar_of(fits.values())
+    is_open = [not (fit.converged or fit.is_hopeless or fit.cost > bar) for fit in order[:SETTLED]]
+    settled = [bench.go_on(fit) if go_on else fit for fit, go_on in zip(order, is_open, strict=False)]
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
+
+
+def bar_of(fits: Iterable[Fit]) -> float:
+    """Say below what cost a further fit is wanted.
+
+    Parameters
+    ----------
+    fits : iterable of Fit
+        What is known already.
+
+    Returns
+    -------
+    float
+        Not far above that of the best, if that explains nearly all; far above it otherwise. Infinite without fits.
+    """
+    best = max(fits, key=lambda fit: fit.log_evidence, default=None)
+    if best is None:
+        return np.inf
+    return WANTED * best.cost + BEHIND if best.is_nearly_all else FAR_BEHIND * best.cost + SLACK
 
 
 def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
@@ -162,7 +183,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
     fits: Fits = {}
     found = close_search(bench, base)
     for start in _most_promising(found, PROMISED_PART * least):
-        _keep(fits, _fit_close(bench, base, start))
+        _keep(fits, _fit_close(bench, base, start, bar_of((base, *fits.values()))))
     if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
         climb_all(bench, base, fits, _how_many_climb(base, fits))
     return Ranking(base=base, fits=ranked(bench, fits), n_tried=len(found))
@@ -175,10 +196,11 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     if not starts and base.is_nearly_right:
         starts = _most_promising(found, -np.inf)[:1]  # how little the best one explains is told
     for start in starts:
-        fit = _fit_close(bench, base, start)
+        bar = bar_of((base, *fits.values()))
+        fit = _fit_close(bench, base, start, bar)
         _keep(fits, fit)
         if fit.cost - base.cost - start.cost > max(BROKEN, -BROKEN_PART * start.cost):
-            _keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values])))
+            _keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values]), bar=bar))
     return len(found)
 
 
@@ -193,9 +215,9 @@ def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
     return [start for start in starts[:CLOSE_FITTED] if -start.cost > max(least, -starts[0].cost - HOPELESS)]
 
 
-def _fit_close(bench: Bench, base: Fit, start: Start) -> Fit:
+def _fit_close(bench: Bench, base: Fit, start: Start, bar: float) -> Fit:
     hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-    return bench.fit_beside(hypothesis, np.concatenate([base.values, start.values]), base)
+    return bench.fit_beside(hypothesis, np.concatenate([base.values, start.values]), base, bar=bar)
 
 
 def _keep(fits: Fits, fit: Fit) -> None:
@@ -213,7 +235,7 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     fits: Fits = {}
     for fit in early[: how_many(early, FITTED_EXACTLY)]:
         if fit.cost < FAR_BEHIND * early[0].cost + SLACK:
-            _keep(fits, bench.fit_from(fit))
+            _keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
     if not early[0].is_hopeless:
         _fit_imitators(bench, early, fits)
     return fits
@@ -245,7 +267,7 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
         effect = fit.hypothesis.causes[-1].effect
         if _are_alike(effect, best) and effect.name not in fitted:
             fitted.add(effect.name)
-            _keep(fits, bench.fit_from(fit))
+            _keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
 
 
 def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> None:
@@ -291,7 +313,7 @@ def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
     for effect in bench.effects.values():
         for other in causes_of(effect, bench.specimen) if _are_alike(effect, cause.effect) else ():
             if other.place.location == cause.place.location and other.key not in fits:
-                fits[other.key] = _from_neighbour(bench, base, other, best)
+                fits[other.key] = _from_neighbour(bench, base, other, best, bar_of(fits.values()))
 
 
 def _are_alike(one: Effect, other: Effect) -> bool:
@@ -307,7 +329,8 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
             if other.key in fits:
                 tried = fits[other.key]
             else:
-                tried = fits[other.key] = _from_neighbour(bench, base, other, fit)
+                bar = bar_of(fits.values())
+                tried = fits[other.key] = _from_neighbour(bench, base, other, fit, bar)
             if tried.log_evidence > better.log_evidence + GAIN:
                 better = tried
         if better is fit:
@@ -315,18 +338,18 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
         fit = better
 
 
-def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit) -> Fit:
+def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)
     if len(hypothesis.parameters) == len(fit.values) and fit.is_nearly_right:
         values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
         unknown = same_modes(hypothesis, values, fit)
-        return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1)
+        return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1, bar=bar)
     if len(hypothesis.parameters) == len(fit.values):
         start = fit.values
     else:
         best = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
         start = np.concatenate([base.values, best.values])
     values, _ = refine(hypothesis, bench.coarse, weights, start)
-    return bench.fit(causes, values)
+    return bench.fit(causes, values, bar=bar)

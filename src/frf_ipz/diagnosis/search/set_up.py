@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
 from frf_ipz.diagnosis.physics.layout import lay_out
 from frf_ipz.diagnosis.physics.nuisance import make_nuisance
-from frf_ipz.diagnosis.physics.response import modify, respond, rows_of
+from frf_ipz.diagnosis.physics.response import modify, respond, rows_of, scatter
 from frf_ipz.diagnosis.search.bench import Bench
 from frf_ipz.diagnosis.search.fit import Data
 
@@ -125,7 +125,7 @@ def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str
 def _scaled(measured: Measured, basis: Basis, layout: Layout, nuisance: Nuisance, free_gains: str) -> Measured:
     """Bring measured FRFs of unknown scale to the scale of the nominal model."""
     unknowns = nuisance.unpack(np.zeros(nuisance.size))
-    modes = modify(basis, NOTHING, rows_of(basis, layout, NOTHING, nuisance), unknowns)
+    modes = scatter(basis, modify(basis, NOTHING), rows_of(basis, layout, NOTHING, nuisance), unknowns)
     nominal = respond(modes, NOTHING, layout, unknowns, measured.s, basis)
     whitening = Whitening(factors=np.zeros((0, 0, 0), complex), blocks=())
     gains = Data(measured=measured, whitening=whitening, free_gains=free_gains).gains(nominal)
