@@ -57,12 +57,18 @@ class Layout:
     @property
     def gain_signs(self) -> FloatArray:
         """How FRFs follow the gains of `channels`, (n_frfs, n_channels): outputs multiply (1), forces divide (-1)."""
-        number = {channel: index for index, channel in enumerate(self.channels)}
-        signs = np.zeros((len(self.output_of), len(number)))
-        frf = np.arange(len(self.output_of))
-        signs[frf, np.array([number[channel] for channel, _ in self.outputs])[self.output_of]] = 1.0
-        signs[frf, np.array([number[channel] for channel in self.input_channels])[self.input_of]] = -1.0
-        return signs
+        return _gain_signs(self)
+
+
+@lru_cache(maxsize=4)  # a search asks for the same one at every step
+def _gain_signs(layout: Layout) -> FloatArray:
+    number = {channel: index for index, channel in enumerate(layout.channels)}
+    signs = np.zeros((len(layout.output_of), len(number)))
+    frf = np.arange(len(layout.output_of))
+    signs[frf, np.array([number[channel] for channel, _ in layout.outputs])[layout.output_of]] = 1.0
+    signs[frf, np.array([number[channel] for channel in layout.input_channels])[layout.input_of]] = -1.0
+    signs.flags.writeable = False
+    return signs
 
 
 def lay_out(labels: Sequence[FrfLabel]) -> Layout:

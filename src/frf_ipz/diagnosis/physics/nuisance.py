@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -241,7 +242,8 @@ class Nuisance:
         Unknowns
             The values.
         """
-        parts = np.split(values, np.cumsum(self.sizes)[:-1])
+        ends = list(accumulate(self.sizes))
+        parts = [values[start:end] for start, end in pairwise((0, *ends))]
         return Unknowns(
             kappa=self._symmetric(parts[0]) * self.kappa_std,
             mu=self._symmetric(parts[1]) * self.mu_std,

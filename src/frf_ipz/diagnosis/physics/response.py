@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.physics.basis import solved
+from frf_ipz.diagnosis.physics.basis import eigh_of_two, solved
 from frf_ipz.diagnosis.physics.layout import motion_row
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
@@ -242,13 +242,15 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
     m, rigid = len(unknowns.kappa), len(unknowns.cords)
+    if not (unknowns.kappa.any() or unknowns.mu.any() or unknowns.cords.any()):
+        return squares, np.eye(m)
     block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
     block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
     mu = unknowns.mu
     if np.linalg.norm(mu) > MOST_OF_MASS:  # no step may take all mass away
         least = float(linalg.eigvalsh(mu, subset_by_index=(0, 0), check_finite=False)[0])
         mu = mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))
-    values, rotation = linalg.eigh(block, np.eye(m) + mu, check_finite=False)
+    values, rotation = eigh_of_two(block, np.eye(m) + mu)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation
 
