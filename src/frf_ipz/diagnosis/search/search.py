@@ -32,7 +32,7 @@ BROKEN, BROKEN_PART = 10.0, 0.5  # nats, and of what a linear step promises: a f
 CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
-FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted to the end
+FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
 CLIMBED, CLIMBED_VAINLY = 6, 2  # effects whose neighbours are looked at, and where no further cause explains much
 VAIN = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
 HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
@@ -155,12 +155,11 @@ def bar_of(fits: Iterable[Fit]) -> float:
     Returns
     -------
     float
-        Not far above that of the best, if that explains nearly all; far above it otherwise. Infinite without fits.
+        Not far above that of the best, if that explains nearly all; infinite otherwise: from a start that is a little
+        off, a fit may gain little for many steps before it falls to a thousandth.
     """
     best = max(fits, key=lambda fit: fit.log_evidence, default=None)
-    if best is None:
-        return np.inf
-    return WANTED * best.cost + BEHIND if best.is_nearly_all else FAR_BEHIND * best.cost + SLACK
+    return WANTED * best.cost + BEHIND if best is not None and best.is_nearly_all else np.inf
 
 
 def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:

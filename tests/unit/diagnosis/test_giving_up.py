@@ -1,0 +1,104 @@
+"""Fits that do not come near the best are given up, and what a step asks for twice is solved for once."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import linalg
+
+from diagnosed import BAND_HZ, beam, measured, observed
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.basis import eigh_of_two
+from frf_ipz.diagnosis.search import hypothesis as hypotheses
+from frf_ipz.diagnosis.search import search
+from frf_ipz.diagnosis.search.far.wide import causes_of
+from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.fe.changes import with_point_masses
+
+MASS_KG = 0.02
+START = np.array([MASS_KG / 1.1])
+DIGITS = 1e-12
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    nominal = beam(tmp_path_factory.mktemp("beam"))
+    effects = {"added_mass": shipped_effects()["added_mass"]}
+    source = divide(observed(measured(with_point_masses(nominal, {12: MASS_KG}))))
+    return set_up(nominal, source, BAND_HZ, DiagnoseOptions(), effects)
+
+
+def mass_at(bench, node):
+    causes = causes_of(bench.effects["added_mass"], bench.specimen)
+    return next(cause for cause in causes if cause.place.location == {"nodes": [node]})
+
+
+def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(bench):
+    right = bench.fit((mass_at(bench, 12),), START)
+    wrong = (mass_at(bench, 16),)
+    to_the_end = bench.fit(wrong, START)
+    given_up = bench.fit(wrong, START, bar=search.bar_of([right]))
+    assert to_the_end.cost > 4 * search.bar_of([right])
+    assert given_up.cost > to_the_end.cost
+    assert not given_up.converged
+
+
+def test_a_bar_does_not_stop_a_fit_on_its_way_below_it(bench):
+    right = bench.fit((mass_at(bench, 12),), START)
+    again = bench.fit((mass_at(bench, 12),), START, bar=search.bar_of([right]))
+    assert again.cost == right.cost
+
+
+def a_fit(cost, *, is_nearly_all, converged=True):
+    return SimpleNamespace(
+        cost=cost, log_evidence=-cost, is_nearly_all=is_nearly_all, is_hopeless=False, converged=converged
+    )
+
+
+def test_the_bar_is_near_the_best_if_that_explains_nearly_all():
+    worse = a_fit(9000.0, is_nearly_all=False)
+    assert search.bar_of([]) == np.inf
+    assert search.bar_of([worse]) == np.inf
+    assert search.bar_of([worse, a_fit(100.0, is_nearly_all=True)]) == pytest.approx(500.0)
+
+
+def test_only_a_fit_below_the_bar_goes_on():
+    gone_on = []
+    bench = SimpleNamespace(go_on=lambda fit: gone_on.append(fit) or fit)
+    best = a_fit(100.0, is_nearly_all=True, converged=False)
+    near, far = (a_fit(cost, is_nearly_all=False, converged=False) for cost in (300.0, 9000.0))
+    search.ranked(bench, {1: best, 2: far})
+    search.ranked(bench, {1: best, 2: near})
+    assert gone_on == [best, best, near]
+
+
+def test_the_modes_of_the_same_values_are_solved_for_once(bench, monkeypatch):
+    solved = []
+    modify = hypotheses.modify
+    monkeypatch.setattr(hypotheses, "modify", lambda *args: solved.append(args) or modify(*args))
+    hypothesis = bench.suppose((mass_at(bench, 12),))
+    nothing = np.zeros(hypothesis.nuisance.size)
+    scattered = nothing.copy()
+    scattered[hypothesis.nuisance.frequency_places[-1]] = 1.0
+    first, second = hypothesis.modes(START, nothing), hypothesis.modes(START, scattered)
+    assert len(solved) == 1
+    assert not np.allclose(first.squares, second.squares, rtol=DIGITS)
+    assert_allclose(bench.suppose(hypothesis.causes).modes(START, scattered).squares, second.squares, rtol=DIGITS)
+    for factor in range(1, hypotheses.REMEMBERED + 1):
+        hypothesis.modes((1 + factor) * START, nothing)
+    before = len(solved)
+    hypothesis.modes(START, nothing)  # was forgotten
+    assert len(solved) == before + 1
+
+
+def test_a_generalised_eigenproblem_is_scipys():
+    rng = np.random.default_rng(3)
+    first, second = (part @ part.T for part in rng.standard_normal((2, 9, 9)))
+    values, vectors = eigh_of_two(first, second)
+    assert_allclose(values, linalg.eigvalsh(first, second), rtol=1e-9)
+    assert_allclose(vectors.T @ second @ vectors, np.eye(9), atol=1e-9)
+    with pytest.raises(linalg.LinAlgError):
+        eigh_of_two(first, -second)
