@@ -153,7 +153,9 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
             law=law, place=fit.place, cost=costs[fit.place], strength=1.0, settled=True
         ),
     )
-    assert candidates._exchange(track, fits) == (best != 7)
+    if place == 9:
+        assert not candidates._exchange(track, list(fits), beside=False)
+    assert candidates._exchange(track, fits, beside=True) == (best != 7)
     assert fits[0].place == best
     assert len(fits) == 4  # each place once
 
@@ -188,7 +190,7 @@ def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, b
     monkeypatch.setattr(candidates, "_different", lambda fits: list({fit.place: fit for fit in fits}.values()))
     monkeypatch.setattr(candidates, "_climb", lambda *_: None)
     monkeypatch.setattr(candidates, "_settle", lambda *_: None)
-    monkeypatch.setattr(candidates, "_exchange", lambda *_: False)
+    monkeypatch.setattr(candidates, "_exchange", lambda *_, **__: False)
     found = candidates.find_candidates(tracks["short"], tracks["long"], ["cubic"], first=lambda: tracks["first"])
     assert [fit.place for fit in found] == expected
 

@@ -32,7 +32,7 @@ HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on 
 HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
-BETTER = 0.02  # relative drop of the cost on short stretches, by a start from still shorter ones, that is worth more
+BETTER = 0.02  # relative drop of the cost that is worth more: by another start, or places beside to be fitted again
 NEIGHBOURS = 2
 LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighbours, and a law would grow without end
 CLIMBS = 8  # steps to better neighbours
@@ -134,11 +134,14 @@ def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
     fits = _simulated(track, _different(finalists), hopeless=HOPELESS_LATE)
     _climb(track, fits)
     if fits:
+        climbed = min(fit.cost for fit in fits)
         _settle(track, fits)
+        has_moved = min(fit.cost for fit in fits) < (1 - BETTER) * climbed
         for _ in range(EXCHANGES):
-            if not _exchange(track, fits):
+            if not _exchange(track, fits, beside=has_moved):
                 break
             _settle(track, fits)
+            has_moved = True
     return sorted(fits, key=lambda fit: fit.cost)
 
 
@@ -197,15 +200,16 @@ def _settle(track: Track, fits: list[LawFit]) -> None:
             fits[best] = min(fit, again, key=lambda one: one.cost)
 
 
-def _exchange(track: Track, fits: list[LawFit]) -> bool:
-    """Fit a law once more at its next best places and at those beside it, from its numbers at the best.
+def _exchange(track: Track, fits: list[LawFit], *, beside: bool) -> bool:
+    """Fit a law once more at its next best places, and at those beside the best if asked, from its numbers there.
 
     They were fitted from numbers that were less good, and may have been led astray. True if one is better than all.
     """
     best = min(fits, key=lambda fit: fit.cost)
     likely = [fit for fit in fits if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
     others = [fit.place for fit in sorted(likely, key=lambda fit: fit.cost)[:EXCHANGED]]
-    others += [place for place in neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS) if place not in others]
+    near = neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS) if beside else []
+    others += [place for place in near if place not in others]
     again = _simulated(track, [_moved(track, best, place) for place in others], least=best.cost)
     fits[:] = _best_of_each(fits + again)
     return fits[0] is not best

@@ -25,9 +25,13 @@ class CubicStiffness(Law):
         return np.asarray(w * w * w)
 
     def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
-        """Newton's method for u + beta k u^3 = w."""
+        """Solve u + beta k u^3 = w: in closed form, but by Newton's method for a spring that softens."""
         del v
         u, scale = w, step.motion * step.strength
+        if scale > 0:
+            bent = np.sqrt(3 * scale)
+            u = 2 / bent * np.sinh(np.arcsinh(1.5 * bent * w) / 3)
+            return np.asarray(step.strength * u * u * u)
         for _ in range(NEWTON_STEPS):
             square = scale * (u * u)
             u = (2 * square * u + w) / (1 + 3 * square)
