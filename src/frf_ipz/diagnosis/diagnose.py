@@ -121,10 +121,11 @@ def diagnose(
     if excess <= 1:
         return linear
     laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
+    laws = laws_of(model, observations, linearity=linearity)
     if certain or not kept or found.verdict == UNEXPLAINED:
         bench_of = partial(_set_up_again, model, options, kept, scale)
-        return _nonlinear(linear, bench, bench_of, found, model, observations, laws_of)
-    return _unless_a_law(linear, laws_of(model, observations))
+        return _nonlinear(linear, bench, bench_of, found, model, observations, laws, laws_of)
+    return _unless_a_law(linear, laws)
 
 
 def _decide(
@@ -218,10 +219,10 @@ def _nonlinear(
     decision: Decision,
     model: StructuralModel,
     observations: Observations,
+    laws: LawSearch,
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
 ) -> Diagnosis:
-    """Look for a law, and for a linear cause beside it where it strains the model or none explains by itself."""
-    laws = laws_of(model, observations)
+    """Look for a linear cause beside a law, where that strains the model or none explains by itself."""
     if not bench.effects:
         beside = None
     elif laws.verdict == UNEXPLAINED:

@@ -141,6 +141,7 @@ def search_laws(
     *,
     folder: Path = Path(),
     progress: Progress = silent,
+    linearity: Linearity | None = None,
 ) -> LawSearch:
     """Find the nonlinear law that explains recordings of different levels, and its place.
 
@@ -156,6 +157,8 @@ def search_laws(
         Where paths of users' own laws start.
     progress : Progress
         Told how far it is.
+    linearity : Linearity, optional
+        What `assess_linearity` said of the recordings, where it was asked already.
 
     Returns
     -------
@@ -168,7 +171,7 @@ def search_laws(
         If the model lacks a DOF that was measured, recordings differ in their sampling rate, or a law is not known.
     """
     progress(0.0, "comparing weak and strong blows")
-    linearity = assess_linearity(observations)
+    linearity = assess_linearity(observations) if linearity is None else linearity
     if not linearity.is_nonlinear:
         return LawSearch(
             verdict=LINEAR, linearity=linearity, statement="Blows of all levels agree with one linear system."
