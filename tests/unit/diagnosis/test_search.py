@@ -17,7 +17,8 @@ from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.diagnosis.physics.response import modify, scatter
+from frf_ipz.diagnosis.physics.modified import modify
+from frf_ipz.diagnosis.physics.response import scatter
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import parse_dof

@@ -356,11 +356,8 @@ def _bend_of_errors(track: Track, fit: LawFit) -> float:
 
 def _gain(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
     """Take off from a drop of the cost what the freedom of the law is worth."""
-    numbers = [(fit.strength, fit.covariance[0, 0])]
-    if fit.law.shape_name:
-        numbers.append((fit.shape, fit.covariance[1, 1]))
     gain = drop - np.log(n_places)
-    for value, variance in numbers:
+    for value, variance in fit.numbers.values():
         spread = min(np.sqrt(max(variance, 1e-300) * scale) / max(abs(value), 1e-300), LOG_RANGE)
         gain += np.log(np.sqrt(2 * np.pi) * max(spread, 1e-12) / LOG_RANGE)
     return float(gain)
@@ -393,11 +390,8 @@ def _findings(
 
 
 def _numbers(fit: LawFit, scale: float) -> dict[str, Estimate]:
-    values = {fit.law.strength_name: (fit.strength, fit.covariance[0, 0])}
-    if fit.law.shape_name:
-        values[fit.law.shape_name] = (fit.shape, fit.covariance[1, 1])
     found = {}
-    for name, (value, variance) in values.items():
+    for name, (value, variance) in fit.numbers.items():
         std = WIDER * float(np.sqrt(max(variance, 0.0) * scale))
         found[name] = Estimate(value=value, std=std, low=value - NORMAL_95 * std, high=value + NORMAL_95 * std)
     return found

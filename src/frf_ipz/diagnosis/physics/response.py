@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.physics.basis import eigh_of_two, solved
+from frf_ipz.diagnosis.physics.basis import eigh_of_two
 from frf_ipz.diagnosis.physics.layout import motion_row
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
@@ -23,12 +23,10 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.basis import Basis
     from frf_ipz.diagnosis.physics.change import Change
     from frf_ipz.diagnosis.physics.layout import Layout
+    from frf_ipz.diagnosis.physics.modified import Modified
     from frf_ipz.diagnosis.physics.nuisance import Nuisance, Unknowns
 
-RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
 MOST_OF_MASS = 0.5  # of a modal mass: scatter takes no more away
-LEAST_RATIO = 1e-6  # where a model states no damping at all
-SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,56 +146,6 @@ def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) ->
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Modified:
-    """A modified structure without scatter.
-
-    Parameters
-    ----------
-    change : Change
-        What is different.
-    squares : (q,) array
-        Squared frequencies, ascending, (rad/s)^2; 0 for rigid-body modes.
-    vectors : (q_basis, q) array
-        The modes in terms of the basis.
-    stated_ratio : (q,) array
-        Damping ratios.
-    """
-
-    change: Change
-    squares: FloatArray
-    vectors: FloatArray
-    stated_ratio: FloatArray
-
-
-def modify(basis: Basis, change: Change) -> Modified:
-    """Solve for the modes of a modified structure.
-
-    Parameters
-    ----------
-    basis : Basis
-        Coordinates.
-    change : Change
-        What is different in structure and damping.
-
-    Returns
-    -------
-    Modified
-        Its modes, by ascending frequency.
-    """
-    squares, vectors = solved(basis, change)
-    largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
-    vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
-    n_rigid = basis.modes.n_rigid
-    elastic = squares[n_rigid] if len(squares) > n_rigid else 1.0
-    squares = np.where(np.abs(squares) <= RIGID * abs(elastic), 0.0, squares)
-    if change.floating:
-        squares[:n_rigid] = 0.0
-    stated = _ratios(basis, change, squares)
-    stated[:n_rigid] = SUSPENSION_RATIO
-    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated)
-
-
 def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) -> Modes:
     """Add to a modified structure what cannot be known.
 
@@ -253,16 +201,6 @@ def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tupl
     values, rotation = eigh_of_two(block, np.eye(m) + mu)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation
-
-
-def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
-    if change.modal_ratio is not None:
-        return np.full(len(squares), change.modal_ratio)
-    stated = basis.model.modal_damping
-    if not stated.size:
-        return np.full(len(squares), LEAST_RATIO if not basis.damping.any() else 0.0)
-    number = np.maximum(np.arange(len(squares)) - basis.modes.n_rigid, 0)
-    return stated[np.minimum(number, stated.size - 1)].copy()
 
 
 def respond(

@@ -11,8 +11,9 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.together import build_together, typical_change
 from frf_ipz.diagnosis.physics.basis import Basis, enrich
 from frf_ipz.diagnosis.physics.change import NOTHING, Change
+from frf_ipz.diagnosis.physics.modified import Modified, modify
 from frf_ipz.diagnosis.physics.nuisance import Nuisance
-from frf_ipz.diagnosis.physics.response import Modes, Modified, Response, Rows, modify, respond, rows_of, scatter
+from frf_ipz.diagnosis.physics.response import Modes, Response, Rows, respond, rows_of, scatter
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place

@@ -12,8 +12,9 @@ from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
 from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.nuisance import make_nuisance
-from frf_ipz.diagnosis.physics.response import modify, respond, rows_of, scatter
+from frf_ipz.diagnosis.physics.response import respond, rows_of, scatter
 from frf_ipz.diagnosis.search.bench import Bench
 from frf_ipz.diagnosis.search.fit import Data
 

@@ -72,6 +72,14 @@ class LawFit:
     misfit: FloatArray
     settled: bool = False
 
+    @property
+    def numbers(self) -> dict[str, tuple[float, float]]:
+        """The law's numbers by their names, each with its variance."""
+        found = {self.law.strength_name: (self.strength, float(self.covariance[0, 0]))}
+        if self.law.shape_name:
+            found[self.law.shape_name] = (self.shape, float(self.covariance[1, 1]))
+        return found
+
     def start(self, unknowns: FloatArray | None = None) -> Start:
         """Start another fit from here, with these or other unknowns of the linear model."""
         return Start(
