@@ -348,5 +348,6 @@ def test_many_truths_without_scatter_are_their_nominal_models(kind):
         assert check.exact < SIMULATION
 
 
+@pytest.mark.slow
 def test_a_law_that_runs_away_at_twice_the_step_is_drawn_again():
     assert make_case(RUNS_AWAY, "gap_contact", analyse=False).truth["attempt"] > 0

@@ -95,12 +95,10 @@ OUTSIDE = {
     "square": (lambda w, _: 3e7 * w * abs(w), "disagree"),
     "quintic": (lambda w, _: 2e14 * w**5, "is bent"),  # a cubic spring leaves less than the errors of the model
 }
-SLOW = {"square": pytest.mark.slow}
 
 
-@pytest.mark.parametrize(
-    ("law", "words"), [pytest.param(*OUTSIDE[name], id=name, marks=SLOW.get(name, ())) for name in OUTSIDE]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "words"), OUTSIDE.values(), ids=OUTSIDE)
 def test_a_law_outside_the_catalogue_is_not_explained(chain, strike, law, words):
     found = search_laws(chain.model, strike(law, (0, 0, 1, 0)), DiagnoseOptions())
     assert found.verdict == "unexplained"
