@@ -127,6 +127,32 @@ def damped_zeros(
     return _quadratic(mass, damping, stiffness, complement(input_row), complement(output_row))
 
 
+def eigh_of_two(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve first @ v = value * second @ v, each symmetric.
+
+    Parameters
+    ----------
+    first, second : (n, n) array
+        Symmetric; the second positive definite.
+
+    Returns
+    -------
+    values : (n,) array
+        Ascending.
+    vectors : (n, n) array
+        Columns, of unit size in the second matrix.
+
+    Raises
+    ------
+    LinAlgError
+        If the second matrix is not positive definite.
+    """
+    values, vectors, failed = lapack.dsygvd(first, second)
+    if failed:
+        raise np.linalg.LinAlgError
+    return values, vectors
+
+
 def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
     """Squared natural frequencies of a symmetric pair.
 
@@ -145,9 +171,11 @@ def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
     NumericalError
         If the mass is not positive definite.
     """
-    values, vectors, info = lapack.dsygvd(stiffness, mass)
-    if info:
-        raise NumericalError("the mass matrix of the reduced model is not positive definite: check masses and units")
+    try:
+        values, vectors = eigh_of_two(stiffness, mass)
+    except np.linalg.LinAlgError:
+        message = "the mass matrix of the reduced model is not positive definite: check masses and units"
+        raise NumericalError(message) from None
     shapes = vectors.astype(complex)
     return Roots(values=values.astype(complex), right=shapes, left=shapes, slope=np.ones(len(values), complex))
 

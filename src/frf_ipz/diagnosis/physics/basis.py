@@ -19,6 +19,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.fe.assembly import apply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
 from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.pencils import eigh_of_two
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -200,32 +201,6 @@ def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
         return squares, vectors
     inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
     return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
-
-
-def eigh_of_two(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve first @ v = value * second @ v by LAPACK itself: for small matrices the checks before it take longer.
-
-    Parameters
-    ----------
-    first, second : (n, n) array
-        Symmetric; the second positive definite.
-
-    Returns
-    -------
-    values : (n,) array
-        Ascending.
-    vectors : (n, n) array
-        Columns, of unit size in the second matrix.
-
-    Raises
-    ------
-    LinAlgError
-        If the second matrix is not positive definite.
-    """
-    values, vectors, failed = linalg.lapack.dsygvd(first, second)
-    if failed:
-        raise linalg.LinAlgError
-    return values, vectors
 
 
 def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:

@@ -14,10 +14,10 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.physics.basis import eigh_of_two
 from frf_ipz.diagnosis.physics.layout import motion_row
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
+from frf_ipz.numerics.pencils import eigh_of_two
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.basis import Basis

@@ -45,10 +45,8 @@ def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
     for start in [start for start in starts if start.cause.key not in fits][:FITTED]:
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
         values = np.concatenate([base.values, start.values])
-        unknown, bar = (
-            same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best),
-            bar_of(fits.values()),
-        )
+        unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
+        bar = bar_of(fits.values())
         fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
     climb_all(bench, base, fits)
     return replace(ranking, fits=ranked(bench, fits), n_tried=ranking.n_tried + len(starts))

@@ -139,8 +139,9 @@ def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
         The best first.
     """
     order, bar = sorted(fits.values(), key=lambda fit: -fit.log_evidence), bar_of(fits.values())
-    is_open = [not (fit.converged or fit.is_hopeless or fit.cost > bar) for fit in order[:SETTLED]]
-    settled = [bench.go_on(fit) if go_on else fit for fit, go_on in zip(order, is_open, strict=False)]
+    settled = [
+        fit if fit.converged or fit.is_hopeless or fit.cost > bar else bench.go_on(fit) for fit in order[:SETTLED]
+    ]
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
 
 
