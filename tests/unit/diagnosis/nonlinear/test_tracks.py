@@ -160,6 +160,23 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
     assert len(fits) == 4  # each place once
 
 
+@pytest.mark.parametrize(("settled", "beside"), [(0.5, True), (0.999, False)])
+def test_places_beside_are_fitted_again_if_the_numbers_moved(monkeypatch, settled, beside):
+    asked = []
+    monkeypatch.setattr(candidates, "_simulated", lambda _, fits, **__: list(fits))
+    monkeypatch.setattr(candidates, "_climb", lambda *_: None)
+    monkeypatch.setattr(candidates, "_settle", lambda _, fits: fits.append(a_law_at(7, settled * fits[0].cost)))
+    monkeypatch.setattr(candidates, "_exchange", lambda _, __, beside: asked.append(beside) or len(asked) == 1)
+    candidates._finished(None, [a_law_at(7, 100.0)])
+    assert asked == [beside, True]  # a better place has neighbours of its own
+
+
+def test_blows_that_were_compared_already_are_not_compared_again(monkeypatch):
+    monkeypatch.setattr(search, "assess_linearity", None)
+    found = search.search_laws(None, None, None, linearity=SimpleNamespace(is_nonlinear=False))
+    assert found.verdict == search.LINEAR
+
+
 def a_law_at(place, cost):
     return SimpleNamespace(law=SimpleNamespace(name="cubic"), place=place, cost=cost, n_rows=100, strength=1.0)
 
