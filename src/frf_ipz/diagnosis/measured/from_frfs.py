@@ -191,5 +191,7 @@ def _weights(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
     share = np.gradient(omega) / (2 * np.pi)
     distance = (s.real - frfs.window_decay_1_s)[:, None]
     along = omega[None] - s.imag[:, None]
-    kernel = (2 * distance) ** 2 / ((distance + 1j * along) ** 2 * (distance - 1j * along)) * share
+    size = share / (distance**2 + along**2) ** 2  # the kernel, over (2 d)^2 (d - i x): far faster than complex powers
+    kernel = np.empty(along.shape, np.complex128)
+    kernel.real, kernel.imag = size * distance, -size * along
     return np.asarray(kernel / kernel.sum(1, keepdims=True))

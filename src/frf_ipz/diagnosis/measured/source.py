@@ -10,6 +10,7 @@ import numpy as np
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_running import finer_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError
 
@@ -109,7 +110,9 @@ def _kept_blows(observations: Observations) -> tuple[Blow, ...]:
 def _of_frfs(observations: Observations) -> Source:
     if observations.frfs is None:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
-    found = survey_frfs(observations.frfs, observations.band_hz)
+    running = observations.kind == "random" and not observations.frfs.window_decay_1_s
+    frfs = finer_frfs(observations, observations.frfs) if running else observations.frfs
+    found = survey_frfs(frfs, observations.band_hz)
     far = _far(observations, found.least_decay_1_s, lambda s: measure_frfs(found, s))
     return _by_points(far, _looked_at(_near(found, observations), observations), found, "frf")
 
@@ -123,7 +126,7 @@ def _far(
 
 
 def _near(found: FrfSurvey, observations: Observations) -> Measured:
-    """Smooth what was averaged from running records, for leakage is spread over lines; take others as they are."""
+    """Smooth what was estimated from running records, on many fine lines; take others as they are."""
     if observations.blows:
         return measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
     spacing = float(np.median(np.diff(found.frfs.s.imag)))

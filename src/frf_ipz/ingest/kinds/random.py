@@ -1,4 +1,4 @@
-"""FRFs of a test with a shaker: records whole under an exponential window, or in segments under Hann windows."""
+"""FRFs of a test with a shaker: whole records or pieces without transients, or segments under Hann windows."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.kinds.recorded import average_recordings
+from frf_ipz.ingest.signals.transients import without_transients
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 
 if TYPE_CHECKING:
@@ -50,16 +51,27 @@ def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> R
 def _add(average: RunAverage, record: Blow, survey: Survey) -> float:
     """Add a record to its run's sums, and return the energy of its force."""
     before = average.sums.count
-    energy = 0.0
-    for signals in _pieces(record, survey):
-        average.sums.add(signals[0], signals[1:])
-        energy += float(np.sum(signals[0] ** 2))
+    if survey.piece:
+        energy = _add_pieces(average, record, survey.piece)
+    else:
+        energy = 0.0
+        for signals in _windowed(record, survey):
+            average.sums.add(signals[0], signals[1:])
+            energy += float(np.sum(signals[0] ** 2))
     count = average.sums.count - before
     average.independent += independent_segments(count) if survey.segment else count
     return energy
 
 
-def _pieces(record: Blow, survey: Survey) -> Iterable[FloatArray]:
+def _add_pieces(average: RunAverage, record: Blow, length: int) -> float:
+    count = len(record.force) // length
+    for number in range(count):
+        piece = slice(number * length, (number + 1) * length)
+        average.sums.add_spectra(*without_transients(record.force[piece], record.responses[:, piece]))
+    return float(np.sum(record.force[: count * length] ** 2))
+
+
+def _windowed(record: Blow, survey: Survey) -> Iterable[FloatArray]:
     if survey.segment:
         return segments_of(np.vstack([record.force, record.responses]), survey.segment)
     return [record.windowed(survey.decay_1_s, survey.n_samples)]

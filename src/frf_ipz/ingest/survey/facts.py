@@ -112,7 +112,9 @@ class Survey:
     decay_1_s : float
         Rate sigma of the exponential window on force and response; 0 for none.
     segment : int
-        Samples of the segments that long records are cut into; 0 where each is used as a whole.
+        Samples of the segments, under Hann windows, that records are cut into; 0 for none.
+    piece : int
+        Samples of the pieces that the records of a running test are cut into, their transients taken off; 0 for none.
     force_window : bool
         The force outside of its pulse is set to zero.
     choices : tuple of str
@@ -126,6 +128,7 @@ class Survey:
     n_samples: int
     decay_1_s: float = 0.0
     segment: int = 0
+    piece: int = 0
     force_window: bool = False
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -1,24 +1,22 @@
-"""The survey of a test with a shaker: its records, and whether they are used whole or in segments.
+"""The survey of a test with a shaker: its records, and whether they are used whole, in pieces or in segments.
 
 A record that starts from rest can be used whole, with an exponential window on force and response: its FRF is then free
 of leakage, however narrow the modes are, but for the motion at its end, which the window has made small. Where several
-records start from rest, that is what is done: segments would lose less of the data, but their peaks are too low by an
-amount that nothing in the data tells. A stationary record is cut into segments (Welch), as long as the number of
-averages allows; they are long enough when the share of the response that the force does not explain no longer falls as
-they are made twice as long.
+records start from rest, that is what is done. Of a running test the motion at both ends of a record, or of pieces of a
+long one, is fitted and taken off. Segments under Hann windows (Welch) are there for who asks for them: their peaks are
+too low by an amount that nothing in the data tells.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.signals.windows import correlated_lines
-from frf_ipz.ingest.spectra import empty_sums, unexplained_power
 from frf_ipz.ingest.survey.checks import check_record
 from frf_ipz.ingest.survey.choice import blow_name, check_names, choose
 from frf_ipz.ingest.survey.facts import Survey
@@ -30,7 +28,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.spectra import SpectrumSums
     from frf_ipz.ingest.survey.facts import BlowFacts
     from frf_ipz.ingest.survey.scan import FileScan
     from frf_ipz.progress import Progress
@@ -38,23 +35,10 @@ if TYPE_CHECKING:
 DECAY = 7.0  # rate of the window times the record: exp(-7) = 0.1 % of the motion at the end remains
 QUIET_SAMPLES = 2
 QUIET = 0.1  # of the signal's spread: what its first samples stay below if it starts from rest
-ENOUGH = 16  # averages that the shortest useful segments must give
-FEW = 6  # averages that tell something at all
-SETTLED = 1.3  # the unexplained share falls by less than this from one length of segments to the double
-SATURATED = 0.5  # of the response: where more is unexplained at all lengths, it may be leakage that is
-SMALL = 1e-3  # of the response: leakage that is smaller than the scatter of so few averages
-EXCITED = 1e-3  # of the strongest line's force power: lines with less tell nothing about leakage
+LONGEST = 2**15  # samples of a piece: finer lines cost time and tell no more
+FEWEST = 3  # pieces of the records at one place: their scatter tells the noise
 SHORTEST = 256  # samples of a segment
 HANN_HALF_OVERLAP = 1.0 / 18.0  # twice the squared correlation of segments that overlap by half
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Segments:
-    """A length of segments, how many there are, and which share of the response they leave unexplained."""
-
-    length: int
-    count: int
-    unexplained: float
 
 
 def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progress) -> Survey:
@@ -90,12 +74,13 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
         blows=verdict.blows, step_s=verdict.step_s, n_samples=max(record.n_samples for record in verdict.blows)
     )
     survey = replace(survey, n_samples=max(record.n_samples for record in survey.used), warnings=verdict.warnings)
-    progress(0.6, "choosing segments")
     if options.segment_s is not None:
         return _in_segments(survey, _asked_segment(survey, options.segment_s), "as asked for")
     if options.exponential_window_s:
         return _whole(survey, 1.0 / options.exponential_window_s, "as asked for")
-    return _choose(files, survey, may_window=options.exponential_window_s is None)
+    fewest = min(Counter(record.run for record in survey.used).values())
+    rested = options.exponential_window_s is None and all(record.rested for record in survey.used)
+    return _from_rest(survey) if rested and fewest > 1 else _in_pieces(survey, fewest)
 
 
 def segments_of(signals: FloatArray, length: int) -> Iterator[FloatArray]:
@@ -157,59 +142,19 @@ def _asked_segment(survey: Survey, segment_s: float) -> int:
     return length
 
 
-def _choose(files: RecordingFiles, survey: Survey, *, may_window: bool) -> Survey:
-    rested = may_window and all(record.rested for record in survey.used)
-    if rested and all(count > 1 for count in Counter(record.run for record in survey.used).values()):
-        return _from_rest(survey, "all start from rest")
-    tried = _try_segments(files, survey)
-    for short, double in zip(tried[1:], tried[:-1], strict=True):
-        if short.count < ENOUGH:
-            continue
-        if short.unexplained <= SMALL or short.unexplained <= min(SETTLED * double.unexplained, SATURATED):
-            why = f"long enough: {100 * short.unexplained:.2g} % of the response is unexplained by the force"
-            return _in_segments(survey, short.length, why)
-        break  # shorter ones leak more
-    if rested:
-        return _from_rest(survey, "all start from rest, and are too short for segments without leakage")
-    lengths = [trial.length for trial in sorted(tried, key=lambda trial: trial.unexplained)]
-    length = lengths[0] if lengths else min(record.n_samples for record in survey.used) // 4
-    warning = (
-        "the records are too short, or most of the response is noise: segments without leakage would give too few "
-        "averages, and the records do not start from rest; record longer, or switch the shaker on within the record. "
-        "Expect peaks that are too low and too wide"
-    )
-    survey = _in_segments(survey, length, "the least bad")
-    return replace(survey, warnings=(*survey.warnings, warning))
-
-
-def _from_rest(survey: Survey, why: str) -> Survey:
+def _from_rest(survey: Survey) -> Survey:
     shortest = min(record.n_samples for record in survey.used)
-    return _whole(survey, DECAY / (shortest * survey.step_s), why)
+    return _whole(survey, DECAY / (shortest * survey.step_s), "all start from rest")
 
 
-def _try_segments(files: RecordingFiles, survey: Survey) -> list[_Segments]:
-    """Measure what segments of different lengths leave unexplained, the longest first."""
+def _in_pieces(survey: Survey, fewest_records: int) -> Survey:
+    """Cut records into equal pieces, as few as their length and the need of some scatter allow."""
     shortest = min(record.n_samples for record in survey.used)
-    lengths = [length for k in range(12) if (length := 2 * (shortest // 2 ** (k + 1))) >= SHORTEST]
-    n_outputs = len(files.test.output_channels)
-    sums = {length: empty_sums(length // 2 + 1, n_outputs) for length in lengths}
-    run = survey.used[0].run
-    for record in survey.used:
-        if record.run is not run:
-            continue
-        (signals,) = files.stretches(record.run, record.path, [(record.start, record.stop)])
-        for length, total in sums.items():
-            for segment in segments_of(signals[1:] - np.array(record.offsets)[:, None], length):
-                total.add(segment[0], segment[1:])
-    return [_measure(length, total) for length, total in sums.items() if total.count >= FEW]
-
-
-def _measure(length: int, sums: SpectrumSums) -> _Segments:
-    independent = independent_segments(sums.count)
-    unexplained = unexplained_power(sums) / (independent - 1.0)
-    share = unexplained / np.maximum(sums.responses.T / independent, np.finfo(float).tiny)
-    excited = sums.force > EXCITED * sums.force.max()
-    return _Segments(length=length, count=sums.count, unexplained=float(np.mean(share[excited])))
+    count = max(-(-shortest // LONGEST), -(-FEWEST // fewest_records))
+    length = max(shortest // count, min(SHORTEST, shortest))
+    each = "records used whole" if length == shortest else f"pieces of {length * survey.step_s:.4g} s"
+    text = f"{each}, the motion that goes on at both ends fitted and taken off (local rational method)"
+    return replace(survey, piece=length, n_samples=length, choices=(text,))
 
 
 def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:

@@ -1,0 +1,68 @@
+"""FRFs of running records on lines that lie closer than the records' own.
+
+A resonance may be narrower than the lines of a record lie apart. What is between two lines is in the record as well:
+the transient is another one there, as smooth, and is taken off in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, IntArray
+from frf_ipz.diagnosis.observations import Observations
+from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.ingest.signals.transients import without_transients
+
+MOST_LINES = 2**15  # in the band
+FINEST = 8  # lines for one of the record
+
+
+def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
+    """Estimate FRFs of running records on finer lines.
+
+    Parameters
+    ----------
+    observations : Observations
+        Records that go on at their beginning.
+    frfs : FrfSet
+        Estimated from them without their transients, in pieces of the same length.
+
+    Returns
+    -------
+    FrfSet
+        In the band. Neighbouring lines share what the record holds: each has the variance that makes all of them
+        together as good as the record's own lines.
+    """
+    kept = np.flatnonzero(frfs.in_band(observations.band_hz) & (frfs.frequency_hz > 0))
+    finer = int(np.clip(MOST_LINES // max(len(kept), 1), 1, FINEST))
+    spacing = float(frfs.frequency_hz[1] - frfs.frequency_hz[0])
+    length = round(1 / (spacing * observations.blows[0].step_s))
+    lines = frfs.lines(np.repeat(kept, finer))
+    combs = [_values(observations, frfs.labels, length, kept, part / finer) for part in range(finer)]
+    between = frfs.frequency_hz[kept, None] + spacing * np.arange(finer) / finer
+    return replace(
+        lines,
+        frequency_hz=between.ravel(),
+        values=np.stack(combs, 1).reshape(len(kept) * finer, -1),
+        variance=lines.variance * finer,
+        correlated_lines=finer,
+    )
+
+
+def _values(
+    observations: Observations, labels: tuple[FrfLabel, ...], length: int, lines: IntArray, between: float
+) -> ComplexArray:
+    """FRFs on one comb of lines, (n_lines, n_frfs)."""
+    force = np.zeros((len(lines), len(labels)))
+    cross = np.zeros(force.shape, np.complex128)
+    places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
+    for blow in observations.blows:
+        columns = [places[sensor.channel, sensor.dof, blow.input_dof] for sensor in blow.sensors]
+        for start in range(0, blow.n_samples - length + 1, length):
+            piece = slice(start, start + length)
+            F, X = without_transients(blow.force[piece], blow.responses[:, piece], lines, between=between)
+            force[:, columns] += (np.abs(F) ** 2)[:, None]
+            cross[:, columns] += (F.conj() * X).T
+    return np.asarray(cross / np.maximum(force, np.finfo(float).tiny))

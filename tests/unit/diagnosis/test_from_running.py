@@ -1,0 +1,58 @@
+"""FRFs of running records on lines closer than their own."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.measured.from_running import FINEST, finer_frfs
+from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.observed import observe
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.test_file import read_test
+from synthetic_campaign import Structure, respond, write_csv, write_test
+
+STEP_S = 1 / 1024
+LIGHT = Structure(damping_ratio=(0.001, 0.001, 0.001))
+RECORD = '[[record]]\ndof = "7:+z"\nfiles = ["records/*.csv"]\n'
+
+
+@pytest.fixture
+def seen(tmp_path):
+    """Three running records of 3 s: lines are 0.34 Hz apart, the narrowest mode is 0.04 Hz wide."""
+    rng = np.random.default_rng(5)
+    for number in range(3):
+        spectrum = np.fft.rfft(rng.standard_normal(3001 + 8192))
+        frequency = np.fft.rfftfreq(3001 + 8192, STEP_S)
+        force = np.fft.irfft(spectrum * np.exp(-((frequency / 280.0) ** 8)), 3001 + 8192)
+        signals = np.vstack([force, respond(LIGHT, force, STEP_S)])[:, 8192:]
+        signals[1:] += 1e-3 * rng.standard_normal(signals[1:].shape)
+        write_csv(tmp_path / "records" / f"{number}.csv", signals, STEP_S)
+    test = read_test(write_test(tmp_path, RECORD, kind="random"))
+    frfs = estimate_frfs(test, IngestOptions()).frfs
+    return observe(test, IngestOptions(), frfs, fit=FitOptions(band_hz=(15.0, 250.0)))
+
+
+def test_lines_between_those_of_the_record_have_the_frf_of_their_frequency(seen):
+    finer = finer_frfs(seen, seen.frfs)
+    kept = seen.frfs.in_band(seen.band_hz)
+    assert finer.n_lines == FINEST * kept.sum()
+    assert np.diff(finer.frequency_hz) == pytest.approx(1 / (3001 * STEP_S) / FINEST)
+    truth = LIGHT.accelerance(finer.s)
+    assert (np.abs(finer.values - truth) / np.abs(truth).max(axis=0)).max() < 0.01
+
+
+def test_all_finer_lines_together_know_no_more_than_the_record(seen):
+    finer = finer_frfs(seen, seen.frfs)
+    kept = seen.frfs.in_band(seen.band_hz)
+    assert (1 / finer.variance).sum() == pytest.approx((1 / seen.frfs.variance[kept]).sum())
+    assert finer.correlated_lines == FINEST
+
+
+def test_a_diagnosis_sees_running_records_off_the_axis_as_they_are(seen):
+    found = divide(seen)
+    for measured in (found.coarse, found.middle, found.training):
+        truth = LIGHT.accelerance(measured.s)
+        inner = (measured.s.imag > 2 * np.pi * 30) & (measured.s.imag < 2 * np.pi * 200)
+        assert np.median(np.abs(measured.values - truth)[inner] / measured.size[inner]) < 3e-3
+        assert np.max(np.abs(measured.values - truth)[inner] / measured.size[inner]) < 0.1
