@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
@@ -101,6 +102,13 @@ def diagnose(
     InputError
         If the model lacks a DOF that was measured, or an effect is not known.
     """
+    with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
+        return _diagnose(model, observations, options, folder, progress)
+
+
+def _diagnose(
+    model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
+) -> Diagnosis:
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.0, "measuring transfer functions")
     source = divide(observations)

@@ -1,0 +1,25 @@
+"""A diagnosis in a session that knows nothing of threads of linear algebra."""
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from frf_ipz.diagnosis import diagnose as stage
+from frf_ipz.diagnosis.observations import Observations
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+
+def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
+    seen = []
+
+    def look(_):
+        seen.extend(library["num_threads"] for library in threadpool_info())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stage, "divide", look)
+    nothing = Observations(kind="frf", blows=(), band_hz=(1.0, 2.0))
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = [library["num_threads"] for library in threadpool_info()]
+        with pytest.raises(KeyboardInterrupt):
+            stage.diagnose(None, nothing, DiagnoseOptions())
+        assert [library["num_threads"] for library in threadpool_info()] == before
+    assert set(seen) == {1}
