@@ -1,5 +1,7 @@
 """FRFs of running records on lines closer than their own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,8 @@ def test_a_diagnosis_sees_running_records_off_the_axis_as_they_are(seen):
         inner = (measured.s.imag > 2 * np.pi * 30) & (measured.s.imag < 2 * np.pi * 200)
         assert np.median(np.abs(measured.values - truth)[inner] / measured.size[inner]) < 3e-3
         assert np.max(np.abs(measured.values - truth)[inner] / measured.size[inner]) < 0.1
+
+
+def test_a_running_test_is_judged_as_one(seen):
+    assert divide(seen).kind == "running"
+    assert divide(replace(seen, kind="frf")).kind == "frf"

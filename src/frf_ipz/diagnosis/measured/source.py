@@ -36,7 +36,7 @@ class Source:
     survey : Survey or FrfSurvey
         Noise and resonances of what is fitted.
     kind : str
-        What was looked at: blows of a ``hammer``, ``random`` records from rest, or ``frf``.
+        What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     held : str
         What was kept for the check: ``blows`` or ``lines``.
     held_names : tuple of str
@@ -114,7 +114,8 @@ def _of_frfs(observations: Observations) -> Source:
     frfs = finer_frfs(observations, observations.frfs) if running else observations.frfs
     found = survey_frfs(frfs, observations.band_hz)
     far = _far(observations, found.least_decay_1_s, lambda s: measure_frfs(found, s))
-    return _by_points(far, _looked_at(_near(found, observations), observations), found, "frf")
+    kind = "running" if running else "frf"
+    return _by_points(far, _looked_at(_near(found, observations), observations), found, kind)
 
 
 def _far(

@@ -41,7 +41,7 @@ class Bench:
     thin : Data
         Fewer points near the axis: for a first look at small effects.
     kind : str
-        What was looked at: blows of a ``hammer``, ``random`` records from rest, or ``frf``.
+        What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     """
 
     specimen: Specimen
