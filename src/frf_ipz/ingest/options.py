@@ -22,7 +22,8 @@ class IngestOptions:
         Time constant of an exponential window on force and response, s; 0 for none. Where it is left out, one is used
         only if decays are cut off, and just as strong as that needs.
     segment_s : float, optional
-        Length of the segments of long records (kind ``random``), s.
+        Length of segments under Hann windows (kind ``random``), s; where it is left out, records are used whole or in
+        pieces, and the motion that goes on at both ends is taken off.
     keep, drop : tuple of str
         Files, or ``file#2`` for the second blow in a file, that are used or left out whatever the checks say.
     hide : tuple of str

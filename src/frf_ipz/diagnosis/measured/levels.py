@@ -2,12 +2,13 @@
 
 Each FRF is estimated anew from the weaker and from the stronger half of the blows at a place. Around each mode, the FRF
 of every single blow gives a frequency and a damping ratio: over a few lines it is a quotient (c0 + c1 s) / (s - p).
-Records of a shaker are blows that go on: each is cut into segments as long as those of the FRFs.
+Records of a shaker that runs already are cut into pieces as long as those of the FRFs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ import pandas as pd
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.frf import FrfLabel
+from frf_ipz.ingest.signals.transients import without_transients
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -99,8 +101,10 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
     curves: list[_Curve] = []
     rows: list[tuple[object, ...]] = []
     for group in groups:
-        cut = _decaying if observations.kind == "hammer" else _going_on
-        spectra = [cut(blow, n, frfs.window_decay_1_s)[:, :, used] for blow in group]
+        blows = [isolate_pulse(blow).blow if observations.kind == "hammer" else blow for blow in group]
+        ends = observations.kind == "hammer" or frfs.window_decay_1_s > 0
+        cut = partial(_decaying, decay_1_s=frfs.window_decay_1_s) if ends else _going_on
+        spectra = [cut(blow, n)[:, :, used] for blow in blows]
         curves += _halves(group, spectra)
         rows += _modes(group, spectra, s, fit)
     return _put_together(frequency[used], curves, rows)
@@ -157,18 +161,19 @@ def _labels(blow: Blow) -> list[FrfLabel]:
 
 
 def _decaying(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
-    """Transform the pulse of the force and the responses, (1, 1 + n_sensors, n_lines)."""
-    signals = np.vstack([isolate_pulse(blow).blow.force, blow.responses])
+    """Transform force and responses under one window, (1, 1 + n_sensors, n_lines)."""
+    signals = np.vstack([blow.force, blow.responses])
     window = np.exp(-decay_1_s * blow.step_s * np.arange(blow.n_samples))
     return np.asarray(np.fft.rfft(signals * window, n))[None] * blow.step_s
 
 
-def _going_on(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
-    """Transform segments that overlap by half, (n_segments, 1 + n_sensors, n_lines)."""
-    del decay_1_s
-    signals = np.vstack([blow.force, blow.responses])
-    starts = range(0, max(blow.n_samples - n, 0) + 1, max(n // 2, 1))
-    return np.array([np.fft.rfft(signals[:, start : start + n] * np.hanning(n), n) * blow.step_s for start in starts])
+def _going_on(blow: Blow, n: int) -> ComplexArray:
+    """Transform pieces without what goes on at their ends, (n_pieces, 1 + n_sensors, n_lines)."""
+    found = []
+    for start in range(0, max(blow.n_samples - n, 0) + 1, n):
+        force, responses = without_transients(blow.force[start : start + n], blow.responses[:, start : start + n])
+        found.append(np.vstack([force, responses]) * blow.step_s)
+    return np.array(found)
 
 
 def _h1(spectra: ComplexArray) -> ComplexArray:

@@ -79,8 +79,8 @@ def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> ComplexArr
 
 def _nearest(rows: ComplexArray, wanted: ComplexArray) -> ComplexArray:
     """Coefficients, (n, q, p), of rows, (n, p, width), whose sum is nearest to each wanted row, (n, q, width)."""
-    across = rows.conj().mT
+    across = rows.conj().swapaxes(1, 2)
     normal = rows @ across
     least = RIDGE * np.trace(normal, axis1=1, axis2=2).real + np.finfo(float).tiny
     normal = normal + least[:, None, None] * np.eye(rows.shape[1])
-    return np.asarray(np.linalg.solve(normal.mT, (wanted @ across).mT).mT)
+    return np.asarray(np.linalg.solve(normal.swapaxes(1, 2), (wanted @ across).swapaxes(1, 2)).swapaxes(1, 2))
