@@ -1,4 +1,4 @@
-"""Shaker tests: running records without their transients, records from rest under an exponential window."""
+"""Shaker tests: records without their transients; segments and exponential windows where they are asked for."""
 
 import numpy as np
 import pytest
@@ -91,15 +91,25 @@ def test_the_variance_of_pieces_is_their_error(tmp_path):
     assert np.mean(error / frfs.variance[band]) == pytest.approx(1.0, abs=0.2)
 
 
-def test_records_from_rest_are_used_whole_and_give_exact_frfs(tmp_path):
+def test_records_from_rest_give_exact_frfs(tmp_path):
     rng = np.random.default_rng(2)
     light = Structure(damping_ratio=(0.003, 0.002, 0.002))
     result = estimate(write(tmp_path, [from_rest(rng, 8192, structure=light) for _ in range(4)]))
-    assert "records used whole" in result.choices[0]
-    assert result.frfs.window_decay_1_s == pytest.approx(7.0 / (8192 * STEP_S))
+    assert result.choices[0].startswith("records used whole, the motion that goes on at both ends")
+    assert result.frfs.window_decay_1_s == 0.0
     assert list(result.frfs.averages) == [4, 4]
-    assert errors(result.frfs, light).max() < 5e-3  # exp(-7) of the motion at the end is cut off
+    assert errors(result.frfs, light).max() < 1e-4
     assert result.blows.used.all()
+
+
+def test_an_exponential_window_may_be_asked_for(tmp_path):
+    rng = np.random.default_rng(2)
+    light = Structure(damping_ratio=(0.003, 0.002, 0.002))
+    records = [from_rest(rng, 8192, structure=light) for _ in range(4)]
+    result = estimate(write(tmp_path, records), exponential_window_s=8192 * STEP_S / 7.0)
+    assert "records used whole, with an exponential window" in result.choices[0]
+    assert result.frfs.window_decay_1_s == pytest.approx(7.0 / (8192 * STEP_S))
+    assert errors(result.frfs, light).max() < 5e-3  # exp(-7) of the motion at the end is cut off
 
 
 def test_segments_would_lose_the_peaks_of_records_from_rest(tmp_path):
@@ -118,10 +128,11 @@ def test_a_single_long_record_from_rest_is_cut_into_pieces(tmp_path):
     assert np.isfinite(result.frfs.variance[1:-1]).all()
 
 
-def test_the_variance_of_whole_records_is_their_error(tmp_path):
+def test_the_variance_under_an_exponential_window_is_the_error(tmp_path):
     rng = np.random.default_rng(3)
     light = Structure(damping_ratio=(0.003, 0.002, 0.002))
-    frfs = estimate(write(tmp_path, [from_rest(rng, 8192, structure=light, noise=0.3) for _ in range(6)])).frfs
+    path = write(tmp_path, [from_rest(rng, 8192, structure=light, noise=0.3) for _ in range(6)])
+    frfs = estimate(path, exponential_window_s=8192 * STEP_S / 7.0).frfs
     band = frfs.in_band(BAND_HZ)
     error = np.abs(frfs.values - light.accelerance(frfs.s))[band] ** 2
     assert np.mean(error / frfs.variance[band]) == pytest.approx(1.0, abs=0.2)

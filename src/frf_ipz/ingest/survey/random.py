@@ -1,10 +1,9 @@
 """The survey of a test with a shaker: its records, and whether they are used whole, in pieces or in segments.
 
-A record that starts from rest can be used whole, with an exponential window on force and response: its FRF is then free
-of leakage, however narrow the modes are, but for the motion at its end, which the window has made small. Where several
-records start from rest, that is what is done. Of a running test the motion at both ends of a record, or of pieces of a
-long one, is fitted and taken off. Segments under Hann windows (Welch) are there for who asks for them: their peaks are
-too low by an amount that nothing in the data tells.
+The motion at both ends of a record, or of pieces of a long one, is fitted and taken off: the FRFs are free of leakage,
+however narrow the modes are, and nothing of a record is lost. Segments under Hann windows (Welch) are there for who
+asks for them: their peaks are too low by an amount that nothing in the data tells. So is an exponential window on force
+and response of records that start from rest: exact at s = sigma + i omega, but it forgets most of a record.
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.scan import FileScan
     from frf_ipz.progress import Progress
 
-DECAY = 7.0  # rate of the window times the record: exp(-7) = 0.1 % of the motion at the end remains
 QUIET_SAMPLES = 2
 QUIET = 0.1  # of the signal's spread: what its first samples stay below if it starts from rest
 LONGEST = 2**15  # samples of a piece: finer lines cost time and tell no more
@@ -75,12 +73,10 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
     )
     survey = replace(survey, n_samples=max(record.n_samples for record in survey.used), warnings=verdict.warnings)
     if options.segment_s is not None:
-        return _in_segments(survey, _asked_segment(survey, options.segment_s), "as asked for")
+        return _in_segments(survey, _asked_segment(survey, options.segment_s))
     if options.exponential_window_s:
-        return _whole(survey, 1.0 / options.exponential_window_s, "as asked for")
-    fewest = min(Counter(record.run for record in survey.used).values())
-    rested = options.exponential_window_s is None and all(record.rested for record in survey.used)
-    return _from_rest(survey) if rested and fewest > 1 else _in_pieces(survey, fewest)
+        return _whole(survey, 1.0 / options.exponential_window_s)
+    return _in_pieces(survey)
 
 
 def segments_of(signals: FloatArray, length: int) -> Iterator[FloatArray]:
@@ -142,27 +138,23 @@ def _asked_segment(survey: Survey, segment_s: float) -> int:
     return length
 
 
-def _from_rest(survey: Survey) -> Survey:
-    shortest = min(record.n_samples for record in survey.used)
-    return _whole(survey, DECAY / (shortest * survey.step_s), "all start from rest")
-
-
-def _in_pieces(survey: Survey, fewest_records: int) -> Survey:
+def _in_pieces(survey: Survey) -> Survey:
     """Cut records into equal pieces, as few as their length and the need of some scatter allow."""
     shortest = min(record.n_samples for record in survey.used)
-    count = max(-(-shortest // LONGEST), -(-FEWEST // fewest_records))
+    fewest = min(Counter(record.run for record in survey.used).values())
+    count = max(-(-shortest // LONGEST), -(-FEWEST // fewest))
     length = max(shortest // count, min(SHORTEST, shortest))
     each = "records used whole" if length == shortest else f"pieces of {length * survey.step_s:.4g} s"
     text = f"{each}, the motion that goes on at both ends fitted and taken off (local rational method)"
     return replace(survey, piece=length, n_samples=length, choices=(text,))
 
 
-def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:
+def _whole(survey: Survey, decay_1_s: float) -> Survey:
     shortest = min(record.n_samples for record in survey.used) * survey.step_s
     left = float(np.exp(-decay_1_s * shortest))
     text = (
-        f"records used whole, with an exponential window of {1.0 / decay_1_s:.4g} s on force and response ({why}): the "
-        f"FRFs are exact at s = sigma + i omega but for {100 * left:.2g} % of the motion at the end"
+        f"records used whole, with an exponential window of {1.0 / decay_1_s:.4g} s on force and response "
+        f"(as asked for): the FRFs are exact at s = sigma + i omega but for {100 * left:.2g} % of the motion at the end"
     )
     step = correlated_lines(decay_1_s * survey.n_samples * survey.step_s)
     lines = f"the window correlates the noise of neighbouring lines: one in {step} is independent"
@@ -176,6 +168,6 @@ def _whole(survey: Survey, decay_1_s: float, why: str) -> Survey:
     )
 
 
-def _in_segments(survey: Survey, length: int, why: str) -> Survey:
-    text = f"segments of {length * survey.step_s:.4g} s under Hann windows, overlapping by half ({why})"
+def _in_segments(survey: Survey, length: int) -> Survey:
+    text = f"segments of {length * survey.step_s:.4g} s under Hann windows, overlapping by half (as asked for)"
     return replace(survey, segment=length, n_samples=length, choices=(text,))
