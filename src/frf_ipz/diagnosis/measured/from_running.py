@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.signals.transients import without_transients
@@ -40,21 +40,23 @@ def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     spacing = float(frfs.frequency_hz[1] - frfs.frequency_hz[0])
     length = round(1 / (spacing * observations.blows[0].step_s))
     lines = frfs.lines(np.repeat(kept, finer))
-    combs = [_values(observations, frfs.labels, length, kept, part / finer) for part in range(finer)]
+    combs = [_comb(observations, frfs.labels, length, kept, part / finer) for part in range(finer)]
     between = frfs.frequency_hz[kept, None] + spacing * np.arange(finer) / finer
+    values, force = (np.stack(parts, 1).reshape(len(kept) * finer, -1) for parts in zip(*combs, strict=True))
+    noise = lines.variance * np.repeat(combs[0][1], finer, axis=0)
     return replace(
         lines,
         frequency_hz=between.ravel(),
-        values=np.stack(combs, 1).reshape(len(kept) * finer, -1),
-        variance=lines.variance * finer,
+        values=values,
+        variance=noise / force * finer,
         correlated_lines=finer,
     )
 
 
-def _values(
+def _comb(
     observations: Observations, labels: tuple[FrfLabel, ...], length: int, lines: IntArray, between: float
-) -> ComplexArray:
-    """FRFs on one comb of lines, (n_lines, n_frfs)."""
+) -> tuple[ComplexArray, FloatArray]:
+    """FRFs on one comb of lines, and the force's power, (n_lines, n_frfs): where it happens to be weak they err."""
     force = np.zeros((len(lines), len(labels)))
     cross = np.zeros(force.shape, np.complex128)
     places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
@@ -65,4 +67,5 @@ def _values(
             F, X = without_transients(blow.force[piece], blow.responses[:, piece], lines, between=between)
             force[:, columns] += (np.abs(F) ** 2)[:, None]
             cross[:, columns] += (F.conj() * X).T
-    return np.asarray(cross / np.maximum(force, np.finfo(float).tiny))
+    force = np.maximum(force, np.finfo(float).tiny)
+    return np.asarray(cross / force), force
