@@ -13,7 +13,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.signals.transients import without_transients
+from frf_ipz.ingest.signals.transients import pieces_without_transients
 
 MOST_LINES = 2**15  # in the band
 FINEST = 8  # lines for one of the record
@@ -62,9 +62,7 @@ def _comb(
     places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
     for blow in observations.blows:
         columns = [places[sensor.channel, sensor.dof, blow.input_dof] for sensor in blow.sensors]
-        for start in range(0, blow.n_samples - length + 1, length):
-            piece = slice(start, start + length)
-            F, X = without_transients(blow.force[piece], blow.responses[:, piece], lines, between=between)
+        for F, X in pieces_without_transients(blow.force, blow.responses, length, lines, between=between):
             force[:, columns] += (np.abs(F) ** 2)[:, None]
             cross[:, columns] += (F.conj() * X).T
     force = np.maximum(force, np.finfo(float).tiny)

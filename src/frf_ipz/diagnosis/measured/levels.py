@@ -2,7 +2,7 @@
 
 Each FRF is estimated anew from the weaker and from the stronger half of the blows at a place. Around each mode, the FRF
 of every single blow gives a frequency and a damping ratio: over a few lines it is a quotient (c0 + c1 s) / (s - p).
-Records of a shaker that runs already are cut into pieces as long as those of the FRFs.
+Records of a shaker are cut into pieces as long as those of the FRFs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import pandas as pd
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.signals.transients import without_transients
+from frf_ipz.ingest.signals.transients import pieces_without_transients
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -91,20 +91,20 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
     if not groups or frfs is None:
         return _put_together(np.zeros(0), [], [])
     low, high = observations.band_hz
-    step = groups[0][0].step_s
+    step, is_hammer = groups[0][0].step_s, observations.kind == "hammer"
     n = max(blow.n_samples for group in groups for blow in group)
-    if observations.kind != "hammer":
+    if not is_hammer:
         n = round(1 / (step * float(np.diff(frfs.frequency_hz[:2])[0])))
     frequency = np.asarray(np.fft.rfftfreq(n, step))
     used = (frequency >= low) & (frequency <= high)
     s = frfs.window_decay_1_s + 2j * np.pi * frequency[used]
+    ends = is_hammer or frfs.window_decay_1_s > 0
+    transform = partial(_decaying, decay_1_s=frfs.window_decay_1_s) if ends else _going_on
     curves: list[_Curve] = []
     rows: list[tuple[object, ...]] = []
     for group in groups:
-        blows = [isolate_pulse(blow).blow if observations.kind == "hammer" else blow for blow in group]
-        ends = observations.kind == "hammer" or frfs.window_decay_1_s > 0
-        cut = partial(_decaying, decay_1_s=frfs.window_decay_1_s) if ends else _going_on
-        spectra = [cut(blow, n)[:, :, used] for blow in blows]
+        blows = [isolate_pulse(blow).blow if is_hammer else blow for blow in group]
+        spectra = [transform(blow, n)[:, :, used] for blow in blows]
         curves += _halves(group, spectra)
         rows += _modes(group, spectra, s, fit)
     return _put_together(frequency[used], curves, rows)
@@ -169,11 +169,8 @@ def _decaying(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
 
 def _going_on(blow: Blow, n: int) -> ComplexArray:
     """Transform pieces without what goes on at their ends, (n_pieces, 1 + n_sensors, n_lines)."""
-    found = []
-    for start in range(0, max(blow.n_samples - n, 0) + 1, n):
-        force, responses = without_transients(blow.force[start : start + n], blow.responses[:, start : start + n])
-        found.append(np.vstack([force, responses]) * blow.step_s)
-    return np.array(found)
+    pieces = pieces_without_transients(blow.force, blow.responses, n)
+    return np.stack([np.vstack(piece) for piece in pieces]) * blow.step_s
 
 
 def _h1(spectra: ComplexArray) -> ComplexArray:

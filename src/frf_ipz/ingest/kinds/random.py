@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.kinds.recorded import average_recordings
-from frf_ipz.ingest.signals.transients import without_transients
+from frf_ipz.ingest.signals.transients import pieces_without_transients
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 
 if TYPE_CHECKING:
@@ -64,11 +64,9 @@ def _add(average: RunAverage, record: Blow, survey: Survey) -> float:
 
 
 def _add_pieces(average: RunAverage, record: Blow, length: int) -> float:
-    count = len(record.force) // length
-    for number in range(count):
-        piece = slice(number * length, (number + 1) * length)
-        average.sums.add_spectra(*without_transients(record.force[piece], record.responses[:, piece]))
-    return float(np.sum(record.force[: count * length] ** 2))
+    for force, responses in pieces_without_transients(record.force, record.responses, length):
+        average.sums.add_spectra(force, responses)
+    return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 
 
 def _windowed(record: Blow, survey: Survey) -> Iterable[FloatArray]:

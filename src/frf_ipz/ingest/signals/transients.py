@@ -12,9 +12,14 @@ Proceedings Volumes 45(16) (2012) 49-54 (doi:10.3182/20120711-3-BE-2027.00299), 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 SIDE = 8  # lines to each side that a fit sees
 DEGREE = 2  # of the three polynomials
@@ -59,6 +64,32 @@ def without_transients(
         return F[wanted], X[:, wanted]
     blocks = [wanted[at : at + BLOCK] for at in range(0, len(wanted), BLOCK)]
     return F[wanted], X[:, wanted] - np.concatenate([_transients(F, X, block) for block in blocks], axis=1)
+
+
+def pieces_without_transients(
+    force: FloatArray, responses: FloatArray, length: int, lines: IntArray | None = None, *, between: float = 0.0
+) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+    """Cut a record into pieces, one behind the other, and transform each without its transients.
+
+    Parameters
+    ----------
+    force : (n_samples,) array
+        N.
+    responses : (n_outputs, n_samples) array
+        SI.
+    length : int
+        Samples of a piece; what is left at the end is not used.
+    lines, between
+        As for `without_transients`.
+
+    Yields
+    ------
+    force, responses : complex arrays
+        As `without_transients` gives them.
+    """
+    for start in range(0, len(force) - length + 1, length):
+        piece = slice(start, start + length)
+        yield without_transients(force[piece], responses[:, piece], lines, between=between)
 
 
 def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> ComplexArray:

@@ -114,7 +114,7 @@ class Survey:
     segment : int
         Samples of the segments, under Hann windows, that records are cut into; 0 for none.
     piece : int
-        Samples of the pieces that the records of a running test are cut into, their transients taken off; 0 for none.
+        Samples of the pieces that records are cut into, their transients taken off; 0 for none.
     force_window : bool
         The force outside of its pulse is set to zero.
     choices : tuple of str
