@@ -99,7 +99,7 @@ def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
     Parameters
     ----------
     world : World
-        Hysteretic damping is defined on the imaginary axis only; nonlinear laws need small steps.
+        Nonlinear laws need small steps.
     refine : float
         Divides the step further.
 
@@ -113,9 +113,7 @@ def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
     steps = 8
     if any(effect.law for effect in world.effects):
         steps = max(8, -int(-STEPS_PER_PERIOD * set_up.band_hz[1] // set_up.rate_hz))
-    hysteretic = any(effect.loss_factor for effect in world.effects)
-    grid = LaplaceGrid(n_samples=set_up.n_samples + before, rate_hz=set_up.rate_hz, oversampling=round(refine * steps))
-    return replace(grid, shift=0.0, padding=6) if hysteretic else grid
+    return LaplaceGrid(n_samples=set_up.n_samples + before, rate_hz=set_up.rate_hz, oversampling=round(refine * steps))
 
 
 def force_of(drive: Drive, set_up: SetUp, grid: LaplaceGrid) -> FloatArray:

@@ -58,7 +58,7 @@ class _Trial:
 
     def __init__(self, world: World, effect: Effect) -> None:
         self.world = world
-        self.template = self._made(replace(effect, damping_factor=1.0, loss_factor=0.0))
+        self.template = self._made(replace(effect, damping_factor=1.0, modulus=None))
 
     def _made(self, effect: Effect) -> World:
         return make_world(self.world.specimen, self.world.set_up, self.world.scatter, (effect,))
@@ -73,7 +73,7 @@ class _Trial:
         attached = tuple(
             replace(old, stiffness=mount.stiffness) for old, mount in zip(model.attachments, effect.mounts, strict=True)
         )
-        model = replace(model, damping_ratio=ratio, loss_factor=effect.loss_factor, attachments=attached)
+        model = replace(model, damping_ratio=ratio, modulus=effect.modulus, attachments=attached)
         return replace(self.template, receptance=model, effects=(effect,)).measured_frf(frequencies_hz)
 
 

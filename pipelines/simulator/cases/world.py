@@ -157,7 +157,7 @@ def make_world(specimen: Specimen, set_up: SetUp, scatter: Scatter, effects: Seq
         everything,
         np.concatenate([np.full(rigid, scatter.cords_damping), ratio]),
         HIGHEST_MODE * set_up.rate_hz,
-        loss_factor=sum(effect.loss_factor for effect in effects),
+        modulus=next((effect.modulus for effect in effects if effect.modulus), None),
     )
     attachments, start = [], len(rows)
     for mount in mounts:

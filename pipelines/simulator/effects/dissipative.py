@@ -6,12 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from simulator.effects.effect import Bench, Effect, Mount, Pair, constant, log_uniform
+from simulator.effects.effect import Bench, ComplexArray, Effect, Gain, Mount, Pair, constant, log_uniform
 from simulator.structures.beams import BeamDrawing
 from simulator.structures.frames import FrameDrawing
 from simulator.structures.points import Point
 
 Draw = Callable[[np.random.Generator, Bench], Effect | None]
+
+SOLIDS_BEYOND, SOLIDS_STEP = 1000.0, 0.5  # rates from below to above the band by this factor, and logarithmic steps
 
 
 def damping_level(rng: np.random.Generator, bench: Bench) -> Effect:
@@ -41,7 +43,38 @@ def local_damper(rng: np.random.Generator, bench: Bench) -> Effect:
 def structural_damping(rng: np.random.Generator, bench: Bench) -> Effect:
     """Draw a loss factor of the stiffness matrix."""
     loss = log_uniform(rng, 1.5, 15) * bench.set_up.damping_ratio
-    return Effect(name="structural_damping", parameters={"loss_factor": loss}, loss_factor=loss)
+    modulus = lossy(loss, bench.set_up.band_hz)
+    return Effect(name="structural_damping", parameters={"loss_factor": loss}, modulus=modulus)
+
+
+def lossy(loss: float, band_hz: tuple[float, float]) -> Gain:
+    """Build a stiffness with the same loss factor at all frequencies from standard solids, so that it is causal.
+
+    Parameters
+    ----------
+    loss : float
+        Loss factor.
+    band_hz : (low, high)
+        In its middle the stiffness is the nominal one.
+
+    Returns
+    -------
+    callable
+        Stiffness at `s` over the nominal one.
+    """
+    low, high = (2 * np.pi * edge for edge in band_hz)
+    slope = 2 / np.pi * np.arctan(loss)
+    logs = np.arange(np.log(low / SOLIDS_BEYOND), np.log(high * SOLIDS_BEYOND), SOLIDS_STEP)
+    rates = np.exp(logs) / np.sqrt(low * high)
+    strengths = np.sin(np.pi * slope) / np.pi * SOLIDS_STEP * rates**slope
+    slowest = np.sin(np.pi * slope) / (np.pi * slope) * np.exp(-slope * SOLIDS_STEP / 2) * rates[0] ** slope
+
+    def stiffness(s: ComplexArray) -> ComplexArray:
+        s = s / np.sqrt(low * high)
+        return np.asarray(slowest + sum(k * s / (s + rate) for k, rate in zip(strengths, rates, strict=True)))
+
+    middle = stiffness(np.array([1j * np.sqrt(low * high)]))[0].real
+    return lambda s: stiffness(s) / middle
 
 
 def viscoelastic_joint(rng: np.random.Generator, bench: Bench) -> Effect:

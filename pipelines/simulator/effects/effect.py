@@ -53,8 +53,10 @@ class Effect:
         What it does to the structure.
     mounts : tuple of Mount
         What it attaches.
-    damping_factor, loss_factor : float
-        Of all modes; of the stiffness matrix.
+    damping_factor : float
+        Of all modes.
+    modulus : callable, optional
+        Factor of the whole stiffness matrix.
     gains : mapping of str to callable
         Transfer functions of channels, besides their gain.
     crosstalk : tuple of (to, from, factor)
@@ -78,7 +80,7 @@ class Effect:
     change: Callable[[Reality], Reality] = unchanged
     mounts: tuple[Mount, ...] = ()
     damping_factor: float = 1.0
-    loss_factor: float = 0.0
+    modulus: Gain | None = None
     gains: Mapping[str, Gain] = field(default_factory=dict)
     crosstalk: tuple[tuple[str, str, float], ...] = ()
     moved: Mapping[str, int] = field(default_factory=dict)

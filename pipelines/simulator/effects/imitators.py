@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from simulator.effects.dissipative import spring_motion
+from simulator.effects.dissipative import lossy, spring_motion
 from simulator.effects.effect import Bench, Effect, Mount, Pair, constant
 from simulator.effects.measuring import first_order
 from simulator.structures.beams import BeamDrawing
@@ -65,7 +65,7 @@ def imitators(bench: Bench, effect: Effect) -> list[Substitute]:
         "viscoelastic_joint": _of_joint,
         "local_stiffness": _of_stiffness,
         "boundary_compliance": _of_boundary,
-        "damping_level": lambda _bench, one: [_loss(2 * one.parameters["modal_ratio"])],
+        "damping_level": lambda one_bench, one: [_loss(one_bench, 2 * one.parameters["modal_ratio"])],
         "structural_damping": lambda one_bench, one: [_level(one_bench, one.parameters["loss_factor"] / 2)],
         "time_delay": _of_delay,
         "sensor_dynamics": _of_filter,
@@ -296,9 +296,9 @@ def _level(bench: Bench, ratio: float) -> Substitute:
     return Substitute(name="damping_level", location={}, build=build, start={"modal_ratio": ratio})
 
 
-def _loss(factor: float) -> Substitute:
+def _loss(bench: Bench, factor: float) -> Substitute:
     def build(values: Values) -> Effect:
-        return Effect(name="structural_damping", loss_factor=values["loss_factor"])
+        return Effect(name="structural_damping", modulus=lossy(values["loss_factor"], bench.set_up.band_hz))
 
     return Substitute(name="structural_damping", location={}, build=build, start={"loss_factor": factor})
 

@@ -31,25 +31,21 @@ class LaplaceGrid:
         Its sampling rate.
     oversampling : int
         Inputs are given at this multiple of the rate.
-    shift : float
-        Strength of the shift, times the padded length; 0 puts the lines on the imaginary axis.
     """
 
     n_samples: int
     rate_hz: float
     oversampling: int = 8
-    shift: float = WRAP_DECAY
-    padding: int = PADDING
 
     @property
     def n_padded(self) -> int:
         """Period of the transforms, samples at the rate of the record."""
-        return 2 * ((self.padding * self.n_samples + 1) // 2)
+        return 2 * ((PADDING * self.n_samples + 1) // 2)
 
     @property
     def sigma_1_s(self) -> float:
         """Real part of the lines."""
-        return self.shift * self.rate_hz / self.n_padded
+        return WRAP_DECAY * self.rate_hz / self.n_padded
 
     @property
     def fine_time_s(self) -> FloatArray:

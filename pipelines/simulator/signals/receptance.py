@@ -87,8 +87,8 @@ class ModalReceptance:
         Mass-normalised, at the rows.
     static : (n_rows, n_rows) array
         Sum of shapes shapes^T / omega^2 over all higher modes.
-    loss_factor : float
-        Of the whole stiffness matrix.
+    modulus : callable, optional
+        Factor of the whole stiffness matrix at `s`.
     attachments : tuple of Attachment
         Whatever has a dynamic stiffness of its own.
     """
@@ -97,7 +97,7 @@ class ModalReceptance:
     damping_ratio: FloatArray
     shapes: FloatArray
     static: FloatArray
-    loss_factor: float = 0.0
+    modulus: DynamicStiffness | None = None
     attachments: tuple[Attachment, ...] = ()
 
     def __call__(self, s: ComplexArray, outputs: list[int], inputs: list[int]) -> ComplexArray:
@@ -125,19 +125,24 @@ class ModalReceptance:
 
     def _bare(self, s: ComplexArray, left: FloatArray, right: FloatArray) -> ComplexArray:
         """Receptance without attachments."""
-        hysteresis = 1 + 1j * self.loss_factor * np.sign(s.imag)
+        modulus = np.ones_like(s) if self.modulus is None else self.modulus(s)
         square = self.omega_rad_s**2
         gains = 1 / (
-            (s * s)[:, None] + s[:, None] * (2 * self.damping_ratio * self.omega_rad_s) + hysteresis[:, None] * square
+            (s * s)[:, None] + s[:, None] * (2 * self.damping_ratio * self.omega_rad_s) + modulus[:, None] * square
         )
         at_left, at_right = left @ self.shapes, right @ self.shapes
         pairs = (at_left[:, None, :] * at_right[None, :, :]).reshape(-1, square.size)
         total = (gains @ pairs.T).reshape(s.size, len(left), len(right))
-        return total + left @ self.static @ right.T / hysteresis[:, None, None]
+        return total + left @ self.static @ right.T / modulus[:, None, None]
 
 
 def modal_receptance(
-    modes: Modes, rows: FloatArray, damping_ratio: FloatArray, highest_hz: float, *, loss_factor: float = 0.0
+    modes: Modes,
+    rows: FloatArray,
+    damping_ratio: FloatArray,
+    highest_hz: float,
+    *,
+    modulus: DynamicStiffness | None = None,
 ) -> ModalReceptance:
     """Receptance between rows of a structure with modal damping.
 
@@ -151,8 +156,8 @@ def modal_receptance(
         Ratios of the first modes; the last one holds for all further modes.
     highest_hz : float
         Modes above are replaced by their static compliance: many times the highest frequency of interest.
-    loss_factor : float
-        Of the whole stiffness matrix.
+    modulus : callable, optional
+        Factor of the whole stiffness matrix.
 
     Returns
     -------
@@ -170,5 +175,5 @@ def modal_receptance(
         damping_ratio=ratio,
         shapes=shapes[:, :n_modes],
         static=(high / omega**2) @ high.T,
-        loss_factor=loss_factor,
+        modulus=modulus,
     )

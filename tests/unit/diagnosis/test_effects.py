@@ -23,6 +23,7 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 
 BAND_HZ = (10.0, 700.0)
+MIDDLE = 2 * np.pi * np.sqrt(BAND_HZ[0] * BAND_HZ[1])
 S = 3.0 + 2j * np.pi * np.geomspace(*BAND_HZ, 60)
 REDUCED = 2e-4  # of the largest FRF: the basis has modes and static shapes, not all DOFs
 EXACT = 1e-9  # of the same numbers along two ways
@@ -178,16 +179,33 @@ def resonator(s):
     return 0.2 * (omega**2 + 2 * 0.05 * omega * s)
 
 
-def test_structural_damping(tmp_path):
+@pytest.mark.parametrize(
+    ("key", "modulus", "ratio"),
+    [
+        ((), lambda _: 1 + 0.04j, 0.01),
+        (("causal",), lambda s: (1 + 0.04j) * (s / MIDDLE / 1j) ** (2 / np.pi * np.arctan(0.04)), 0.01),
+        (("of modes",), lambda _: 1, 0.03),
+    ],
+)
+def test_structural_damping(tmp_path, key, modulus, ratio):
     frame = lumped(tmp_path)
     names = labels(("3:+x",), ("2:+x",), FrfQuantity.RECEPTANCE)
     free = ~frame.fixed
     k, m = frame.stiffness_all.toarray()[np.ix_(free, free)], frame.mass_all.toarray()[np.ix_(free, free)]
     squares, vectors = np.linalg.eigh(k / np.sqrt(np.outer(np.diag(m), np.diag(m))))
     shapes = vectors / np.sqrt(np.diag(m))[:, None]
-    modal = S[:, None] ** 2 + 0.02 * np.sqrt(squares) * S[:, None] + squares * (1 + 0.04j)
+    stiffness = squares * np.broadcast_to(modulus(S), S.shape)[:, None]
+    modal = S[:, None] ** 2 + 2 * ratio * np.sqrt(squares) * S[:, None] + stiffness
     expected = ((shapes[2] * shapes[1]) / modal).sum(1)[:, None]
-    assert_same(changed_frfs(frame, "structural_damping", (), [0.04], names), expected, REDUCED)
+    assert_same(changed_frfs(frame, "structural_damping", key, [0.04], names), expected, REDUCED)
+
+
+@pytest.mark.parametrize("key", [(), ("causal",), ("of modes",)])
+def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, key):
+    specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
+    builder = shipped_effects()["structural_damping"].build(specimen, Place(key=key))
+    corrected = with_change(specimen.model, builder(np.array([0.04])))
+    assert_allclose(corrected.modal_damping, specimen.model.modal_damping + 0.02, rtol=EXACT)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
+from simulator.effects.dissipative import lossy
 from simulator.signals.channels import AntiAlias, Noise, quantise
 from simulator.signals.hammer import Blow, draw_blows
 from simulator.signals.laplace import LaplaceGrid
@@ -56,11 +57,22 @@ def test_a_spring_attached_by_its_dynamic_stiffness_shifts_the_resonance():
     assert_allclose(with_spring, oscillator(50.0, 0.0)(s, [0], [0])[:, 0, 0], rtol=1e-9)  # 30, 40, 50 Hz: Pythagoras
 
 
+def test_a_lossy_stiffness_has_its_loss_factor_throughout_and_is_causal():
+    band = (20.0, 1000.0)
+    stiffness = lossy(0.05, band)
+    on_axis = stiffness(2j * np.pi * np.geomspace(*band, 50))
+    assert_allclose(on_axis.imag / on_axis.real, 0.05, rtol=2e-3)  # the solids end somewhere
+    assert_allclose(stiffness(2j * np.pi * np.array([np.sqrt(20 * 1000)])).real, 1, rtol=1e-9)
+    growth = stiffness(np.geomspace(1, 1e5, 30) + 0j)  # real for growing motions: what is causal has no complex memory
+    assert_allclose(growth.imag, 0, atol=1e-12)  # rounding
+    assert (np.diff(growth.real) > 0).all()
+
+
 def test_the_filter_passes_its_band_and_stops_what_would_fold():
     for symmetric in (True, False):
-        grid = LaplaceGrid(n_samples=1000, rate_hz=1000.0, shift=0.0)
+        grid = LaplaceGrid(n_samples=100_000, rate_hz=1000.0)  # long: its lines are near the imaginary axis
         gain = np.abs(AntiAlias(symmetric=symmetric).gain(grid))
-        frequencies = np.arange(gain.size) / 2.0
+        frequencies = np.arange(gain.size) / 200.0
         assert_allclose(gain[frequencies < 420], 1.0, rtol=1e-3)  # ripple of a filter of 100 dB, with margin
         assert gain[-1] < 1e-3
 

@@ -39,8 +39,9 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
     fixed = changed.fixed.copy()
     fixed[list(change.released)] = False
     stated = changed.modal_damping if change.modal_ratio is None else np.array([change.modal_ratio])
-    if change.loss_factor:
-        stated = (stated if stated.size else np.zeros(1)) + change.loss_factor / 2
+    added = change.added_ratio + change.loss_factor / 2
+    if added:
+        stated = (stated if stated.size else np.zeros(1)) + added
     changed = replace(
         changed,
         fixed=fixed,

@@ -55,8 +55,13 @@ class Change:
         What has dynamics of its own. Modal damping is that of the structure without them.
     modal_ratio : float, optional
         Damping ratio of all modes, instead of the model's.
+    added_ratio : float
+        Damping ratio of all modes besides their own.
     loss_factor : float
         Of the whole stiffness: K (1 + i eta), besides the modal damping.
+    reference_rad_s : float
+        Where the stiffness is the model's: it rises with frequency, as causality asks of a constant loss factor. 0 for
+        the same at all frequencies.
     channels : mapping of str to Transfer
         What a channel shows over what it should show.
     moved : mapping of str to int
@@ -70,7 +75,9 @@ class Change:
     floating: bool = False
     attachments: tuple[Attachment, ...] = ()
     modal_ratio: float | None = None
+    added_ratio: float = 0.0
     loss_factor: float = 0.0
+    reference_rad_s: float = 0.0
     channels: Mapping[str, Transfer] = field(default_factory=dict)
     moved: Mapping[str, int] = field(default_factory=dict)
 
@@ -84,7 +91,9 @@ class Change:
             floating=self.floating or other.floating,
             attachments=(*self.attachments, *other.attachments),
             modal_ratio=self.modal_ratio if other.modal_ratio is None else other.modal_ratio,
+            added_ratio=self.added_ratio + other.added_ratio,
             loss_factor=self.loss_factor + other.loss_factor,
+            reference_rad_s=self.reference_rad_s or other.reference_rad_s,
             channels=_product(self.channels, other.channels),
             moved={**self.moved, **other.moved},
         )

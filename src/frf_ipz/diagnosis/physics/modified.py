@@ -64,7 +64,7 @@ def modify(basis: Basis, change: Change) -> Modified:
     squares = np.where(np.abs(squares) <= RIGID * abs(elastic), 0.0, squares)
     if change.floating:
         squares[:n_rigid] = 0.0
-    stated = _ratios(basis, change, squares)
+    stated = _ratios(basis, change, squares) + change.added_ratio
     stated[:n_rigid] = SUSPENSION_RATIO
     return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated)
 

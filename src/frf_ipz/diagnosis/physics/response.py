@@ -234,7 +234,7 @@ def respond(
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
     loads = np.concatenate([left, right, attached])
-    motion = _solve(modes, change.loss_factor, loads, s)
+    motion = _solve(modes, _modulus(change, s), loads, s)
     own = motion[:, :, len(left) + len(right) :]
     stiffness = _coupled(own, attached, change, s)
     motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
@@ -253,11 +253,18 @@ def respond(
     )
 
 
-def _solve(modes: Modes, loss_factor: float, loads: FloatArray, s: ComplexArray) -> ComplexArray:
+def _modulus(change: Change, s: ComplexArray) -> ComplexArray:
+    """Stiffness over that of the model, by its loss factor; of Kjartansson (1979) where it has to be causal."""
+    loss = change.loss_factor
+    if not loss or not change.reference_rad_s:
+        return np.full(len(s), 1 + 1j * loss)
+    return np.asarray(np.hypot(1, loss) * (s / change.reference_rad_s) ** (2 / np.pi * np.arctan(loss)))
+
+
+def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArray) -> ComplexArray:
     """Modal motion under loads, (n_points, q, n_loads)."""
-    squares = modes.squares * (1 + 1j * loss_factor)
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
-    denominators = s[:, None] ** 2 + s[:, None] * damping + squares
+    denominators = s[:, None] ** 2 + s[:, None] * damping + modulus[:, None] * modes.squares
     if modes.viscous is None:
         return np.asarray(loads.T[None] / denominators[:, :, None])
     dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))
