@@ -15,10 +15,14 @@ from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.response import scatter
+from frf_ipz.diagnosis.search import search
+from frf_ipz.diagnosis.search.far.sketches import Start
+from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import parse_dof
@@ -130,6 +134,35 @@ def test_both_ends_of_a_spring_move_at_once(nominal):
     assert {(4, 13), (6, 11), (4, 11), (6, 13)} <= beside
     at_the_end = next(place for place in effect.places(bench.specimen) if place.key == (5, 17, "z"))
     assert all(max(other.key[:2]) <= 17 for other in effect.neighbours(bench.specimen, at_the_end))
+
+
+def with_coupling(model, pair, stiffness):
+    specimen = bench_of(model, measured(model), ("coupling_spring",)).specimen
+    effect = shipped_effects()["coupling_spring"]
+    place = next(place for place in effect.places(specimen) if place.key[:2] == pair)
+    return with_change(model, effect.build(specimen, place)(np.array([stiffness])))
+
+
+def test_the_ends_of_a_spring_are_looked_for_further_around(nominal):
+    effect = shipped_effects()["coupling_spring"]
+    bench = bench_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
+    places = {place.key[:2]: place for place in effect.places(bench.specimen)}
+    assert places[6, 13].key in {other.key for other in effect.around(bench.specimen, places[3, 14])}
+    cause = Cause(effect=effect, place=places[3, 14], n_places=100)
+    found = search._around(bench, (cause,), np.array([2e4]))
+    assert found[0][0][-1].place.location == {"nodes": [6, 13]}
+    assert found[0][1] == pytest.approx(2e4, rel=0.05)
+
+
+def test_where_nothing_far_off_fits_places_around_are_tried(nominal, monkeypatch):
+    effect = shipped_effects()["coupling_spring"]
+    bench = bench_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
+    wrong = next(place for place in effect.places(bench.specimen) if place.key[:2] == (3, 14))
+    start = Start(cause=Cause(effect=effect, place=wrong, n_places=100), values=np.array([2e4]), cost=1.0)
+    monkeypatch.setattr(search, "bring_closer", lambda _bench, starts: starts)
+    fits = search._fitted(bench, fit_nothing(bench), [start])
+    best = max(fits.values(), key=lambda fit: fit.log_evidence)
+    assert best.hypothesis.causes[-1].place.location == {"nodes": [6, 13]}
 
 
 def test_faint_frfs_are_known_no_better_than_the_large_ones(nominal):

@@ -172,6 +172,11 @@ class Effect(ABC):
         del specimen, place
         return ()
 
+    def around(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """Places further around one, with the same parameters; the best few are looked at when none beside is better."""
+        del specimen, place
+        return ()
+
 
 def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
     """Spread values over the bounds of parameters.

@@ -91,11 +91,11 @@ class Specimen:
         largest = float(np.max(np.sum(self.basis.loaded[:, elastic] ** 2 / squares[elastic], axis=1)))
         return 1.0 / max(compliance, 1e-6 * largest)
 
-    def nodes_near(self, node: int, direction: str) -> list[int]:
-        """Nodes beside one that move in a direction: the next ones in a row, the nearest ones elsewhere."""
+    def nodes_near(self, node: int, direction: str, furthest: int = 2) -> list[int]:
+        """Nodes beside one that move in a direction: as many on each side in a row, the nearest ones elsewhere."""
         nodes = [dof.node for dof in self.moving_dofs if dof.direction == direction]
         if self.model.kind in ("beam", "lumped"):
-            return [other for other in nodes if 0 < abs(other - node) <= 2]
+            return [other for other in nodes if 0 < abs(other - node) <= furthest]
         here = self.positions[node]
         return sorted((other for other in nodes if other != node), key=lambda other: self._distance(other, here))[
             :NEAREST

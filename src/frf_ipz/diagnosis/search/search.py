@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -19,7 +19,8 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.polish import polish, same_modes
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Place
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
@@ -40,6 +41,7 @@ WANTED = 2.0  # times the cost of one that explains all: a fit on its way there 
 GAIN = 0.5  # nats: a neighbour must be better by that
 SETTLED = 2  # fits that go on until they converge
 MOST_STEPS = 12
+FITTED_AROUND, EARLY_AROUND = 4, 16  # places further around that are fitted exactly, and with large errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,6 +233,10 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     known = base.hypothesis.causes
     closer = bring_closer(bench, [(known, start) for start in refined[:FITTED]])
     early = [bench.fit_early((*known, start.cause), start.values) for known, start in closer]
+    if all(fit.is_hopeless for fit in early):
+        for start in spread(refined[:FITTED], 1):
+            around = _around(bench, (*known, start.cause), start.values)[:EARLY_AROUND]
+            early += [bench.fit_early(*there) for there in around]
     early.sort(key=lambda fit: fit.cost)
     fits: Fits = {}
     for fit in early[: how_many(early, FITTED_EXACTLY)]:
@@ -323,19 +329,40 @@ def _are_alike(one: Effect, other: Effect) -> bool:
 def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
     for _ in range(MOST_STEPS):
         cause = fit.hypothesis.causes[-1]
-        better = fit
-        for place in cause.effect.neighbours(bench.specimen, cause.place):
-            other = Cause(effect=cause.effect, place=place, n_places=cause.n_places)
-            if other.key in fits:
-                tried = fits[other.key]
-            else:
-                bar = bar_of(fits.values())
-                tried = fits[other.key] = _from_neighbour(bench, base, other, fit, bar)
-            if tried.log_evidence > better.log_evidence + GAIN:
-                better = tried
+        better = _best_of(bench, base, fit, cause.effect.neighbours(bench.specimen, cause.place), fits)
+        if better is fit and fit.is_nearly_right:
+            around = _around(bench, fit.hypothesis.causes, fit.values)[:FITTED_AROUND]
+            better = _best_of(bench, base, fit, [causes[-1].place for causes, _ in around], fits)
         if better is fit:
             return
         fit = better
+
+
+def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
+    """Fit the last cause at other places too; the fit itself where none is better."""
+    cause = fit.hypothesis.causes[-1]
+    better = fit
+    for place in places:
+        other = replace(cause, place=place)
+        if other.key in fits:
+            tried = fits[other.key]
+        else:
+            tried = fits[other.key] = _from_neighbour(bench, base, other, fit, bar_of(fits.values()))
+        if tried.log_evidence > better.log_evidence + GAIN:
+            better = tried
+    return better
+
+
+def _around(bench: Bench, causes: tuple[Cause, ...], values: FloatArray) -> list[tuple[tuple[Cause, ...], FloatArray]]:
+    """Bring the values to places further around the last cause; the best ones first, as seen far from the axis."""
+    *known, cause = causes
+    weights = weights_of(bench.coarse, REFINED_ERROR)
+    found = []
+    for place in cause.effect.around(bench.specimen, cause.place):
+        there = (*known, replace(cause, place=place))
+        at, cost = refine(bench.suppose(there), bench.coarse, weights, values, iterations=4)
+        found.append((cost, there, at))
+    return [(there, at) for _, there, at in sorted(found, key=lambda one: one[0])]
 
 
 def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
 MOST_IN_A_ROW, MOST_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
+FURTHEST = 3  # nodes in a row around each end
 NEXT_TO = 2  # nodes in a row that count as one place: what joins them is the structure itself
 
 
@@ -68,10 +69,14 @@ class CouplingSpring(Effect):
             nodes = {dof.node for dof in specimen.moving_dofs if dof.direction == direction}
             both = [(first + step, second + other) for step, other in product((-1, 1), repeat=2)]
             pairs += [pair for pair in both if nodes.issuperset(pair)]
-        found = [_place(a, b, direction) for a, b in pairs if a != b and _is_new(specimen, a, b)]
-        if is_floating(place):
-            return [floating(other) for other in found]
-        return [*found, *([floating(place)] if specimen.basis.modes.n_rigid else [])]
+        found = _places(specimen, place, pairs)
+        return [*found, *([floating(place)] if specimen.basis.modes.n_rigid and not is_floating(place) else [])]
+
+    def around(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+        """Both ends at any nodes near: along a line of such pairs, each is nearly as good as the next."""
+        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
+        near, far = ([node, *specimen.nodes_near(node, direction, FURTHEST)] for node in (first, second))
+        return _places(specimen, place, [pair for pair in product(near, far) if pair != (first, second)])
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and between what."""
@@ -86,6 +91,12 @@ class CouplingSpring(Effect):
 def _place(first: int, second: int, direction: str) -> Place:
     low, high = sorted((first, second))
     return Place(key=(low, high, direction), location={"nodes": [low, high]})
+
+
+def _places(specimen: Specimen, like: Place, pairs: Sequence[tuple[int, int]]) -> list[Place]:
+    """Make places of pairs of nodes, hanging or not as another."""
+    found = [_place(a, b, str(like.key[2])) for a, b in pairs if a != b and _is_new(specimen, a, b)]
+    return [floating(other) for other in found] if is_floating(like) else found
 
 
 def _is_new(specimen: Specimen, first: int, second: int) -> bool:
