@@ -190,12 +190,13 @@ def with_causes(bench, *named):
     ("named", "expected"),
     [
         ((("attached_resonator", 9), ("attached_resonator", 9)), True),
+        ((("local_damper", 3), ("local_damper", 14)), True),
         ((("attached_resonator", 9), ("local_damper", 3)), False),
         ((("attached_resonator", 9), ("added_mass", 9)), False),
         ((("added_mass", 9), ("local_damper", 4), ("viscoelastic_joint", 4)), True),
     ],
 )
-def test_two_with_dynamics_of_their_own_at_one_place_are_one_of_another_kind(nominal, named, expected):
+def test_two_with_dynamics_of_their_own_alike_or_at_one_place_are_one_of_another_kind(nominal, named, expected):
     names = ("attached_resonator", "local_damper", "added_mass", "viscoelastic_joint")
     assert is_of_another_kind(with_causes(bench_of(nominal, measured(nominal), names), *named)) is expected
 

@@ -1,4 +1,7 @@
-"""Two findings with dynamics of their own at nearly one place: rather one thing that the catalogue does not know."""
+"""Two findings with dynamics of their own, alike or at nearly one place: rather one thing that the catalogue lacks.
+
+Two resonators are a chain of two at one of their places, two dampers or joints what is spread between them.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,8 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the largest extent of a structure
 COMPLAINT = (
-    "two effects with dynamics of their own at nearly one place explain the measurement together, which rather are one "
-    "thing of another kind"
+    "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place, which "
+    "rather are one thing of another kind"
 )
 
 
@@ -32,11 +35,14 @@ def is_of_another_kind(fit: Fit) -> bool:
     Returns
     -------
     bool
-        Two of them imitate something at their place.
+        Two of them imitate something at their place, or something that is spread.
     """
     hypothesis = fit.hypothesis
     dynamic = [cause for cause in hypothesis.causes if cause.effect.has_dynamics]
-    return any(_at_one_place(hypothesis.specimen, *two) for two in combinations(dynamic, 2))
+    return any(
+        one.effect.name == other.effect.name or _at_one_place(hypothesis.specimen, one, other)
+        for one, other in combinations(dynamic, 2)
+    )
 
 
 def _at_one_place(specimen: Specimen, first: Cause, second: Cause) -> bool:
