@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
 from frf_ipz.diagnosis.judging.tracing import trace
+from frf_ipz.diagnosis.judging.verdict import goodness
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -114,6 +115,16 @@ def test_where_nothing_is_wrong_nothing_is_traced(nominal):
 def test_what_was_found_says_where_the_mismatch_is(nominal):
     found = diagnose(nominal, observed(measured(with_point_masses(nominal, {12: 0.02}))), DiagnoseOptions(effects=FEW))
     assert found.to_json()["mismatch"]["location"] == {"nodes": [12]}
+
+
+def test_a_frequency_beyond_the_tolerances_is_not_explained(nominal):
+    inside, beyond = (fit_nothing(bench_of(nominal, measured(nominal))) for _ in range(2))
+    bench = bench_of(nominal, measured(nominal))
+    first = bench.nuisance.frequency_places[bench.nuisance.is_stated][0]
+    beyond.unknown[first] = 2.6
+    assert goodness(bench, inside).is_good
+    assert not goodness(bench, beyond).is_good
+    assert goodness(bench, beyond).detuned == pytest.approx(2.6)
 
 
 def test_three_causes_are_found_at_once(nominal):

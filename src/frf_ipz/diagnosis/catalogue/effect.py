@@ -173,7 +173,7 @@ class Effect(ABC):
         return ()
 
     def around(self, specimen: Specimen, place: Place) -> Sequence[Place]:
-        """Places further around one, with the same parameters; the best few are looked at when none beside is better."""
+        """Places further around one, with the same parameters; the best few are looked at if none beside is better."""
         del specimen, place
         return ()
 

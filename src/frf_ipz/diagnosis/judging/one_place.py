@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the largest extent of a structure
 COMPLAINT = (
-    "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place, which "
+    "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place: they "
     "rather are one thing of another kind"
 )
 
