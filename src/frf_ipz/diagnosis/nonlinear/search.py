@@ -22,6 +22,7 @@ from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, Track, find_candidates
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import anywhere, whereabouts
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import Misfit
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+    from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
@@ -187,11 +189,14 @@ def search_laws(
         window = Window(duration_s=periods / observations.band_hz[1], floor=floor, loudest=loudest)
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
-        return Track(stretches=stretches, linear=fit_linear(stretches, freedom))
+        linear = fit_linear(stretches, freedom)
+        return Track(stretches=stretches, linear=linear, where=anywhere(plant))
 
     from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
     short, long = _tracks(track_of, from_rest=from_rest)
-    first = partial(track_of, FIRST, ROUGH, loudest=False) if short.missed > WEAK else None
+    where = whereabouts(long.stretches, long.linear)
+    short, long = replace(short, where=where), replace(long, where=where)
+    first = partial(_first, track_of, where) if short.missed > WEAK else None
     fits = find_candidates(short, long, laws, first=first)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
@@ -227,9 +232,14 @@ def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, 
     return track_of(SHORT, ROUGH, loudest=is_linear), long
 
 
+def _first(track_of: Callable[..., Track], where: Whereabouts) -> Track:
+    """Cut the stretches from which a rough start leads to a strong law."""
+    return replace(track_of(FIRST, ROUGH, loudest=False), where=where)
+
+
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:
     """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
-    near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost][:MOST_NEAR]
+    near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost and fit.place in long.where.equal][:MOST_NEAR]
     small = [fit for fit in near if bend_of(fit) < SMALL * fit.cost]
     bent = [AnyForce.on(long, fit.place, fit.cost - bend_of(fit)) for fit in small]
     of_each_law = {fit.law.name: fit.place for fit in reversed(fits)}

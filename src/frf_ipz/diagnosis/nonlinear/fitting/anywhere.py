@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track, neighbours
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
@@ -30,7 +30,6 @@ YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring sl
 STEEP = 3e-3  # of the largest velocity: below, friction grows with it
 FEW_TURNS, MANY_TURNS = 3, 8
 FINALISTS = 4  # places that are fitted on long stretches
-NEIGHBOURS = 2
 CLIMBS = 6  # steps to better neighbours
 RIDGE = 1e-6  # of a column's own square: many of the laws are nearly alike
 SETTLED = 1e-3  # relative change of the cost between turns
@@ -62,7 +61,7 @@ class AnyForce:
 
 
 def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyForce, AnyForce]:
-    """Find the place of a force whose law is not known.
+    """Find the place of a force whose law is not known, among those at which any force explains as much.
 
     Parameters
     ----------
@@ -76,13 +75,13 @@ def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyFor
     on_long, on_short : AnyForce
         The best place by the long stretches, and by the short ones, on which any force is known better.
     """
-    n_places = len(short.linear.freedom.plant.places)
-    rough = sorted((fit_anything(short, place, FEW_TURNS) for place in range(n_places)), key=lambda one: one.cost)
-    done = {*likely, *(one.place for one in rough[:FINALISTS])}
+    equal = long.where.equal
+    rough = sorted((fit_anything(short, place, FEW_TURNS) for place in equal), key=lambda one: one.cost)
+    done = {*(place for place in likely if place in equal), *(one.place for one in rough[:FINALISTS])}
     fits = [fit_anything(long, place, MANY_TURNS) for place in sorted(done)]
     for _ in range(CLIMBS):
         best = min(fits, key=lambda one: one.cost)
-        near = [place for place in neighbours(short.linear.freedom.plant, best.place, NEIGHBOURS) if place not in done]
+        near = [place for place in long.beside(best.place) if place in equal and place not in done]
         if not near:
             break
         done.update(near)

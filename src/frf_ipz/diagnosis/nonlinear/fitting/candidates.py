@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import start_at
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
 from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
@@ -19,12 +20,15 @@ from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 OF_EACH_LAW = 3  # places that are refined
 OF_ALL = 5
+FEW = 4  # places that nothing but a law tells apart: with more, what explains at one of them may be surpassed
+READ = 2  # places at which laws are read from the force itself
 SIMULATED = 2  # places of each law that are simulated on short stretches
 TURNS = 6  # of the refinement
 FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that are not hopeless
@@ -51,15 +55,23 @@ class Track:
         The data.
     linear : LinearFit
         The linear model.
+    where : Whereabouts
+        Where a force may sit.
     """
 
     stretches: Stretches
     linear: LinearFit
+    where: Whereabouts
 
     @property
     def missed(self) -> float:
         """Mean square that the linear model leaves, over the expected one."""
         return self.linear.cost / self.linear.n_rows
+
+    def beside(self, place: int) -> list[int]:
+        """Possible places among the two that move most like a place."""
+        near = neighbours(self.linear.freedom.plant, place, NEIGHBOURS)
+        return [other for other in near if other in self.where.possible]
 
     def shoot(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other stretches."""
@@ -95,16 +107,26 @@ def find_candidates(
     list of LawFit
         Fits to the long stretches, the smallest cost first.
     """
-    rough, late = _refined(short, laws), _refined(long, laws)
+    late = sorted(_refined(long, laws) + _read(long, laws), key=lambda fit: fit.cost)
+    is_placed = len(long.where.equal) <= FEW and _explain(late)
+    known = _finished(long, [fit for law in laws for fit in _of(law, late)[:1]]) if is_placed else []
+    if _explain(known):
+        return known
+    rough = _refined(short, laws)
     early = _climbed(short, [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]])
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
-    fits = _finished(long, finalists)
-    if first is None or (fits and fits[0].cost < fits[0].n_rows):
+    fits = _best_of_each(known + _finished(long, finalists))
+    if first is None or _explain(fits):
         return fits
     again = _climbed(short, _first(first(), laws))
     if not again or again[0].cost > max(again[0].n_rows, (1 - BETTER) * early[0].cost if early else np.inf):
         return fits
     return _best_of_each(fits + _finished(long, _others(again[:FINALISTS], fits[:1])))
+
+
+def _explain(fits: Sequence[LawFit]) -> bool:
+    """Tell whether the first fit leaves no more than can be expected."""
+    return bool(fits) and fits[0].cost < fits[0].n_rows
 
 
 def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:
@@ -164,7 +186,7 @@ def _different(fits: Iterable[LawFit]) -> list[LawFit]:
 
 
 def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
-    guesses = screen(track.stretches, track.linear, laws)
+    guesses = screen(track.stretches, track.linear, laws, places=track.where.possible)
     unknowns = track.linear.unknowns.copy()
     unknowns[: track.linear.freedom.n_lasting] = 0.0
     chosen = [guess for law in laws for guess in [g for g in guesses if g.law is law][:OF_EACH_LAW]]
@@ -175,6 +197,12 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
         fit = refine(track.stretches, track.linear.freedom, start, n_turns=TURNS, known=False)
         fits.append(fit if fit.strength else replace(fit, strength=guess.strength, shape=guess.shape))
     return sorted(fits, key=lambda fit: fit.cost)
+
+
+def _read(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+    """Fit the laws from numbers that are read from the force at the likeliest places, whatever its law."""
+    starts = [start_at(track.stretches, track.linear, free, law) for free in track.where.forces[:READ] for law in laws]
+    return [refine(track.stretches, track.linear.freedom, start, n_turns=TURNS) for start in starts if start.strength]
 
 
 def _simulated(
@@ -208,8 +236,7 @@ def _exchange(track: Track, fits: list[LawFit], *, beside: bool) -> bool:
     best = min(fits, key=lambda fit: fit.cost)
     likely = [fit for fit in fits if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
     others = [fit.place for fit in sorted(likely, key=lambda fit: fit.cost)[:EXCHANGED]]
-    near = neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS) if beside else []
-    others += [place for place in near if place not in others]
+    others += [place for place in (track.beside(best.place) if beside else []) if place not in others]
     again = _simulated(track, [_moved(track, best, place) for place in others], least=best.cost)
     fits[:] = _best_of_each(fits + again)
     return fits[0] is not best
@@ -220,8 +247,7 @@ def _climb(track: Track, fits: list[LawFit]) -> None:
     done = {(fit.law.name, fit.place) for fit in fits}
     for _ in range(CLIMBS if fits else 0):
         best = min(fits, key=lambda fit: fit.cost)
-        near = neighbours(track.linear.freedom.plant, best.place, NEIGHBOURS)
-        new = [place for place in near if (best.law.name, place) not in done]
+        new = [place for place in track.beside(best.place) if (best.law.name, place) not in done]
         if not new:
             return
         done |= {(best.law.name, place) for place in new}

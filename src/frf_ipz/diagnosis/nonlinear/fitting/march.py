@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lapack
 from scipy.signal import lfilter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -263,7 +264,7 @@ class _Block:
         free = (state @ self.read).imag.reshape(*state.shape[:2], 2, BLOCK)[..., :n]
         right = given + np.einsum("bcit,bti->btc", free, slopes)
         matrix = np.eye(n) + np.einsum("bti,tki->btk", slopes, self.lower[:n, :n])
-        force = np.linalg.solve(matrix, right)
+        force = np.stack([lapack.dtrtrs(*both, lower=1, unitdiag=1)[0] for both in zip(matrix, right, strict=True)])
         added = force.swapaxes(1, 2) @ (self.powers[n - 1 :: -1] * self.per_force)
         return force, state * self.powers[n] - added
 

@@ -1,0 +1,191 @@
+"""Where a force may sit of which nothing is known, not even that it follows a law.
+
+On each line of each blow any force at the place takes up one direction among the sensors: the one in which the place
+reaches them. What is left across it is for the linear model's unknowns to explain, and tells the place, if two sensors
+or more were there. The better the linear model is known, the less is left that several places have in common.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
+from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.linear.plant import respond
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+
+TURNS = 3  # the unknowns change how a place reaches the sensors
+TIE = 15.0  # of the cost: less tells no place from another
+POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
+LEAST_SENSORS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FreeForce:
+    """The best force at a place, whatever its law.
+
+    Parameters
+    ----------
+    place : int
+        Index in `Plant.places`.
+    cost : float
+        Weighted sum of squares that is left, and of the unknowns.
+    force : (n_blows, n_used) complex array
+        Of the law against the structure, N s.
+    unknowns : (n_unknowns,) array
+        Of the linear model, in prior standard deviations.
+    """
+
+    place: int
+    cost: float
+    force: ComplexArray
+    unknowns: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Whereabouts:
+    """Where a force may sit.
+
+    Parameters
+    ----------
+    possible, equal : tuple of int
+        Indices in `Plant.places` that are worth a look, and those of them that nothing but a law tells apart.
+    forces : tuple of FreeForce
+        At the equal places, the best first; none where one sensor alone can tell no place from another.
+    """
+
+    possible: tuple[int, ...]
+    equal: tuple[int, ...]
+    forces: tuple[FreeForce, ...] = ()
+
+
+def anywhere(plant: Plant) -> Whereabouts:
+    """Leave all places of a structure possible."""
+    every = tuple(range(len(plant.places)))
+    return Whereabouts(possible=every, equal=every)
+
+
+def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce:
+    """Fit the linear model with any force at a place.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    linear : LinearFit
+        The linear model.
+    place : int
+        Index in `Plant.places`.
+
+    Returns
+    -------
+    FreeForce
+        The best turn.
+    """
+    freedom, used = linear.freedom, stretches.used
+    weight = 1 / np.sqrt(stretches.variance[:, :, used])
+    unknowns = linear.unknowns.copy()
+    unknowns[: freedom.n_lasting] = 0.0
+    force = np.zeros((stretches.n_blows, len(used)), complex)
+    found: list[FreeForce] = []
+    for _ in range(TURNS):
+        response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns, place))
+        shown = linear_motion(stretches, freedom, response)
+        shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+        misfit = (stretches.motion - shown)[:, :, used] * weight
+        columns = freedom.columns(stretches, response.on(used), -force, place)
+        reach = response.to_sensors(place)[:, used] * weight
+        across = as_real(_across(reach, np.concatenate([columns, misfit[None]])))
+        rows, left = across[:-1], across[-1]
+        step = linalg.solve(rows @ rows.T + np.eye(len(rows)), rows @ left - unknowns, assume_a="pos")
+        unknowns = unknowns + step
+        left = left - step @ rows
+        force = -_along(reach, misfit - np.tensordot(step, columns, 1))
+        cost = float(left @ left + unknowns @ unknowns)
+        found.append(FreeForce(place=place, cost=cost, force=force, unknowns=unknowns))
+    return min(found, key=lambda one: one.cost)
+
+
+def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
+    """Say where a force may sit.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    linear : LinearFit
+        The linear model.
+
+    Returns
+    -------
+    Whereabouts
+        Anywhere, where one sensor alone can tell no place from another.
+    """
+    every = anywhere(linear.freedom.plant)
+    if np.isfinite(stretches.variance).any(2).sum(1).min() < LEAST_SENSORS:
+        return every
+    found = sorted((free_force(stretches, linear, place) for place in every.possible), key=lambda one: one.cost)
+    least = found[0].cost
+    equal = tuple(one for one in found if one.cost < least + TIE)
+    possible = tuple(one.place for one in found if one.cost < least + max(POSSIBLE, TIE) + PART * least)
+    return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
+
+
+def start_at(stretches: Stretches, linear: LinearFit, free: FreeForce, law: Law) -> Start:
+    """Read the numbers of a law from a force that follows none yet.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    linear : LinearFit
+        The linear model.
+    free : FreeForce
+        Fitted to these stretches.
+    law : Law
+        Which.
+
+    Returns
+    -------
+    Start
+        Strength 0 where the force is not of that law at all.
+    """
+    clock, used = Clock(stretches), stretches.used
+    nothing = Start(law=law, place=free.place, strength=0.0, shape=0.0, unknowns=free.unknowns)
+    force = np.zeros((stretches.n_blows, len(stretches.s)), complex)
+    force[:, used] = free.force
+    response, w, v = motion_at(stretches, linear.freedom, nothing, clock, force)
+    reach = np.abs(response.to_sensors(free.place)[:, used]) ** 2
+    weight = np.sum(reach / stretches.variance[:, :, used], 1)
+    best, most = nothing, 0.0
+    for shape in law.shapes(float(np.abs(w).max()), float(np.abs(v).max())):
+        unit = clock.at_lines(law.unit_force(w, v, float(shape)))[:, used]
+        across, square = np.sum(weight * (unit.conj() * free.force).real), np.sum(weight * np.abs(unit) ** 2)
+        drop = float(across**2 / max(square, np.finfo(float).tiny))
+        if drop > most and (across > 0 or law.strength_can_be_negative):
+            most = drop
+            best = Start(
+                law=law, place=free.place, strength=float(across / square), shape=float(shape), unknowns=free.unknowns
+            )
+    return best
+
+
+def _along(reach: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """(..., n_blows, n_used) part of weighted values (..., n_blows, n_sensors, n_used) along the reach of a force."""
+    square = np.maximum(np.sum(np.abs(reach) ** 2, 1), np.finfo(float).tiny)
+    return np.asarray(np.sum(reach.conj() * values, -2) / square)
+
+
+def _across(reach: ComplexArray, values: ComplexArray) -> ComplexArray:
+    return np.asarray(values - reach * _along(reach, values)[..., None, :])
