@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import Misfit
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
-    from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
@@ -189,14 +188,13 @@ def search_laws(
         window = Window(duration_s=periods / observations.band_hz[1], floor=floor, loudest=loudest)
         stretches = transform(training, plant, noise, window)
         freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
-        linear = fit_linear(stretches, freedom)
-        return Track(stretches=stretches, linear=linear, where=anywhere(plant))
+        return Track(stretches=stretches, linear=fit_linear(stretches, freedom), where=anywhere(plant))
 
     from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
     short, long = _tracks(track_of, from_rest=from_rest)
     where = whereabouts(long.stretches, long.linear)
     short, long = replace(short, where=where), replace(long, where=where)
-    first = partial(_first, track_of, where) if short.missed > WEAK else None
+    first = (lambda: replace(track_of(FIRST, ROUGH, loudest=False), where=where)) if short.missed > WEAK else None
     fits = find_candidates(short, long, laws, first=first)
     bend_of = cache(partial(_bend, long))
     found = _judge(long, linearity, plant, fits, bend_of)
@@ -230,11 +228,6 @@ def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, 
         if longer.stretches.n_samples > LONGER_BY * long.stretches.n_samples:
             return long, longer
     return track_of(SHORT, ROUGH, loudest=is_linear), long
-
-
-def _first(track_of: Callable[..., Track], where: Whereabouts) -> Track:
-    """Cut the stretches from which a rough start leads to a strong law."""
-    return replace(track_of(FIRST, ROUGH, loudest=False), where=where)
 
 
 def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:

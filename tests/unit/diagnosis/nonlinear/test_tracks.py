@@ -8,6 +8,9 @@ import pytest
 from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.fitting import anywhere, candidates
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
+
+EVERY = tuple(range(10))
 
 
 def cutter(missed, most=float("inf")):
@@ -76,8 +79,12 @@ def a_force(place, cost, *, n_rows=100, missed=50.0):
     return search.AnyForce(place=place, cost=cost, left=cost / n_rows, missed=missed)
 
 
-def a_track(n_rows=100, missed=50.0):
-    return SimpleNamespace(linear=SimpleNamespace(n_rows=n_rows), missed=missed)
+def a_track(n_rows=100, missed=50.0, equal=EVERY):
+    return SimpleNamespace(linear=SimpleNamespace(n_rows=n_rows), missed=missed, where=where(equal))
+
+
+def where(equal):
+    return Whereabouts(possible=EVERY, equal=equal)
 
 
 @pytest.mark.parametrize(("drop", "place"), [(300.0, 7), (950.0, 3)])
@@ -97,18 +104,18 @@ def test_first_moments_place_a_law_where_later_ones_are_not_reached(monkeypatch,
 def test_places_of_the_best_laws_are_asked_for_whatever_the_first_moments_say(monkeypatch):
     costs = {("short", place): 10.0 + place for place in range(8)} | {("long", place): 50.0 for place in range(8)}
     costs["long", 7] = 20.0
-    tracks = {name: SimpleNamespace(name=name, linear=a_plant_of(8), missed=9.0) for name in ("short", "long")}
-    monkeypatch.setattr(anywhere, "neighbours", lambda *_: [])
+    tracks = {
+        name: SimpleNamespace(name=name, missed=9.0, where=where(EVERY[:8]), beside=lambda _: [])
+        for name in ("short", "long")
+    }
     monkeypatch.setattr(
         anywhere, "fit_anything", lambda track, place, _: a_force(place, costs[track.name, place], missed=track.missed)
     )
     by_long, by_short = anywhere.find_place(tracks["short"], tracks["long"], [7])
     assert (by_long.place, by_short.place) == (7, 0)
     assert anywhere.find_place(tracks["short"], tracks["long"], [])[0].place != 7
-
-
-def a_plant_of(n_places):
-    return SimpleNamespace(freedom=SimpleNamespace(plant=SimpleNamespace(places=range(n_places))))
+    tracks["long"].where = where(EVERY[:7])
+    assert anywhere.find_place(tracks["short"], tracks["long"], [7])[0].place != 7  # any force tells that it is not
 
 
 def test_neighbours_move_alike_or_the_other_way_round():
@@ -146,9 +153,8 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
     fits = [SimpleNamespace(law=law, place=one, cost=cost, strength=1.0) for one, cost in costs.items()]
     costs[place] = 6.0
     monkeypatch.setattr(candidates, "_moved", lambda _, fit, there: SimpleNamespace(law=fit.law, place=there))
-    monkeypatch.setattr(candidates, "neighbours", lambda *_: [9])
     track = SimpleNamespace(
-        linear=a_plant_of(10),
+        beside=lambda _: [9],
         shoot=lambda fit, _: SimpleNamespace(
             law=law, place=fit.place, cost=costs[fit.place], strength=1.0, settled=True
         ),
@@ -188,7 +194,8 @@ def a_law_at(place, cost):
 def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, by_short, by_first, expected):
     """A linear model leaves 100 of the first moments, the law at place 7 leaves 10, or 90 in the last case."""
     tracks = {
-        name: SimpleNamespace(name=name, linear=SimpleNamespace(cost=100.0)) for name in ("first", "short", "long")
+        name: SimpleNamespace(name=name, linear=SimpleNamespace(cost=100.0), where=where(EVERY))
+        for name in ("first", "short", "long")
     }
     costs = {
         ("first", 7): 90.0 if by_first == 99.0 else 10.0,

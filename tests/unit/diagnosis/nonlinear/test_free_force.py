@@ -1,0 +1,62 @@
+"""A force at a place, before anything is known of its law: by how it reaches the sensors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import start_at, whereabouts
+from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
+from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
+from frf_ipz.diagnosis.nonlinear.laws.gap_contact import GapContact
+from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+LAWS = {
+    "cubic": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}),
+    "gap": (lambda w, _: 3e4 * max(w - 2e-4, 0.0), (0, 0, 0, 1), {"nodes": [4]}),
+    "none that is known": (lambda w, v: 3e7 * w * abs(w) + 5.0 * v * abs(v), (0, 0, 1, 0), {"nodes": [3]}),
+    "across a spring": (lambda w, _: 2e10 * w**3, (0, -1, 1, 0), {"springs": ["k3"]}),
+}
+READ = 0.3  # relative: by the nearest of a few gaps
+
+
+def prepared(model, observations):
+    plant = make_plant(model, observations)
+    stretches = transform(observations, plant, read_noise(observations), Window(duration_s=2.0, floor=2e-3))
+    return stretches, fit_linear(stretches, make_freedom(plant, stretches, 75.0, DiagnoseOptions()))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_force_is_placed_whatever_its_law(chain, strike, name):
+    law, where, location = LAWS[name]
+    stretches, linear = prepared(chain.model, strike(law, where))
+    found = whereabouts(stretches, linear)
+    assert dict(linear.freedom.plant.places[found.equal[0]].location) == location
+    assert found.forces[0].cost < 1e-3 * linear.cost
+    assert set(found.equal) <= set(found.possible)
+    assert len(found.possible) < len(linear.freedom.plant.places)
+
+
+def test_one_sensor_places_nothing(chain, strike):
+    law, where, _ = LAWS["cubic"]
+    observations = strike(law, where)
+    blows = tuple(replace(blow, sensors=blow.sensors[:1], responses=blow.responses[:1]) for blow in observations.blows)
+    stretches, linear = prepared(chain.model, replace(observations, blows=blows))
+    found = whereabouts(stretches, linear)
+    assert found.equal == found.possible == tuple(range(len(linear.freedom.plant.places)))
+    assert found.forces == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "strength", "shape"), [("cubic", CubicStiffness(), 2e10, 0.0), ("gap", GapContact(), 3e4, 2e-4)]
+)
+def test_the_numbers_of_a_law_are_read_from_the_force(chain, strike, name, law, strength, shape):
+    stretches, linear = prepared(chain.model, strike(*LAWS[name][:2]))
+    start = start_at(stretches, linear, whereabouts(stretches, linear).forces[0], law)
+    assert start.strength == pytest.approx(strength, rel=READ)
+    assert start.shape == pytest.approx(shape, rel=READ)
+    assert np.isfinite(start.unknowns).all()
