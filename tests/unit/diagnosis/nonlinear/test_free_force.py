@@ -18,8 +18,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 LAWS = {
     "cubic": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}),
     "gap": (lambda w, _: 3e4 * max(w - 2e-4, 0.0), (0, 0, 0, 1), {"nodes": [4]}),
-    "none that is known": (lambda w, v: 3e7 * w * abs(w) + 5.0 * v * abs(v), (0, 0, 1, 0), {"nodes": [3]}),
-    "across a spring": (lambda w, _: 2e10 * w**3, (0, -1, 1, 0), {"springs": ["k3"]}),
+    "none that is known": (lambda w, v: 3e7 * w * abs(w) + 5.0 * v * abs(v), (0, -1, 1, 0), {"springs": ["k3"]}),
 }
 READ = 0.3  # relative: by the nearest of a few gaps
 
