@@ -108,8 +108,7 @@ def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
     """
     stretches, linear = track.stretches, track.linear
     clock, freedom = Clock(stretches), linear.freedom
-    unknowns = linear.unknowns.copy()
-    unknowns[: freedom.n_lasting] = 0.0
+    unknowns = linear.as_stated
     force: ComplexArray | None = None
     best = np.inf
     for _ in range(n_turns):

@@ -83,9 +83,8 @@ class Track:
 
     def shoot_afresh(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation from its numbers, with the linear model as it starts without a law."""
-        unknowns = self.linear.unknowns.copy()
-        unknowns[: self.linear.freedom.n_lasting] = 0.0
-        return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
+        start = fit.start(self.linear.as_stated)
+        return shoot(self.stretches, self.linear.freedom, start, iterations=iterations)
 
 
 def find_candidates(
@@ -187,8 +186,7 @@ def _different(fits: Iterable[LawFit]) -> list[LawFit]:
 
 def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
     guesses = screen(track.stretches, track.linear, laws, places=track.where.possible)
-    unknowns = track.linear.unknowns.copy()
-    unknowns[: track.linear.freedom.n_lasting] = 0.0
+    unknowns = track.linear.as_stated
     chosen = [guess for law in laws for guess in [g for g in guesses if g.law is law][:OF_EACH_LAW]]
     chosen += [guess for guess in guesses[:OF_ALL] if guess not in chosen]
     fits = []

@@ -95,8 +95,7 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
     """
     freedom, used = linear.freedom, stretches.used
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    unknowns = linear.unknowns.copy()
-    unknowns[: freedom.n_lasting] = 0.0
+    unknowns = linear.as_stated
     force = np.zeros((stretches.n_blows, len(used)), complex)
     found: list[FreeForce] = []
     for _ in range(TURNS):
@@ -138,7 +137,7 @@ def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
     found = sorted((free_force(stretches, linear, place) for place in every.possible), key=lambda one: one.cost)
     least = found[0].cost
     equal = tuple(one for one in found if one.cost < least + TIE)
-    possible = tuple(one.place for one in found if one.cost < least + max(POSSIBLE, TIE) + PART * least)
+    possible = tuple(one.place for one in found if one.cost < least + POSSIBLE + PART * least)
     return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
 
 

@@ -89,6 +89,13 @@ class LinearFit:
         """Number of real data."""
         return len(self.misfit)
 
+    @property
+    def as_stated(self) -> FloatArray:
+        """(n_unknowns,) unknowns of the model as it is stated, and how stretches start in the best linear one."""
+        unknowns = self.unknowns.copy()
+        unknowns[: self.freedom.n_lasting] = 0.0
+        return unknowns
+
 
 def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     """Fit the linear model alone.
