@@ -318,29 +318,30 @@ def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) ->
         Per standard deviation of each parameter.
     """
     modes, s, m = response.modes, response.s, nuisance.n_modes
-    scattered_left = response.output_motion[:, :m][:, :, layout.output_of]
-    scattered_right = response.input_motion[:, :m][:, :, layout.input_of]
-    left = np.matmul(modes.rotation, scattered_left)
-    right = np.matmul(modes.rotation, scattered_right)
+    scattered_left = response.output_motion[:, :m].swapaxes(1, 2)[:, layout.output_of]  # point, FRF, mode
+    scattered_right = response.input_motion[:, :m].swapaxes(1, 2)[:, layout.input_of]
+    left, right = scattered_left @ modes.rotation.T, scattered_right @ modes.rotation.T
     i, j = nuisance.pairs
-    products = left[:, i] * right[:, j]
-    across = i != j
-    products[:, across] += left[:, j[across]] * right[:, i[across]]
     omega = modes.omega[:m]
-    kappa = -products * (omega[i] * omega[j] * nuisance.kappa_std[i, j])[:, None]
-    mu = -products * (s**2)[:, None, None] * nuisance.mu_std[i, j][:, None]
+    products = left[:, :, i] * right[:, :, j]
+    products += np.where(i != j, left[:, :, j] * right[:, :, i], 0.0)
+    products *= -response.chain[:, :, None]
     own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance.damping_std
-    damping = -scattered_left * scattered_right * own[:, None] * s[:, None, None]
     rigid = slice(0, nuisance.n_rigid)
-    cords = -left[:, rigid] * right[:, rigid] * nuisance.cords_std
-    parts = [kappa, mu, damping, cords]
-    parts += _shift_jacobians(response, nuisance, layout)
-    parts.append(
-        np.broadcast_to(np.diag(nuisance.local_std), (len(s), len(nuisance.local_std), len(nuisance.local_std)))
-    )
-    stacked = np.concatenate(parts, axis=1) * response.chain[:, None, :]
-    gains = response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std)
-    return np.concatenate([np.moveaxis(stacked, 1, 2), gains], axis=2)
+    changed = -response.chain[:, :, None] * scattered_left * scattered_right
+    parts = [
+        products * (omega[i] * omega[j] * nuisance.kappa_std[i, j]),
+        products * nuisance.mu_std[i, j] * (s**2)[:, None, None],
+        changed * own * s[:, None, None],
+        -response.chain[:, :, None] * left[:, :, rigid] * right[:, :, rigid] * nuisance.cords_std,
+        *(
+            np.moveaxis(part, 1, 2) * response.chain[:, :, None]
+            for part in _shift_jacobians(response, nuisance, layout)
+        ),
+        response.chain[:, :, None] * np.diag(nuisance.local_std),
+        response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std),
+    ]
+    return np.concatenate(parts, axis=2)
 
 
 def _shift_jacobians(response: Response, nuisance: Nuisance, layout: Layout) -> list[ComplexArray]:
