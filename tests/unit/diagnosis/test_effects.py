@@ -200,6 +200,14 @@ def test_structural_damping(tmp_path, key, modulus, ratio):
     assert_same(changed_frfs(frame, "structural_damping", key, [0.04], names), expected, REDUCED)
 
 
+def test_another_level_of_damping_goes_before_half_a_loss_factor_for_each_mode(tmp_path):
+    specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
+    effect = shipped_effects()["structural_damping"]
+    priors = {place.key: effect.log_prior(specimen, place, np.array([0.01])) for place in effect.places(specimen)}
+    assert priors["of modes",] < priors[()] == priors["causal",] == 0
+    assert priors["of modes",] > -5.0  # nats: it stays among what is reported
+
+
 @pytest.mark.parametrize("key", [(), ("causal",), ("of modes",)])
 def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, key):
     specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 BOUNDS = 1e-5, 1.0
 CAUSAL, OF_MODES = "causal", "of modes"
+LESS_LIKELY = -3.0  # nats: less than what tells explanations apart, more than what priors of two numbers differ by
 TRIED = np.geomspace(2e-4, 0.5, 16)
 
 
@@ -52,6 +53,11 @@ class StructuralDamping(Effect):
         """From little to much."""
         del specimen, place
         return TRIED[:, None]
+
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""
+        del specimen, values
+        return LESS_LIKELY if place.key == (OF_MODES,) else 0.0
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much."""
