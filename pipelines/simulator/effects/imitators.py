@@ -381,4 +381,4 @@ def _of_outside(bench: Bench, effect: Effect) -> list[Substitute]:
         found += [_damper(bench, node, bench.damping(motion))]
         found += [_joint({"nodes": [node]}, motion, "stiffness_N_m", stiffness, 1 / middle)]
     ratio = bench.set_up.damping_ratio
-    return [*found, _level(bench, 1.2 * ratio), _loss(0.5 * ratio)]
+    return [*found, _level(bench, 1.2 * ratio), _loss(bench, 0.5 * ratio)]
