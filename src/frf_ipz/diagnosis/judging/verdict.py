@@ -43,7 +43,7 @@ class Limits:
     beside_nats : float
         The same where the first one leaves nothing to explain either.
     detuned : float
-        Standard deviations of one natural frequency: 153 tests with nothing missing reached 1.0, with FRFs of two states,
+        Standard deviations of one natural frequency: 153 tests with nothing missing reached 1.0; FRFs of two states,
         whose tolerances are learnt from one of them, 2.8.
     """
 
