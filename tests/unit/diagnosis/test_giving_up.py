@@ -11,8 +11,8 @@ from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.search import climb, search
 from frf_ipz.diagnosis.search import hypothesis as hypotheses
-from frf_ipz.diagnosis.search import search
 from frf_ipz.diagnosis.search.far.wide import causes_of
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.fe.changes import with_point_masses
@@ -40,15 +40,15 @@ def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(bench):
     right = bench.fit((mass_at(bench, 12),), START)
     wrong = (mass_at(bench, 16),)
     to_the_end = bench.fit(wrong, START)
-    given_up = bench.fit(wrong, START, bar=search.bar_of([right]))
-    assert to_the_end.cost > 4 * search.bar_of([right])
+    given_up = bench.fit(wrong, START, bar=climb.bar_of([right]))
+    assert to_the_end.cost > 4 * climb.bar_of([right])
     assert given_up.cost > to_the_end.cost
     assert not given_up.converged
 
 
 def test_a_bar_does_not_stop_a_fit_on_its_way_below_it(bench):
     right = bench.fit((mass_at(bench, 12),), START)
-    again = bench.fit((mass_at(bench, 12),), START, bar=search.bar_of([right]))
+    again = bench.fit((mass_at(bench, 12),), START, bar=climb.bar_of([right]))
     assert again.cost == right.cost
 
 
@@ -60,9 +60,9 @@ def a_fit(cost, *, is_nearly_all, converged=True):
 
 def test_the_bar_is_near_the_best_if_that_explains_nearly_all():
     worse = a_fit(9000.0, is_nearly_all=False)
-    assert search.bar_of([]) == np.inf
-    assert search.bar_of([worse]) == np.inf
-    assert search.bar_of([worse, a_fit(100.0, is_nearly_all=True)]) == pytest.approx(500.0)
+    assert climb.bar_of([]) == np.inf
+    assert climb.bar_of([worse]) == np.inf
+    assert climb.bar_of([worse, a_fit(100.0, is_nearly_all=True)]) == pytest.approx(500.0)
 
 
 def test_only_a_fit_below_the_bar_goes_on():
@@ -70,8 +70,8 @@ def test_only_a_fit_below_the_bar_goes_on():
     bench = SimpleNamespace(go_on=lambda fit: gone_on.append(fit) or fit)
     best = a_fit(100.0, is_nearly_all=True, converged=False)
     near, far = (a_fit(cost, is_nearly_all=False, converged=False) for cost in (300.0, 9000.0))
-    search.ranked(bench, {1: best, 2: far})
-    search.ranked(bench, {1: best, 2: near})
+    search.ranked(bench, [best, far])
+    search.ranked(bench, [best, near])
     assert gone_on == [best, best, near]
 
 

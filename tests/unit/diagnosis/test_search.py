@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.response import scatter
-from frf_ipz.diagnosis.search import search
+from frf_ipz.diagnosis.search import climb, search
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
@@ -160,7 +160,7 @@ def test_the_ends_of_a_spring_are_looked_for_further_around(nominal):
     places = {place.key[:2]: place for place in effect.places(bench.specimen)}
     assert places[6, 13].key in {other.key for other in effect.around(bench.specimen, places[3, 14])}
     cause = Cause(effect=effect, place=places[3, 14], n_places=100)
-    found = search._around(bench, (cause,), np.array([2e4]))
+    found = climb.further_around(bench, (cause,), np.array([2e4]))
     assert found[0][0][-1].place.location == {"nodes": [6, 13]}
     assert found[0][1] == pytest.approx(2e4, rel=0.05)
 

@@ -325,7 +325,7 @@ def a_cause(name, place):
 
 def one_of(name, log_evidence):
     cause = SimpleNamespace(effect=SimpleNamespace(name=name))
-    near = {"is_nearly_right": True, "is_nearly_all": True, "mean_misfit": 1.0}
+    near = {"is_nearly_right": True, "is_nearly_all": True, "is_hopeless": False, "mean_misfit": 1.0}
     return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence, **near)
 
 

@@ -199,7 +199,7 @@ def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
         else np.linspace(parameter.low, parameter.high, count + 2)[1:-1]
         for parameter in parameters
     ]
-    return np.array(list(product(*axes))).reshape(-1, len(parameters))
+    return np.array(list(product(*axes))).reshape(count ** len(axes), len(axes))
 
 
 def at_nodes(specimen: Specimen) -> list[Place]:

@@ -19,9 +19,10 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Place, Sketch
 from frf_ipz.diagnosis.catalogue.stiffness.viscoelastic_joint import SOFTEST, STIFFEST, ViscoelasticJoint, motion_at
 from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.physics.change import Attachment, Change
+from frf_ipz.diagnosis.search.climb import climb_all
 from frf_ipz.diagnosis.search.far.starts import bring_closer, refine_far
 from frf_ipz.diagnosis.search.far.wide import wide_search
-from frf_ipz.diagnosis.search.search import climb_all, ranked
+from frf_ipz.diagnosis.search.search import ranked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -103,7 +104,7 @@ def find_another(bench: Bench, found: Decision) -> Fit | None:
     exact = only.fit_from(best)
     fits = {exact.hypothesis.causes[-1].key: exact}
     climb_all(only, found.null, fits)
-    best = ranked(only, fits)[0]
+    best = ranked(only, fits.values())[0]
     needed = LIMITS[bench.kind].beside_nats if len(causes) == 1 else 0.0
     return best if best.log_evidence > found.final.log_evidence + needed else None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -78,11 +78,14 @@ class Bench:
 
         It is given up where the cost does not come below a bar.
         """
-        inside = hypothesis.physical(hypothesis.start_at(values))
-        starts = (base.unknown, same_modes(hypothesis, inside, base))
-        costs = [self._cost(hypothesis, inside, unknown) for unknown in starts]
-        unknown = starts[int(np.argmin(costs))]
+        inside, unknown = self.nearest(hypothesis, (values,), base)
         return polish(hypothesis, self.data, inside, unknown=unknown, iterations=8, tolerance=0.2, bar=bar)
+
+    def nearest(self, hypothesis: Hypothesis, starts: Sequence[FloatArray], fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """Choose the start that is nearest to the data, with the scatter of a fit or with its frequencies."""
+        inside = [hypothesis.physical(hypothesis.start_at(values)) for values in starts]
+        both = [(at, unknown) for at in inside for unknown in (fit.unknown, same_modes(hypothesis, at, fit))]
+        return min(both, key=lambda start: self._cost(hypothesis, *start))
 
     def _cost(self, hypothesis: Hypothesis, values: FloatArray, unknown: FloatArray) -> float:
         white = self.data.misfit(hypothesis.respond(values, unknown, self.data.measured.s))

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.search.climb import Fits, bar_of, climb_all
 from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.polish import polish, same_modes
-from frf_ipz.diagnosis.search.search import Fits, Ranking, bar_of, climb_all, ranked
+from frf_ipz.diagnosis.search.search import Ranking, ranked
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -49,4 +50,4 @@ def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
         bar = bar_of(fits.values())
         fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
     climb_all(bench, base, fits)
-    return replace(ranking, fits=ranked(bench, fits), n_tried=ranking.n_tried + len(starts))
+    return replace(ranking, fits=ranked(bench, fits.values()), n_tried=ranking.n_tried + len(starts))

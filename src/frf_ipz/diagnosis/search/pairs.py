@@ -14,33 +14,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.climb import GAIN, Fits, bar_of, climb_all
 from frf_ipz.diagnosis.search.far.refine import refine
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spread, step_far
 from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.fit import VERY_NEARLY, Fit
 from frf_ipz.diagnosis.search.polish import polish
-from frf_ipz.diagnosis.search.search import (
-    GAIN,
-    Fits,
-    Ranking,
-    bar_of,
-    by_effect,
-    climb_all,
-    how_many,
-    ranked,
-    search,
-    search_beside,
-)
+from frf_ipz.diagnosis.search.search import Ranking, by_effect, how_many, ranked, search, search_beside
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
 OTHERS, ALL_OTHERS = 3, 5  # first causes that are tried where a pair explains all, and where it lacks a little
 MOST_LEFT = 0.8  # of the cost of one cause: where a second leaves more, the first is not searched anew beside it
 NEAR_NATS = 100.0  # behind the best pair: such a pair's causes are stepped to better places
+MOST_SIMPLER = 2  # other effects that are tried for one cause of a pair
+MOST_TURNS = 6  # from one cause of a pair to the other
 PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
 FIRSTS, NOT_FAR = 8, 3.0  # causes that get companions, and times the best cost
 COMPANIONS, PLACES_EACH = 12, 3  # of each that are refined, and of an effect
@@ -67,7 +60,7 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
         Its base has one cause, its fits have two.
     """
     found: list[Ranking] = []
-    if first.best.is_nearly_right or not first.refined:
+    if not first.best.is_hopeless or not first.refined:
         beside = search(bench, first.best)
         found.append(beside)
         if beside.fits and not is_good(beside.best) and beside.best.cost < MOST_LEFT * first.best.cost:
@@ -78,6 +71,8 @@ def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) 
     best = _likeliest(found)
     if best.fits and best.best.mean_misfit <= VERY_NEARLY:
         best = _settled(bench, best)
+        if all(cause.effect.has_dynamics for cause in best.best.hypothesis.causes):
+            best = _simpler(bench, best)
     if not best.best.is_nearly_all:
         return best
     return _likeliest([best, *_from_others(bench, first, best.best, OTHERS if is_good(best.best) else ALL_OTHERS)])
@@ -110,12 +105,25 @@ def _settled(bench: Bench, pairs: Ranking) -> Ranking:
     return _around(bench, best, pairs.n_tried)
 
 
+def _simpler(bench: Bench, pairs: Ranking) -> Ranking:
+    """Try other effects for either cause of a pair, and go on from there: one with dynamics can stand for many."""
+    found = pairs.best
+    for pair in (found, _turned(bench, found)):
+        others = [fits[0] for fits in by_effect(_neighbours(bench, pair)) if _is_other(fits[0], pair)]
+        for other in others[:MOST_SIMPLER]:
+            found = max(found, _climbed_up(bench, other), key=lambda fit: fit.log_evidence)
+    return pairs if found is pairs.best else _around(bench, found, pairs.n_tried)
+
+
+def _is_other(fit: Fit, pair: Fit) -> bool:
+    one, other = fit.hypothesis.causes[-1].effect, pair.hypothesis.causes[-1].effect
+    return one.name != other.name and _is_near(fit, pair)
+
+
 def _around(bench: Bench, best: Fit, n_tried: int) -> Ranking:
     """Look at all neighbours of the last cause of a pair."""
     base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
-    fits: Fits = {best.hypothesis.causes[-1].key: best}
-    climb_all(bench, base, fits)
-    return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried)
+    return Ranking(base=base, fits=ranked(bench, _neighbours(bench, best)), n_tried=n_tried)
 
 
 def _newest_alone(bench: Bench, fit: Fit) -> Fit:
@@ -174,7 +182,7 @@ def _stepped(bench: Bench, cause: Cause, both: Start) -> tuple[Cause, Start]:
 
 def _companions(bench: Bench, start: Start) -> list[Start]:
     """Find what explains most beside a cause, far from the axis."""
-    base = polish(bench.suppose((start.cause,)), bench.early, start.values, iterations=0)
+    base = _as_it_is(bench, start.cause, start.values)
     starts = [one for one in wide_search(bench, base) if one.cause.key != start.cause.key]
     weights = weights_of(bench.coarse, REFINED_ERROR)
     found = []
@@ -185,15 +193,40 @@ def _companions(bench: Bench, start: Start) -> list[Start]:
     return found
 
 
+def _as_it_is(bench: Bench, cause: Cause, values: FloatArray) -> Fit:
+    """Take a cause with the values that it has beside another one."""
+    return polish(bench.suppose((cause,)), bench.early, values, iterations=0)
+
+
 def _climbed(bench: Bench, fit: Fit) -> Fit:
     """Exchange the two causes and step the new last one to better places."""
-    hypothesis = fit.hypothesis
-    count = hypothesis.counts[0]
+    return max(_neighbours(bench, _turned(bench, fit)), key=lambda one: one.log_evidence)
+
+
+def _climbed_up(bench: Bench, fit: Fit) -> Fit:
+    """Step both causes in turn until neither gains."""
+    vain = 0
+    for _ in range(MOST_TURNS):
+        better = _climbed(bench, fit)
+        vain = vain + 1 if better.log_evidence < fit.log_evidence + GAIN else 0
+        fit = better
+        if vain == len(fit.hypothesis.causes):
+            break
+    return fit
+
+
+def _turned(bench: Bench, fit: Fit) -> Fit:
+    """Exchange the two causes."""
+    hypothesis, count = fit.hypothesis, fit.hypothesis.counts[0]
     values = np.concatenate([fit.values[count:], fit.values[:count]])
-    turned = polish(
-        bench.suppose(hypothesis.causes[::-1]), bench.data, values, unknown=fit.unknown, iterations=4, tolerance=0.5
-    )
-    alone = bench.fit_early(turned.hypothesis.causes[:1], turned.values[: turned.hypothesis.counts[0]])
-    fits: Fits = {turned.hypothesis.causes[-1].key: turned}
-    climb_all(bench, alone, fits)
-    return max(fits.values(), key=lambda one: one.log_evidence)
+    causes = hypothesis.causes[::-1]
+    return polish(bench.suppose(causes), bench.data, values, unknown=fit.unknown, iterations=4, tolerance=0.5)
+
+
+def _neighbours(bench: Bench, pair: Fit) -> list[Fit]:
+    """Step the last cause of a pair to better places; the pair is among what is given."""
+    hypothesis = pair.hypothesis
+    first = _as_it_is(bench, hypothesis.causes[0], pair.values[: hypothesis.counts[0]])
+    fits: Fits = {hypothesis.causes[-1].key: pair}
+    climb_all(bench, first, fits)
+    return list(fits.values())

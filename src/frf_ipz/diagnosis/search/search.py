@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.diagnosis.search.bench import Bench, weights_of
+from frf_ipz.diagnosis.search.bench import Bench
+from frf_ipz.diagnosis.search.climb import (
+    CLIMBED,
+    GAIN,
+    HOPELESS,
+    Fits,
+    are_alike,
+    bar_of,
+    climb_all,
+    further_around,
+)
 from frf_ipz.diagnosis.search.close import close_search
-from frf_ipz.diagnosis.search.far.refine import refine
 from frf_ipz.diagnosis.search.far.sketches import Start
-from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, refine_far, spread
-from frf_ipz.diagnosis.search.far.wide import best_start, causes_of, wide_search
+from frf_ipz.diagnosis.search.far.starts import bring_closer, refine_far, spread
+from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.fit import Fit
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.polish import polish, same_modes
-
-if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.catalogue.effect import Effect, Place
-
-Fits: TypeAlias = dict[tuple[object, ...], Fit]
-"""Fits by the key of their last cause."""
 
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 5.0  # nats that a linear step promises: with less, a hypothesis is not fitted
@@ -34,14 +33,10 @@ CLOSE_EACH = 3  # places of an effect that are fitted after the close search
 FITTED = 12  # hypotheses that are fitted with large errors
 FITTED_EXACTLY, FITTED_HOPELESS = 7, 2
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
-CLIMBED, CLIMBED_VAINLY = 6, 2  # effects whose neighbours are looked at, and where no further cause explains much
+CLIMBED_VAINLY = 2  # effects whose neighbours are looked at, where no further cause explains much
 VAIN = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
-HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
-WANTED = 2.0  # times the cost of one that explains all: a fit on its way there may have reached that much
-GAIN = 0.5  # nats: a neighbour must be better by that
 SETTLED = 2  # fits that go on until they converge
-MOST_STEPS = 12
-FITTED_AROUND, EARLY_AROUND = 4, 16  # places further around that are fitted exactly, and with large errors
+EARLY_AROUND = 16  # places further around that are fitted with large errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -122,47 +117,30 @@ def search(bench: Bench, base: Fit) -> Ranking:
         n_tried += _add_close(bench, base, fits)
     if fits and (n_effects := _how_many_climb(base, fits)):
         climb_all(bench, base, fits, n_effects)
-    return Ranking(base=base, fits=ranked(bench, fits), n_tried=n_tried, refined=tuple(refined))
+    return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=n_tried, refined=tuple(refined))
 
 
-def ranked(bench: Bench, fits: Fits) -> tuple[Fit, ...]:
+def ranked(bench: Bench, fits: Iterable[Fit]) -> tuple[Fit, ...]:
     """Sort fits by falling evidence; the best ones go on where they have not converged.
 
     Parameters
     ----------
     bench : Bench
         Data and effects.
-    fits : dict
-        By any key.
+    fits : iterable of Fit
+        In any order.
 
     Returns
     -------
     tuple of Fit
         The best first.
     """
-    order, bar = sorted(fits.values(), key=lambda fit: -fit.log_evidence), bar_of(fits.values())
+    order = sorted(fits, key=lambda fit: -fit.log_evidence)
+    bar = bar_of(order)
     settled = [
         fit if fit.converged or fit.is_hopeless or fit.cost > bar else bench.go_on(fit) for fit in order[:SETTLED]
     ]
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
-
-
-def bar_of(fits: Iterable[Fit]) -> float:
-    """Say below what cost a further fit is wanted.
-
-    Parameters
-    ----------
-    fits : iterable of Fit
-        What is known already.
-
-    Returns
-    -------
-    float
-        Not far above that of the best, if that explains nearly all; infinite otherwise: from a start that is a little
-        off, a fit may gain little for many steps before it falls to a thousandth.
-    """
-    best = max(fits, key=lambda fit: fit.log_evidence, default=None)
-    return WANTED * best.cost + BEHIND if best is not None and best.is_nearly_all else np.inf
 
 
 def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
@@ -188,7 +166,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
         _keep(fits, _fit_close(bench, base, start, bar_of((base, *fits.values()))))
     if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
         climb_all(bench, base, fits, _how_many_climb(base, fits))
-    return Ranking(base=base, fits=ranked(bench, fits), n_tried=len(found))
+    return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=len(found))
 
 
 def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
@@ -235,7 +213,7 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     early = [bench.fit_early((*known, start.cause), start.values) for known, start in closer]
     if all(fit.is_hopeless for fit in early):
         for start in spread(refined[:FITTED], 1):
-            around = _around(bench, (*known, start.cause), start.values)[:EARLY_AROUND]
+            around = further_around(bench, (*known, start.cause), start.values)[:EARLY_AROUND]
             early += [bench.fit_early(*there) for there in around]
     early.sort(key=lambda fit: fit.cost)
     fits: Fits = {}
@@ -271,37 +249,9 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
     fitted = {fit.hypothesis.causes[-1].effect.name for fit in fits.values()}
     for fit in sorted(early, key=lambda fit: fit.cost):
         effect = fit.hypothesis.causes[-1].effect
-        if _are_alike(effect, best) and effect.name not in fitted:
+        if are_alike(effect, best) and effect.name not in fitted:
             fitted.add(effect.name)
             _keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
-
-
-def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> None:
-    """Step to neighbours as long as that makes an effect more probable.
-
-    Parameters
-    ----------
-    bench : Bench
-        Data and effects.
-    base : Fit
-        What is supposed already.
-    fits : dict
-        By the key of their last cause, whose place is changed; new fits are added.
-    n_effects : int
-        The best ones that are stepped.
-    """
-    ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    if ranked and not ranked[0].is_hopeless:
-        _add_imitators(bench, base, ranked[0], fits)
-        ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
-    leaders: dict[str, Fit] = {}
-    for fit in ranked:
-        leaders.setdefault(fit.hypothesis.causes[-1].effect.name, fit)
-    for leader in list(leaders.values())[:n_effects]:
-        best = max(fits.values(), key=lambda fit: fit.log_evidence)
-        behind = BEHIND if best.is_nearly_all else HOPELESS
-        if leader.log_evidence > best.log_evidence - behind and not leader.is_hopeless:
-            _climb(bench, base, leader, fits)
 
 
 def _how_many_climb(base: Fit, fits: Fits) -> int:
@@ -311,72 +261,3 @@ def _how_many_climb(base: Fit, fits: Fits) -> int:
         return CLIMBED if max(fit.log_evidence for fit in found) > base.log_evidence + GAIN else 0
     is_vain = bool(base.hypothesis.causes) and min(fit.cost for fit in found) > VAIN * base.cost
     return CLIMBED_VAINLY if is_vain else CLIMBED
-
-
-def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
-    """Fit what looks like the best, at its place."""
-    cause = best.hypothesis.causes[-1]
-    for effect in bench.effects.values():
-        for other in causes_of(effect, bench.specimen) if _are_alike(effect, cause.effect) else ():
-            if other.place.location == cause.place.location and other.key not in fits:
-                fits[other.key] = _from_neighbour(bench, base, other, best, bar_of(fits.values()))
-
-
-def _are_alike(one: Effect, other: Effect) -> bool:
-    return one.name in other.imitators or other.name in one.imitators
-
-
-def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
-    for _ in range(MOST_STEPS):
-        cause = fit.hypothesis.causes[-1]
-        better = _best_of(bench, base, fit, cause.effect.neighbours(bench.specimen, cause.place), fits)
-        if better is fit and fit.is_nearly_right:
-            around = _around(bench, fit.hypothesis.causes, fit.values)[:FITTED_AROUND]
-            better = _best_of(bench, base, fit, [causes[-1].place for causes, _ in around], fits)
-        if better is fit:
-            return
-        fit = better
-
-
-def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
-    """Fit the last cause at other places too; the fit itself where none is better."""
-    cause = fit.hypothesis.causes[-1]
-    better = fit
-    for place in places:
-        other = replace(cause, place=place)
-        if other.key in fits:
-            tried = fits[other.key]
-        else:
-            tried = fits[other.key] = _from_neighbour(bench, base, other, fit, bar_of(fits.values()))
-        if tried.log_evidence > better.log_evidence + GAIN:
-            better = tried
-    return better
-
-
-def _around(bench: Bench, causes: tuple[Cause, ...], values: FloatArray) -> list[tuple[tuple[Cause, ...], FloatArray]]:
-    """Bring the values to places further around the last cause; the best ones first, as seen far from the axis."""
-    *known, cause = causes
-    weights = weights_of(bench.coarse, REFINED_ERROR)
-    found = []
-    for place in cause.effect.around(bench.specimen, cause.place):
-        there = (*known, replace(cause, place=place))
-        at, cost = refine(bench.suppose(there), bench.coarse, weights, values, iterations=4)
-        found.append((cost, there, at))
-    return [(there, at) for _, there, at in sorted(found, key=lambda one: one[0])]
-
-
-def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
-    causes = (*base.hypothesis.causes, cause)
-    hypothesis = bench.suppose(causes)
-    weights = weights_of(bench.coarse, REFINED_ERROR)
-    if len(hypothesis.parameters) == len(fit.values) and fit.is_nearly_right:
-        values, _ = refine(hypothesis, bench.coarse, weights, fit.values, iterations=4)
-        unknown = same_modes(hypothesis, values, fit)
-        return polish(hypothesis, bench.data, values, unknown=unknown, iterations=12, tolerance=0.1, bar=bar)
-    if len(hypothesis.parameters) == len(fit.values):
-        start = fit.values
-    else:
-        best = best_start(bench, base, cause, bench.coarse, weights, np.zeros(bench.nuisance.size))
-        start = np.concatenate([base.values, best.values])
-    values, _ = refine(hypothesis, bench.coarse, weights, start)
-    return bench.fit(causes, values, bar=bar)

@@ -137,7 +137,7 @@ def best_start(
         The best of them.
     """
     hypothesis = bench.suppose((*base.hypothesis.causes, cause), exact=False)
-    grid = cause.effect.starts(bench.specimen, cause.place) if hypothesis.counts[-1] else np.zeros((1, 0))
+    grid = cause.effect.starts(bench.specimen, cause.place)
     costs = []
     for values in grid:
         response = hypothesis.respond(np.concatenate([base.values, values]), unknown, measured.s)

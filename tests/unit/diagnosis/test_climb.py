@@ -1,0 +1,117 @@
+"""Steps from a cause to its neighbours and to what looks like it, alone and in pairs."""
+
+import numpy as np
+import pytest
+
+from diagnosed import beam, bench_of, measured
+from frf_ipz.diagnosis.search import climb, pairs
+from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
+
+KINDS = ("attached_resonator", "local_damper", "grounded_spring", "coupling_spring", "viscoelastic_joint")
+SEEN = 0.05  # relative
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return beam(tmp_path_factory.mktemp("beam"))
+
+
+def cause_at(bench, name, *nodes):
+    effect = bench.effects[name]
+    places = effect.places(bench.specimen)
+    place = next(place for place in places if place.location.get("nodes") == list(nodes))
+    return Cause(effect=effect, place=place, n_places=len(places))
+
+
+def bench_with(nominal, names, causes, values):
+    """A bench for what a beam with some causes is measured to do."""
+    blank = bench_of(nominal, measured(nominal), tuple({*names, *(name for name, *_ in causes)}))
+    both = blank.suppose(tuple(cause_at(blank, *cause) for cause in causes))
+    values, unknown = np.array(values), np.zeros(blank.nuisance.size)
+
+    def chain(frequency_hz):
+        s = 2j * np.pi * frequency_hz
+        alone = blank.suppose(()).respond(np.zeros(0), unknown, s).values
+        return both.respond(values, unknown, s).values / alone
+
+    return bench_of(nominal, measured(nominal, factors=chain), names)
+
+
+def likeliest(fits):
+    return max(fits, key=lambda fit: fit.log_evidence)
+
+
+def climbed(bench, base, fit):
+    fits = {fit.hypothesis.causes[-1].key: fit}
+    climb.climb_all(bench, base, fits)
+    return likeliest(fits.values())
+
+
+def test_a_spring_whose_other_end_hardly_moves_is_tried_as_a_support(nominal):
+    bench = bench_with(nominal, ("coupling_spring", "grounded_spring"), [("grounded_spring", 12)], [2e3])
+    base = fit_nothing(bench)
+    near = bench.fit((cause_at(bench, "coupling_spring", 2, 12),), np.array([2e3]))
+    assert near.is_nearly_right
+    best = climbed(bench, base, near).hypothesis.causes[-1]
+    assert (best.effect.name, best.place.location) == ("grounded_spring", {"nodes": [12]})
+
+
+def test_what_looks_alike_is_fitted_from_values_that_do_the_same_in_the_band(nominal):
+    names = ("attached_resonator", "viscoelastic_joint")
+    bench = bench_with(nominal, names, [("viscoelastic_joint", 14)], [3e3, 4e-4])
+    near = bench.fit((cause_at(bench, "attached_resonator", 13),), np.array([0.2, 9.0, 0.3]))
+    best = climbed(bench, fit_nothing(bench), near)
+    cause = best.hypothesis.causes[-1]
+    assert (cause.effect.name, cause.place.location) == ("viscoelastic_joint", {"nodes": [14]})
+    assert best.values == pytest.approx([3e3, 4e-4], rel=SEEN)
+
+
+def test_of_equal_starts_that_is_taken_which_the_data_support(nominal):
+    bench = bench_with(nominal, ("grounded_spring",), [("grounded_spring", 12)], [2e3])
+    hypothesis = bench.suppose((cause_at(bench, "grounded_spring", 12),))
+    right = bench.fit(hypothesis.causes, np.array([2e3]))
+    start, unknown = bench.nearest(hypothesis, [np.array([10.0]), np.array([2e3]), np.array([9e4])], right)
+    assert start == pytest.approx([2e3])
+    assert unknown.shape == (bench.nuisance.size,)
+
+
+def test_a_grid_is_thinned_so_that_every_value_stays():
+    grid = np.array([[a, b, c] for a in range(8) for b in range(8) for c in range(8)], float)
+    some = climb._some(grid)
+    assert 32 <= len(some) <= climb.MOST_STARTS
+    assert all(set(column) == set(range(8)) for column in some.T)
+    assert len(climb._some(grid[:5])) == 5
+
+
+def test_a_second_cause_is_looked_for_beside_a_first_that_leaves_much(nominal, monkeypatch):
+    """A slow high-pass of a channel changes nothing far from the axis, where pairs are searched."""
+    names = ("grounded_spring", "sensor_dynamics", "sensor_gain")
+    bench = bench_with(nominal, names, [("grounded_spring", 12)], [2e3])
+    late = bench.effects["sensor_dynamics"]
+    place = next(place for place in late.places(bench.specimen) if place.key == ("acc_2", "highpass"))
+    both = (cause_at(bench, "grounded_spring", 12), Cause(effect=late, place=place, n_places=4))
+
+    def chain(frequency_hz):
+        s, unknown = 2j * np.pi * frequency_hz, np.zeros(bench.nuisance.size)
+        alone = bench.suppose(()).respond(np.zeros(0), unknown, s).values
+        return bench.suppose(both).respond(np.array([2e3, 1.2]), unknown, s).values / alone
+
+    bench = bench_of(nominal, measured(nominal, factors=chain), names)
+    first = search(bench, fit_nothing(bench))
+    assert not first.best.is_nearly_right
+    assert not first.best.is_hopeless
+    assert first.refined
+    monkeypatch.setattr(pairs, "_of_pairs", lambda *_: [])
+    found = pairs.search_second(bench, first, lambda fit: fit.is_nearly_all).best
+    assert {cause.effect.name for cause in found.hypothesis.causes} == {"grounded_spring", "sensor_dynamics"}
+
+
+def test_two_resonators_are_taken_for_simpler_things(nominal):
+    bench = bench_with(nominal, KINDS, [("local_damper", 15), ("grounded_spring", 9)], [0.4, 1.5e3])
+    two = (cause_at(bench, "attached_resonator", 15), cause_at(bench, "attached_resonator", 9))
+    fit = bench.fit(two, np.array([0.02, 11.0, 0.5, 0.3, 11.0, 1e-3]))
+    base = bench.fit(two[:1], fit.values[:3])
+    found = pairs._simpler(bench, Ranking(base=base, fits=(fit,), n_tried=1)).best
+    causes = {(cause.effect.name, *cause.place.location["nodes"]) for cause in found.hypothesis.causes}
+    assert causes == {("local_damper", 15), ("grounded_spring", 9)}
