@@ -196,20 +196,20 @@ def _response_noise(
             stacks.append((lines.frequency_hz, energy, _gain(group, lines), known))
         if stacks:
             fitted = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
-            found[channel] = replace(fitted, white=max(fitted.white, _rounding(groups, channel)))
+            found[channel] = fitted.rounded(_signals(groups, channel), groups[0][0].step_s)
         else:
             found[channel] = _noise_of_single(groups, pulses, line_sets, channel)
     return found
 
 
-def _rounding(groups: tuple[tuple[Blow, ...], ...], channel: str) -> float:
-    """Density of the noise of a recorder's steps: a channel that stays on one step seems to have none."""
-    found = np.inf
-    for blow in (blow for group in groups for blow in group):
-        for sensor, values in zip(blow.sensors, blow.responses, strict=True):
-            if sensor.channel == channel:
-                found = min(found, float(np.diff(np.unique(values)).min(initial=np.inf)) ** 2 / 12 * blow.step_s)
-    return found if np.isfinite(found) else 0.0
+def _signals(groups: tuple[tuple[Blow, ...], ...], channel: str) -> list[FloatArray]:
+    return [
+        values
+        for group in groups
+        for blow in group
+        for sensor, values in zip(blow.sensors, blow.responses, strict=True)
+        if sensor.channel == channel
+    ]
 
 
 def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[_Lines]) -> Noise:

@@ -7,7 +7,8 @@ residual stands out of that model (resonances of something nonlinear) do not cou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import nnls
@@ -48,6 +49,24 @@ class Noise:
             unit^2 s.
         """
         return self.white + self.pink / np.maximum(frequency_hz, 1e-9)
+
+    def rounded(self, signals: Iterable[FloatArray], step_s: float) -> Noise:
+        """Give what a recorder's steps leave: a channel that stays on one step seems to have no noise.
+
+        Parameters
+        ----------
+        signals : iterable of (n_samples,) array
+            Of the channel, unit.
+        step_s : float
+            Between samples, s.
+
+        Returns
+        -------
+        Noise
+            With at least the white noise of a rounding, a twelfth of the squared step.
+        """
+        step = min((np.diff(np.unique(signal)).min(initial=np.inf) for signal in signals), default=np.inf)
+        return replace(self, white=max(self.white, float(step) ** 2 / 12 * step_s)) if np.isfinite(step) else self
 
 
 def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, known: FloatArray) -> Noise:

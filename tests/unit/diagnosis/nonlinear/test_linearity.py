@@ -9,6 +9,7 @@ HALF_BAND = WIDTH / 2  # lines
 ACROSS = np.linspace(-1, 1, WIDTH)  # a group of lines
 LOUD = 0.2  # noise over the motion of the strongest record
 GROUPS = 50
+STEPS = 1e-3  # of the largest response
 
 
 def test_blows_on_a_linear_chain_agree(strike):
@@ -24,6 +25,22 @@ def test_blows_on_a_linear_chain_agree(strike):
 )
 def test_blows_on_a_nonlinear_chain_do_not(strike, law):
     assert assess_linearity(strike(law)).is_nonlinear
+
+
+def test_a_channel_whose_noise_is_below_its_steps_is_not_taken_for_nonlinear(strike):
+    """What has decayed below half a step is not recorded at all: as if there were no noise."""
+    observations = strike()
+    step = STEPS * np.abs(observations.blows[0].responses).max()
+    rounded = replace(
+        observations,
+        blows=tuple(
+            replace(blow, responses=step * np.round(blow.responses * decayed(blow) / step))
+            for blow in observations.blows
+        ),
+    )
+    found = assess_linearity(rounded)
+    assert found.score > 0
+    assert not found.is_nonlinear
 
 
 def test_groups_of_lines_keep_out_of_what_is_left_out(strike):
@@ -44,6 +61,11 @@ def test_a_local_quotient_does_not_follow_loud_noise():
         motion = force * np.exp(-0.5 * ACROSS) + LOUD * drawn(rng, 3, WIDTH) + drawn(rng, 3, 1)
         misfits.append(_left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, LOUD**2)])))
     assert max(misfits) < 1.6  # of 1 that is expected: 66 squared moduli, the worst of many groups
+
+
+def decayed(blow):
+    """(n_samples,) window that makes a response die out within its record."""
+    return np.exp(-4.0 * blow.step_s * np.arange(blow.n_samples))
 
 
 def drawn(rng, *shape):

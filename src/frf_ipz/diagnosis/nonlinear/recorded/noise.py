@@ -83,7 +83,7 @@ def read_noise(observations: Observations) -> ChannelNoise:
     if is_hammer:
         pulses = tuple(isolate_pulse(blow) for blow in observations.blows)
         length = float(np.median([pulse.stop - pulse.start for pulse in pulses])) * step
-        found = [quiet_density([s[len(s) // 2 :] for s in mine], step) for mine in signals]
+        found = [quiet_density([s[len(s) // 2 :] for s in mine], step).rounded(mine, step) for mine in signals]
         force = force_noise(observations.blows, pulses)
         return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(found), pulse_s=length)
     forces = [blow.force for blow in observations.blows]
