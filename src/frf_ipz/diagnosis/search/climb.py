@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.search.polish import polish
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect, Place
-    from frf_ipz.diagnosis.search.hypothesis import Cause
+    from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""
@@ -29,7 +29,7 @@ WANTED = 2.0  # times the cost of one that explains all: a fit on its way there 
 GAIN = 0.5  # nats: a neighbour must be better by that
 MOST_STEPS = 12
 MOST_STARTS = 64  # of an effect that looks like another one
-FITTED_AROUND = 4  # places further around
+GLANCED_AT, FITTED_AROUND = 24, 4  # places further around
 
 
 def bar_of(fits: Iterable[Fit]) -> float:
@@ -104,8 +104,7 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
         cause = fit.hypothesis.causes[-1]
         better = _best_of(bench, base, fit, cause.effect.neighbours(bench.specimen, cause.place), fits)
         if better is fit and fit.is_nearly_right:
-            around = further_around(bench, fit.hypothesis.causes, fit.values)[:FITTED_AROUND]
-            better = _best_of(bench, base, fit, [causes[-1].place for causes, _ in around], fits)
+            better = _best_of(bench, base, fit, _promising_around(bench, fit), fits)
         if better is fit:
             return
         fit = better
@@ -124,6 +123,17 @@ def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: F
         if tried.log_evidence > better.log_evidence + GAIN:
             better = tried
     return better
+
+
+def _promising_around(bench: Bench, fit: Fit) -> list[Place]:
+    """Choose places further around the last cause by one step on few data: far from the axis they are all alike."""
+    glances = []
+    for causes, values in further_around(bench, fit.hypothesis.causes, fit.values)[:GLANCED_AT]:
+        hypothesis = bench.suppose(causes)
+        start, unknown = bench.nearest(hypothesis, (values,), fit)
+        glances.append(polish(hypothesis, bench.thin, start, unknown=unknown, iterations=1))
+    glances.sort(key=lambda glance: -glance.log_evidence)
+    return [glance.hypothesis.causes[-1].place for glance in glances[:FITTED_AROUND]]
 
 
 def further_around(
@@ -159,7 +169,7 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float)
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)
-    is_same = len(hypothesis.parameters) == len(fit.values)
+    is_same = _names(hypothesis) == _names(fit.hypothesis)
     if is_same:
         start = fit.values
     else:
@@ -175,6 +185,10 @@ def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float)
     start, unknown = bench.nearest(hypothesis, starts, fit)
     near = polish(hypothesis, bench.data, start, unknown=unknown, iterations=12, tolerance=0.1, bar=bar)
     return near if is_same or near.is_nearly_all else bench.fit(causes, values, bar=bar)
+
+
+def _names(hypothesis: Hypothesis) -> list[str]:
+    return [parameter.name for parameter in hypothesis.parameters]
 
 
 def _some(grid: FloatArray) -> FloatArray:

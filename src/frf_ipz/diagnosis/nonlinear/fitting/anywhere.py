@@ -30,7 +30,7 @@ YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring sl
 STEEP = 3e-3  # of the largest velocity: below, friction grows with it
 FEW_TURNS, MANY_TURNS = 3, 8
 FINALISTS = 4  # places that are fitted on long stretches
-CLIMBS = 6  # steps to better neighbours
+CLIMBS = 24  # steps to better neighbours: few are taken, unless what is likely is far off
 RIDGE = 1e-6  # of a column's own square: many of the laws are nearly alike
 SETTLED = 1e-3  # relative change of the cost between turns
 
