@@ -25,10 +25,20 @@ def cause_at(bench, name, *nodes):
     return Cause(effect=effect, place=place, n_places=len(places))
 
 
+def joint_at_end(bench):
+    joint = bench.effects["viscoelastic_joint"]
+    (place,) = (place for place in joint.places(bench.specimen) if place.key[0] == "end")
+    return Cause(effect=joint, place=place, n_places=16)
+
+
 def bench_with(nominal, names, causes, values):
     """A bench for what a beam with some causes is measured to do."""
     blank = bench_of(nominal, measured(nominal), tuple({*names, *(name for name, *_ in causes)}))
-    both = blank.suppose(tuple(cause_at(blank, *cause) for cause in causes))
+    return bench_doing(nominal, names, blank, tuple(cause_at(blank, *cause) for cause in causes), values)
+
+
+def bench_doing(nominal, names, blank, causes, values):
+    both = blank.suppose(causes)
     values, unknown = np.array(values), np.zeros(blank.nuisance.size)
 
     def chain(frequency_hz):
@@ -75,6 +85,32 @@ def test_what_looks_alike_is_fitted_from_values_that_do_the_same_in_the_band(nom
     cause = best.hypothesis.causes[-1]
     assert (cause.effect.name, cause.place.location) == ("viscoelastic_joint", {"nodes": [14]})
     assert best.values == pytest.approx([3e3, 4e-4], rel=SEEN)
+
+
+def test_the_end_of_a_beam_is_tried_with_values_of_its_own(tmp_path, monkeypatch):
+    """A spring against a rotation has as many parameters as one against a motion, in other units."""
+    pinned, names = beam(tmp_path, left="pinned", right="sliding"), ("viscoelastic_joint",)
+    blank = bench_of(pinned, measured(pinned), names)
+    bench = bench_doing(pinned, names, blank, (joint_at_end(blank),), [30.0, 5e-4])
+    base = fit_nothing(bench)
+    near = bench.fit((cause_at(bench, "viscoelastic_joint", 2),), np.array([3e4, 5e-4]))
+    monkeypatch.setattr(type(bench), "fit", lambda *_, **__: near)  # no beginning anew
+    monkeypatch.setattr(climb, "refine", lambda _hypothesis, _measured, _weights, values, **_: (values, 0.0))
+    best = climbed(bench, base, near)
+    assert best.hypothesis.causes[-1].place.location == {"end": "left", "nodes": [1]}
+    assert best.values == pytest.approx([30.0, 5e-4], rel=SEEN)
+
+
+def test_places_around_are_chosen_near_the_axis(nominal, monkeypatch):
+    """Far from the axis other pairs of nodes may look better than the true one, and no step beside leads there."""
+    bench = bench_with(nominal, ("coupling_spring",), [("coupling_spring", 6, 15)], [4e3])
+    near = bench.fit((cause_at(bench, "coupling_spring", 4, 14),), np.array([4e3]))
+    around = climb.further_around(bench, near.hypothesis.causes, near.values)
+    true = [causes[-1].place.location["nodes"] for causes, _ in around].index([6, 15])
+    others = [one for index, one in enumerate(around) if index != true]
+    blurred = [*others[: climb.GLANCED_AT - 1], around[true], *others[climb.GLANCED_AT - 1 :]]
+    monkeypatch.setattr(climb, "further_around", lambda *_: blurred)
+    assert climb._promising_around(bench, near)[0].location == {"nodes": [6, 15]}
 
 
 def test_of_equal_starts_that_is_taken_which_the_data_support(nominal):

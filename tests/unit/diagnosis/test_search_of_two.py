@@ -32,7 +32,6 @@ from frf_ipz.diagnosis.search.search import (
     search,
     search_beside,
 )
-from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.variants import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
@@ -44,7 +43,7 @@ SEEN = 0.02  # relative: noise of 0.1 % of the FRFs, tolerances of 0.1 % of the 
 WEAK_N_M = 45.0  # so little that the mass alone leaves nothing to explain
 ROUNDING = 1e-9  # of the largest entry
 ATTACHED = shipped_effects()["attached_resonator"]
-LITTLE_KG, THICKER = 2e-4, 1.0015  # the thickness takes frequencies 0.15 % off, more than a part of 0.1 %
+LITTLE_KG = 2e-4
 SMALL_GAIN = 0.96  # tolerances of gains are half a per cent
 GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
 
@@ -336,25 +335,3 @@ def test_the_first_of_two_causes_is_placed_anew_beside_the_second(nominal):
     wrong = bench.fit((Cause(effect=mass, place=beside, n_places=16),), np.array([0.002]))
     found = search_second(bench, Ranking(base=fit_nothing(bench), fits=(wrong,), n_tried=1), lambda _: True)
     assert {cause.key[:2] for cause in found.best.hypothesis.causes} == {("added_mass", 12), ("grounded_spring", 8)}
-
-
-def test_a_place_that_needs_more_of_the_tolerances_falls_behind_where_the_model_is_better(nominal):
-    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
-    found = search(bench, fit_nothing(bench))
-    settled = settle_ties(bench, found)
-    assert settled.best.hypothesis.causes[0].place.location == {"nodes": [12]}
-    assert settled.best.log_evidence == pytest.approx(found.best.log_evidence)
-    assert ahead(found) < 5  # nats
-    assert ahead(settled) > 2 * ahead(found)
-
-
-def test_places_stay_alike_where_the_model_needs_its_tolerances(nominal, tmp_path):
-    true = with_point_masses(beam(tmp_path, thickness_m=0.005 * THICKER), {12: 2 * LITTLE_KG})
-    bench = bench_of(nominal, measured(true), ("added_mass",))
-    found = search(bench, fit_nothing(bench))
-    assert ahead(settle_ties(bench, found)) == pytest.approx(ahead(found), abs=0.5)
-
-
-def ahead(ranking):
-    """How far the best place is ahead of the next, nats."""
-    return ranking.fits[0].log_evidence - ranking.fits[1].log_evidence

@@ -119,7 +119,7 @@ def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
     if not ranking.fits:
         return None
     good, limits = goodness(bench, ranking.best), LIMITS[bench.kind]
-    gain = min(gain_over(ranking.best, found.final), gain_over(ranking.best, found.null))
+    gain = ranking.best_evidence - max(found.final.log_evidence, found.null.log_evidence)
     needed = limits.beside_nats if found.good.is_good else limits.second_nats if good.is_good else PARTIAL_NATS
     if gain <= needed or good.score >= max(found.good.score, 1.0):
         return None

@@ -130,6 +130,12 @@ class Whitening:
     factors: ComplexArray
     blocks: tuple[tuple[IntArray, FloatArray, FloatArray], ...]
 
+    @property
+    def log_density(self) -> float:
+        """Logarithm of the likelihood of no error at all, nats: the smaller the expected errors, the larger."""
+        own = float(np.sum(np.log(np.abs(np.diagonal(self.factors, axis1=1, axis2=2)))))
+        return 2 * own + sum(float(np.sum(np.log1p(-shrink))) for *_, shrink in self.blocks)
+
     def __call__(self, errors: ComplexArray) -> FloatArray:
         """Whiten.
 

@@ -65,6 +65,12 @@ class Ranking:
         """The best place of the most probable effect; the base where nothing was found."""
         return by_effect(self.fits)[0][0] if self.fits else self.base
 
+    @property
+    def best_evidence(self) -> float:
+        """Evidence of the most probable effect, wherever it is, nats."""
+        fits = by_effect(self.fits)[0] if self.fits else (self.base,)
+        return float(np.logaddexp.reduce([fit.log_evidence for fit in fits]))
+
 
 def by_effect(fits: Iterable[Fit]) -> list[tuple[Fit, ...]]:
     """Sort fits by effects: one is as probable as all its places together.

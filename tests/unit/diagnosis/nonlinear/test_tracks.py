@@ -118,6 +118,20 @@ def test_places_of_the_best_laws_are_asked_for_whatever_the_first_moments_say(mo
     assert anywhere.find_place(tracks["short"], tracks["long"], [7])[0].place != 7  # any force tells that it is not
 
 
+def test_the_place_of_a_force_is_climbed_to_however_far_it_is(monkeypatch):
+    """The first moments and the law that fits best are both far off."""
+    far = tuple(range(20))
+    costs = {("short", place): 10.0 + place for place in far} | {("long", place): 99.0 - place for place in far}
+    tracks = {
+        name: SimpleNamespace(name=name, missed=9.0, where=where(far), beside=lambda place: [place - 1, place + 1])
+        for name in ("short", "long")
+    }
+    monkeypatch.setattr(
+        anywhere, "fit_anything", lambda track, place, _: a_force(place, costs[track.name, place], missed=track.missed)
+    )
+    assert anywhere.find_place(tracks["short"], tracks["long"], [5])[0].place == 19
+
+
 def test_neighbours_move_alike_or_the_other_way_round():
     """Four places of two modes: the fourth is a spring that is counted the other way round."""
     shapes = np.array([(1.0, 0.0), (0.2, 1.0), (1.0, 0.8), (-0.5, 0.02)])

@@ -1,0 +1,50 @@
+"""How much a second cause must explain to be one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.judging import decision
+from frf_ipz.diagnosis.judging.verdict import LIMITS
+from frf_ipz.diagnosis.search.search import Ranking
+
+ALONE = -577.0  # nats
+
+
+def a_fit(log_evidence, name="local_stiffness"):
+    cause = SimpleNamespace(effect=SimpleNamespace(name=name))
+    return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence)
+
+
+def goodness_of(score):
+    return SimpleNamespace(is_good=score <= 1, score=score)
+
+
+def found(score):
+    first = a_fit(ALONE, "boundary_compliance")
+    return decision.Decision(
+        verdict="explained",
+        null=a_fit(-1e6, ""),
+        final=first,
+        ranking=Ranking(base=first, fits=(first,), n_tried=1),
+        further=(),
+        good=goodness_of(score),
+        null_good=goodness_of(9.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("left", "gain", "n_places", "verdict"),
+    [(1.1, 2.0, 1, None), (1.1, 3.1, 1, "explained"), (1.1, 2.0, 4, "explained"), (0.8, 7.0, 1, None)],
+)
+def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_wherever_it_is(
+    monkeypatch, left, gain, n_places, verdict
+):
+    """Where nothing is left to explain, more is asked for."""
+    assert np.exp(LIMITS["hammer"].second_nats) == pytest.approx(20, rel=0.01)
+    monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
+    one = found(left)
+    second = Ranking(base=one.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_places)), n_tried=9)
+    both = decision._beside(SimpleNamespace(kind="hammer"), one, second)
+    assert (both and both.verdict) == verdict
