@@ -13,6 +13,7 @@ from frf_ipz.quantities import FrfQuantity
 
 IMITATORS = ("attached_resonator", "viscoelastic_joint")
 NOISY = 0.004  # with less, two imitators are sought before: that takes longer
+DELAY_S = 5e-4
 SEEN = 0.05  # of an order: what this noise allows
 OUTPUTS, STRUCK = ("17:+z", "9:-z"), "6:+z"
 
@@ -38,9 +39,9 @@ def nominal(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("beam"))
 
 
-def diagnosed(model, stiffness):
+def diagnosed(model, stiffness, effects=IMITATORS):
     frfs = measured(model, factors=with_force(model, 12, stiffness), noise=NOISY)
-    return diagnose(model, observed(frfs), DiagnoseOptions(effects=IMITATORS))
+    return diagnose(model, observed(frfs), DiagnoseOptions(effects=effects))
 
 
 @pytest.mark.parametrize("order", [pytest.param(0.3, marks=pytest.mark.slow), 0.5])
@@ -58,3 +59,11 @@ def test_a_joint_that_relaxes_once_is_named(nominal):
     found = diagnosed(nominal, lambda s: 300.0 * s * time / (1 + s * time))
     assert found.verdict == "explained"
     assert [finding.effect for finding in found.findings] == ["viscoelastic_joint"]
+
+
+def test_a_late_force_is_not_named_by_what_looks_like_it(nominal):
+    """Control by a sensor's signal that comes late takes stiffness away, and damps."""
+    found = diagnosed(nominal, lambda s: -40.0 * np.exp(-s * DELAY_S), effects=("local_damper", "added_mass"))
+    assert found.verdict == "unexplained"
+    assert found.mismatch_location == {"nodes": [12]}
+    assert "at node 12 (x = 0.344 m) that takes stiffness away, with a loss factor of" in found.statement
