@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.far.starts import Supposed
     from frf_ipz.diagnosis.search.fit import Fit
 
+KINDS: tuple[LocalForce, ...] = (PowerLaw(), NegativeSpring())
 FITTED = 5  # places with large errors
 FAR_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
 
@@ -44,23 +45,26 @@ def find_another(bench: Bench, found: Decision) -> Fit | None:
     """
     causes = found.final.hypothesis.causes
     are_dynamic = bool(causes) and all(cause.effect.has_dynamics for cause in causes)
-    kinds = [*([PowerLaw()] if are_dynamic else []), *([NegativeSpring()] if are_dynamic or len(causes) > 1 else [])]
-    fits = [fit for kind in kinds if (fit := _best_of(bench, found, kind)) is not None]
+    kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(causes) > 1)]
+    if not kinds:
+        return None
+    bar = bench.fit_early(causes, found.final.values).cost + FAR_BEHIND
+    fits = [fit for kind in kinds if (fit := _best_of(bench, found.null, kind, bar)) is not None]
     needed = found.final.log_evidence + (LIMITS[bench.kind].beside_nats if len(causes) == 1 else 0.0)
     return max((fit for fit in fits if fit.log_evidence > needed), key=lambda fit: fit.log_evidence, default=None)
 
 
-def _best_of(bench: Bench, found: Decision, kind: LocalForce) -> Fit | None:
-    """Fit a kind of force at its best place; none where it is far behind what was found."""
+def _best_of(bench: Bench, null: Fit, kind: LocalForce, bar: float) -> Fit | None:
+    """Fit a kind of force at its best place; none where its cost with large errors is above a bar."""
     only = replace(bench, effects={kind.name: kind})
-    refined = refine_far(only, found.null, wide_search(only, found.null))
+    refined = refine_far(only, null, wide_search(only, null))
     early = [only.fit_early((*known, start.cause), start.values) for known, start in _closer(only, refined)]
     best = min(early, key=lambda fit: fit.cost)
-    if best.cost > only.fit_early(found.final.hypothesis.causes, found.final.values).cost + FAR_BEHIND:
+    if best.cost > bar:
         return None
     exact = only.fit_from(best)
     fits = {exact.hypothesis.causes[-1].key: exact}
-    climb_all(only, found.null, fits)
+    climb_all(only, null, fits)
     return ranked(only, fits.values())[0]
 
 

@@ -21,6 +21,8 @@ class LocalForce(ViscoelasticJoint):
 
     tried: ClassVar[tuple[float, ...]]
     """Values of the second parameter that a wide search starts from."""
+    rivals_several: ClassVar[bool] = False
+    """Any two causes may imitate it, not only those with dynamics of their own."""
 
     @abstractmethod
     def second_parameter(self) -> Parameter:

@@ -23,6 +23,7 @@ class NegativeSpring(LocalForce):
 
     name = "negative_spring"
     tried = (0.01, 0.1, 1.0, 5.0)
+    rivals_several = True
 
     def second_parameter(self) -> Parameter:
         """Loss in the middle of the band."""
