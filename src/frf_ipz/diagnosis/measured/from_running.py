@@ -1,14 +1,16 @@
 """FRFs of running records on lines that lie closer than the records' own.
 
 A resonance may be narrower than the lines of a record lie apart. What is between two lines is in the record as well:
-the transient is another one there, as smooth, and is taken off in the same way.
+the transient is another one there, as smooth, and is taken off in the same way. The narrower the resonance, the less
+surely: what is left of the transient is another error in each piece, so it shows in how far the pieces scatter.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.observations import Observations
@@ -17,6 +19,30 @@ from frf_ipz.ingest.signals.transients import pieces_without_transients
 
 MOST_LINES = 2**15  # in the band
 FINEST = 8  # lines for one of the record
+AROUND = 2  # lines of the record over which scatter is averaged
+KNOWN = 8.0  # what the stated variance of a line counts against its scatter, in degrees of freedom
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comb:
+    """FRFs on one comb of lines.
+
+    Parameters
+    ----------
+    values : (n_lines, n_frfs) complex array
+        Theirs.
+    force : (n_lines, n_frfs) array
+        Its power in all pieces: where it happens to be weak, FRFs err.
+    scatter : (n_lines, n_frfs) array
+        Variance of the FRFs by how far pieces differ; 0 where there is one.
+    freedom : (n_frfs,) array
+        Degrees of freedom of the scatter: the pieces but one.
+    """
+
+    values: ComplexArray
+    force: FloatArray
+    scatter: FloatArray
+    freedom: FloatArray
 
 
 def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
@@ -42,28 +68,48 @@ def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     lines = frfs.lines(np.repeat(kept, finer))
     combs = [_comb(observations, frfs.labels, length, kept, part / finer) for part in range(finer)]
     between = frfs.frequency_hz[kept, None] + spacing * np.arange(finer) / finer
-    values, force = (np.stack(parts, 1).reshape(len(kept) * finer, -1) for parts in zip(*combs, strict=True))
-    noise = lines.variance * np.repeat(combs[0][1], finer, axis=0)
+    noise = lines.variance * np.repeat(combs[0].force, finer, axis=0) / _together([comb.force for comb in combs])
     return replace(
         lines,
         frequency_hz=between.ravel(),
-        values=values,
-        variance=noise / force * finer,
+        values=np.stack([comb.values for comb in combs], 1).reshape(len(noise), -1),
+        variance=noise * _excess(combs, noise)[:, None] * finer,
         correlated_lines=finer,
     )
 
 
+def _together(combs: list[FloatArray]) -> FloatArray:
+    """(n_combs * n_lines, n_frfs) of all combs, by ascending frequency."""
+    parts = np.stack(combs, 1)
+    return parts.reshape(-1, parts.shape[-1])
+
+
+def _excess(combs: list[Comb], noise: FloatArray) -> FloatArray:
+    """How much more pieces scatter on a line, and on those around it, than the stated variance; 1 at least."""
+    freedom, width = combs[0].freedom, AROUND * len(combs)
+    if not freedom.any():
+        return np.ones(len(noise))
+    known = AROUND * freedom.sum()
+    scatter = _together([comb.scatter for comb in combs]) / np.maximum(noise, np.finfo(float).tiny)
+    over = scatter @ freedom / freedom.sum()
+    return np.maximum((KNOWN + known * uniform_filter1d(over, width, mode="nearest")) / (KNOWN + known), 1.0)
+
+
 def _comb(
     observations: Observations, labels: tuple[FrfLabel, ...], length: int, lines: IntArray, between: float
-) -> tuple[ComplexArray, FloatArray]:
-    """FRFs on one comb of lines, and the force's power, (n_lines, n_frfs): where it happens to be weak they err."""
+) -> Comb:
     force = np.zeros((len(lines), len(labels)))
-    cross = np.zeros(force.shape, np.complex128)
+    cross, own = np.zeros(force.shape, np.complex128), np.zeros(force.shape)
+    n_pieces = np.zeros(len(labels))
     places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
     for blow in observations.blows:
         columns = [places[sensor.channel, sensor.dof, blow.input_dof] for sensor in blow.sensors]
         for F, X in pieces_without_transients(blow.force, blow.responses, length, lines, between=between):
+            n_pieces[columns] += 1
             force[:, columns] += (np.abs(F) ** 2)[:, None]
             cross[:, columns] += (F.conj() * X).T
+            own[:, columns] += (np.abs(X) ** 2).T
     force = np.maximum(force, np.finfo(float).tiny)
-    return np.asarray(cross / force), force
+    freedom = np.maximum(n_pieces - 1, 0.0)
+    left = np.maximum(own - np.abs(cross) ** 2 / force, 0.0)
+    return Comb(values=cross / force, force=force, scatter=left / force / np.maximum(freedom, 1.0), freedom=freedom)

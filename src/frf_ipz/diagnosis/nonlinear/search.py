@@ -20,9 +20,9 @@ import numpy as np
 
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
-from frf_ipz.diagnosis.nonlinear.fitting.anywhere import AnyForce, find_place, simple_forces
+from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, Track, find_candidates
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import anywhere, whereabouts
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE, anywhere, whereabouts
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -74,7 +74,8 @@ FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to explain, where later ones are not reached
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
-NEARLY_ALL = 0.01  # or so much of the linear model's: what the forces lack is then their law, not their place
+MOSTLY = 0.05  # or so much of the linear model's: what the forces lack is then their law, not their place
+NEARLY_ALL = 0.01  # of what the linear model leaves of first moments: a law that leaves no more explains them
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
 WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
@@ -238,7 +239,10 @@ def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[
     of_each_law = {fit.law.name: fit.place for fit in reversed(fits)}
     found, first = find_place(short, long, of_each_law.values())
     best = min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
-    return first if best.left > PLACED and first.left < EXPLAINED_FIRST else best
+    if best.left < PLACED or first.left > EXPLAINED_FIRST:
+        return best
+    early = fit_anything(short, best.place, MANY_TURNS)
+    return early if early.cost < first.cost + TIE else first
 
 
 def _bend(track: Track, fit: LawFit) -> float:
@@ -249,7 +253,7 @@ def _bend(track: Track, fit: LawFit) -> float:
 def _with_place(found: LawSearch, plant: Plant, best: AnyForce) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
     left = best.left
-    if left > max(min(PLACED, HALVED * best.missed), NEARLY_ALL * best.missed):
+    if left > max(min(PLACED, HALVED * best.missed), MOSTLY * best.missed):
         return found
     place = plant.places[best.place]
     where = (
