@@ -32,8 +32,7 @@ from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.judging.one_place import COMPLAINT as OF_ANOTHER_KIND
-from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
+from frf_ipz.diagnosis.judging.one_place import another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.measured.source import divide
@@ -155,8 +154,8 @@ def _decide(
     another = find_another(bench, found) if found.final.is_nearly_all else None
     if another is not None:
         return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_another(another)
-    if found.verdict == EXPLAINED and is_of_another_kind(found.final):
-        return bench, replace(found, verdict=UNEXPLAINED), OF_ANOTHER_KIND
+    if found.verdict == EXPLAINED and (rather := another_kind(found.final)):
+        return bench, replace(found, verdict=UNEXPLAINED), rather
     return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
 
 

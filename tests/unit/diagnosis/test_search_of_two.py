@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.together import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.decision import decide
-from frf_ipz.diagnosis.judging.one_place import is_of_another_kind
+from frf_ipz.diagnosis.judging.one_place import another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pairs
@@ -182,7 +182,8 @@ def with_causes(bench, *named):
         effect = bench.effects[name]
         place = next(one for one in effect.places(bench.specimen) if one.location.get("nodes") == [node])
         causes.append(Cause(effect=effect, place=place, n_places=1))
-    return SimpleNamespace(hypothesis=SimpleNamespace(causes=tuple(causes), specimen=bench.specimen))
+    hypothesis = bench.suppose(tuple(causes))
+    return SimpleNamespace(hypothesis=hypothesis, values=hypothesis.physical((hypothesis.low + hypothesis.high) / 2))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +198,16 @@ def with_causes(bench, *named):
 )
 def test_two_with_dynamics_of_their_own_alike_or_at_one_place_are_one_of_another_kind(nominal, named, expected):
     names = ("attached_resonator", "local_damper", "added_mass", "viscoelastic_joint")
-    assert is_of_another_kind(with_causes(bench_of(nominal, measured(nominal), names), *named)) is expected
+    assert bool(another_kind(with_causes(bench_of(nominal, measured(nominal), names), *named))) is expected
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(0.05, ""), (0.3, "damping ratio of 30 %")])
+def test_a_resonator_that_hardly_swings_is_something_else(nominal, ratio, said):
+    names = ("attached_resonator", "added_mass")
+    fit = with_causes(bench_of(nominal, measured(nominal), names), ("added_mass", 3), ("attached_resonator", 9))
+    fit.values[-1] = ratio
+    assert (said in another_kind(fit)) is True
+    assert bool(another_kind(fit)) is bool(said)
 
 
 def test_two_resonators_at_one_node_are_not_named(nominal):

@@ -162,6 +162,11 @@ class Effect(ABC):
         del specimen, place, values
         return 0.0
 
+    def doubt(self, values: FloatArray) -> str:
+        """Say why values that explain a measurement are rather those of something else; empty where they are not."""
+        del values
+        return ""
+
     def reported(self, place: Place, name: str, value: float) -> float:
         """Turn a value that was searched into the one that is reported: a sign, for one."""
         del place, name

@@ -107,6 +107,8 @@ def search_beside_law(
     best = ranking.best
     if best is null or gain_over(best, null) < LIMITS[bench.kind].found_nats or not is_significant(best, -1):
         return None
+    if any(best.hypothesis.doubts(best.values)):
+        return None
     change = best.hypothesis.change(best.values)
     again = search_laws(with_change(model, change), restore(observations, change))
     if again.verdict != EXPLAINED or again.strain > EASED * laws.strain:

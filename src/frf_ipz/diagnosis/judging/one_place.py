@@ -1,6 +1,7 @@
-"""Two findings with dynamics of their own, alike or at nearly one place: rather one thing that the catalogue lacks.
+"""Findings that explain a measurement and yet rather are something that the catalogue lacks.
 
-Two resonators are a chain of two at one of their places, two dampers or joints what is spread between them.
+Two with dynamics of their own, alike or at nearly one place: two resonators are a chain of two at one of their places,
+two dampers or joints what is spread between them. Or one with numbers that its kind hardly has.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
 NEAR = 0.05  # of the largest extent of a structure
-COMPLAINT = (
+TWO_ALIKE = (
     "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place: they "
     "rather are one thing of another kind"
 )
 
 
-def is_of_another_kind(fit: Fit) -> bool:
-    """Tell whether several causes are rather one that the catalogue lacks.
+def another_kind(fit: Fit) -> str:
+    """Say why causes are rather one that the catalogue lacks.
 
     Parameters
     ----------
@@ -34,15 +35,18 @@ def is_of_another_kind(fit: Fit) -> bool:
 
     Returns
     -------
-    bool
-        Two of them imitate something at their place, or something that is spread.
+    str
+        In words that follow "Something is missing that nothing in the catalogue explains: "; empty where two causes
+        imitate neither something at their place nor something that is spread, and all have numbers of their kind.
     """
     hypothesis = fit.hypothesis
     dynamic = [cause for cause in hypothesis.causes if cause.effect.has_dynamics]
-    return any(
+    if any(
         one.effect.name == other.effect.name or _at_one_place(hypothesis.specimen, one, other)
         for one, other in combinations(dynamic, 2)
-    )
+    ):
+        return TWO_ALIKE
+    return next((doubt for doubt in hypothesis.doubts(fit.values) if doubt), "")
 
 
 def _at_one_place(specimen: Specimen, first: Cause, second: Cause) -> bool:

@@ -92,7 +92,8 @@ def _excess(combs: list[Comb], noise: FloatArray) -> FloatArray:
     known = AROUND * freedom.sum()
     scatter = _together([comb.scatter for comb in combs]) / np.maximum(noise, np.finfo(float).tiny)
     over = scatter @ freedom / freedom.sum()
-    return np.maximum((KNOWN + known * uniform_filter1d(over, width, mode="nearest")) / (KNOWN + known), 1.0)
+    around = uniform_filter1d(over, width, mode="nearest")
+    return np.asarray(np.maximum((KNOWN + known * around) / (KNOWN + known), 1.0))
 
 
 def _comb(

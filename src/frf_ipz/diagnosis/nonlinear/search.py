@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
+from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE, anywhere, whereabouts
@@ -37,6 +37,7 @@ from frf_ipz.progress import silent
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import Misfit
+    from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
@@ -76,11 +77,6 @@ EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to expl
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
 MOSTLY = 0.05  # or so much of the linear model's: what the forces lack is then their law, not their place
 NEARLY_ALL = 0.01  # of what the linear model leaves of first moments: a law that leaves no more explains them
-LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
-NORMAL_95 = 1.96
-WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
-MOST_PLACES = 12
-LISTED = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -290,10 +286,10 @@ def _judge(
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
     gains = np.array(
-        [_gain(fit, drop / scale, len(plant.places), scale) for fit, drop in zip(fits, drops, strict=True)]
+        [gain_of(fit, drop / scale, len(plant.places), scale) for fit, drop in zip(fits, drops, strict=True)]
     )
     weights = np.exp(gains - gains.max())
-    findings = _findings(plant, fits, gains, weights / weights.sum(), scale)
+    findings = findings_of(plant, fits, gains, weights / weights.sum(), scale)
     agreement = agreement_with(track.stretches, track.linear.freedom, best)
     why = _complaint(track, best, agreement, float(gains[0]), bend_of)
     return LawSearch(
@@ -359,46 +355,3 @@ def _bend_of_errors(track: Track, fit: LawFit) -> float:
     """Drop of the cost by forces of other kinds that errors of the model imitate."""
     of_cost, of_gain = BENT_MOVING if track.stretches.moving.any() else BENT
     return max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))
-
-
-def _gain(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
-    """Take off from a drop of the cost what the freedom of the law is worth."""
-    gain = drop - np.log(n_places)
-    for value, variance in fit.numbers.values():
-        spread = min(np.sqrt(max(variance, 1e-300) * scale) / max(abs(value), 1e-300), LOG_RANGE)
-        gain += np.log(np.sqrt(2 * np.pi) * max(spread, 1e-12) / LOG_RANGE)
-    return float(gain)
-
-
-def _findings(
-    plant: Plant, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
-) -> tuple[Finding, ...]:
-    """Make one finding of each law, at its best place."""
-    order = np.argsort(-gains)
-    found: dict[str, Finding] = {}
-    for index in order:
-        fit, place = fits[index], plant.places[fits[index].place]
-        if fit.law.name in found:
-            continue
-        mine = [i for i in order if fits[i].law is fit.law]
-        share = np.cumsum(probability[mine]) / max(probability[mine].sum(), 1e-300)
-        listed = mine[: min(int(np.searchsorted(share, LISTED)) + 1, MOST_PLACES)]
-        numbers = _numbers(fit, scale)
-        found[fit.law.name] = Finding(
-            effect=fit.law.name,
-            location=dict(place.location),
-            parameters=numbers,
-            probability=float(probability[mine].sum()),
-            log_evidence_gain=float(gains[index]),
-            statement=f"At {place.words} sits {fit.law.phrase.format(f'{fit.strength:.3g}')} that the model lacks.",
-            location_set=tuple(dict(plant.places[fits[i].place].location) for i in listed),
-        )
-    return tuple(found.values())
-
-
-def _numbers(fit: LawFit, scale: float) -> dict[str, Estimate]:
-    found = {}
-    for name, (value, variance) in fit.numbers.items():
-        std = WIDER * float(np.sqrt(max(variance, 0.0) * scale))
-        found[name] = Estimate(value=value, std=std, low=value - NORMAL_95 * std, high=value + NORMAL_95 * std)
-    return found

@@ -127,6 +127,11 @@ class Hypothesis:
             total = total + build(own)
         return total
 
+    def doubts(self, values: FloatArray) -> tuple[str, ...]:
+        """Why each cause is rather something else; empty where it is not."""
+        own = self._split(values)
+        return tuple(cause.effect.doubt(mine) for cause, mine in zip(self.causes, own, strict=True))
+
     def log_prior(self, values: FloatArray) -> float:
         """How likely the places are, and the values beside their bounds, nats."""
         return sum(

@@ -116,12 +116,14 @@ def test_a_law_alone_does_not_strain_the_model(solved):
     assert solved[-1].strain < 0.1 * STRAINED
 
 
-@pytest.mark.parametrize(("strain", "again", "both"), [(50.0, 2.0, True), (50.0, 40.0, False), (5.0, 0.1, False)])
-def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, again, both):
-    """A spring gains 1000 nats on the recordings without the law."""
-    spring = SimpleNamespace(
-        log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=SimpleNamespace(change=lambda _: "change")
-    )
+@pytest.mark.parametrize(
+    ("strain", "again", "doubt", "both"),
+    [(50.0, 2.0, "", True), (50.0, 40.0, "", False), (5.0, 0.1, "", False), (50.0, 2.0, "hardly swings", False)],
+)
+def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, again, doubt, both):
+    """A cause that is what it looks like gains 1000 nats on the recordings without the law."""
+    hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,))
+    spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
         "without_law": lambda *_: "rest",
         "fit_nothing": lambda _: SimpleNamespace(log_evidence=0.0),

@@ -94,10 +94,14 @@ def test_only_a_small_force_besides_a_law_is_believed_without_being_fitted(monke
     assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: drop).place == place
 
 
-@pytest.mark.parametrize(("left", "first", "place"), [(500.0, 20.0, 5), (500.0, 150.0, 3), (300.0, 20.0, 3)])
-def test_first_moments_place_a_law_where_later_ones_are_not_reached(monkeypatch, left, first, place):
-    """Long stretches say place 3, the first moments place 5: they are believed where they leave nothing."""
+@pytest.mark.parametrize(
+    ("left", "first", "early", "place"),
+    [(500.0, 20.0, 50.0, 5), (500.0, 20.0, 30.0, 3), (500.0, 150.0, 500.0, 3), (300.0, 20.0, 50.0, 3)],
+)
+def test_first_moments_place_a_law_where_later_ones_are_not_reached(monkeypatch, left, first, early, place):
+    """Long stretches say place 3, the first moments place 5: they are believed where they leave nothing there alone."""
     monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, left), a_force(5, first)))
+    monkeypatch.setattr(search, "fit_anything", lambda _, one, __: a_force(one, early))
     assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: 950.0).place == place
 
 
@@ -138,7 +142,7 @@ def test_neighbours_move_alike_or_the_other_way_round():
     assert candidates.neighbours(SimpleNamespace(at_places=SimpleNamespace(shapes=shapes)), 0, 2) == [3, 2]
 
 
-@pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 2600.0, True)])
+@pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 260.0, True)])
 def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
     plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)

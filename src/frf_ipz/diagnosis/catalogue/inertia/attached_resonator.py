@@ -22,6 +22,7 @@ RATIOS = 1e-3, 0.5
 USUAL_RATIO, WITHIN = 0.05, 1.7  # the most of what swings by itself, and the factor by which it may be more
 FREQUENCY_STEP = 1.06
 TRIED_RATIOS = (0.01, 0.06)
+MOST_RATIO = 0.2  # with more, what fits is a resonator in name only
 
 
 class AttachedResonator(Effect):
@@ -83,6 +84,16 @@ class AttachedResonator(Effect):
         del specimen, place
         beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
         return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
+
+    def doubt(self, values: FloatArray) -> str:
+        """Doubt one that hardly swings: it can bend to what many other losses do."""
+        _, frequency_hz, ratio = values
+        if ratio <= MOST_RATIO:
+            return ""
+        return (
+            f"what looks like a resonator of {frequency_hz:.4g} Hz has a damping ratio of {100 * ratio:.2g} %, far "
+            "more than what swings by itself: it rather is another way to lose energy"
+        )
 
     def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say what swings where."""
