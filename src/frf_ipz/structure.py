@@ -61,12 +61,15 @@ class Geometry:
         Pairs of node numbers that are drawn as lines.
     supports : mapping of int to str
         How a node is held: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
+    is_a_row : bool
+        Coordinates are no positions, but a row of masses.
     """
 
     nodes: IntArray
     coordinates_m: FloatArray
     lines: IntArray
     supports: Mapping[int, str] = field(default_factory=dict)
+    is_a_row: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

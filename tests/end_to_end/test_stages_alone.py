@@ -2,6 +2,7 @@
 
 import json
 import sys
+from html import escape
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from frf_ipz.cli import main as command
 from frf_ipz.export.design_files import load_ensemble, read_weights
 from frf_ipz.export.state_space_files import load_state_space
+from frf_ipz.report.findings import plain_signs
 from frf_ipz.runs.folder import read_run
 from small_campaign import write_campaign
 
@@ -100,3 +102,15 @@ def test_an_update_changes_what_the_diagnosis_has_found_and_nothing_else(tmp_pat
     factor = np.vdot(before, change) / np.vdot(before, before)
     assert factor != 0
     np.testing.assert_allclose(change, factor * before, atol=ROUNDING * np.abs(change).max())
+
+
+def test_a_diagnosis_alone_has_a_page_that_shows_it_on_the_structure(tmp_path, monkeypatch):
+    pipeline = write_campaign(tmp_path)
+    pipeline.write_text(pipeline.read_text() + '[diagnose]\neffects = ["global_stiffness"]\n')
+    stage(monkeypatch, "diagnose", pipeline, tmp_path / "out")
+    assert set(keys(tmp_path / "out")) == {"ingest", "fit", "model", "diagnose", "levels", "report"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["findings"][0]["statement"]
+    assert f'<p class="verdict">{escape(plain_signs(said))}</p>' in page
+    assert "Position, m" in page
+    assert "No model gives positions" not in page

@@ -46,7 +46,7 @@ HELP = {
     "run": "Run the whole chain: FRFs, poles and zeros, updated model, prediction, state space, report.",
     "ingest": "Recordings into FRFs with their variance: frf.parquet, blows.parquet.",
     "fit": "FRFs into poles, zeros and mode shapes: poles.parquet, zeros.parquet, fit.parquet, modes.parquet.",
-    "diagnose": "Locate where model and recordings differ and say what physics was left out: diagnosis.json.",
+    "diagnose": "Locate a mismatch of model and recordings, and say what was left out: diagnosis.json, report.html.",
     "pair": "Measured poles and zeros against those of the reduced FE model: pairs.parquet.",
     "update": "Bring the reduced model to the measured poles and zeros: updated_model.npz, parameters.parquet.",
     "predict": "FRFs at the points of interest, with their band: poi_frf.parquet.",

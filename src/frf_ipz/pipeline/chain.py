@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
 
 
-def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) -> Iterator[str]:
+def chain(job: Job, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress) -> Iterator[str]:
     """Run the stages one after another.
 
     Parameters
@@ -30,6 +30,8 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
         What to work on.
     folder : RunFolder
         Where results are kept.
+    until : str
+        The last stage that is wanted. A diagnosis is looked at: one that is the last has its page.
     diagnosing : bool
         Look for what the model left out.
     progress : Progress
@@ -52,10 +54,13 @@ def chain(job: Job, folder: RunFolder, *, diagnosing: bool, progress: Progress) 
     fit = measurement.fit(desk, frfs, corrected_by=diagnosis)
     yield "fit"
     if model is not None:
+        modelling.outline(desk, model, corrected_by=diagnosis)
         if diagnosing:
             if diagnosis is None:
                 mismatch.diagnose(desk, model, frfs)
             mismatch.levels(desk, fit, recordings.frfs)
+            if until == "diagnose":
+                results.report(desk)
             yield "diagnose"
         reduced = modelling.reduce(desk, model, fit, corrected_by=diagnosis)
         pairs = modelling.pair(desk, fit, reduced)

@@ -57,7 +57,7 @@ def run_pipeline(
         raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
     with open_run(out) as folder:
         folder.record.update(_provenance(job))
-        for stage in chain(job, folder, diagnosing=wanted, progress=progress):
+        for stage in chain(job, folder, until=until, diagnosing=wanted, progress=progress):
             if stage == until:
                 break
     return read_run(out)

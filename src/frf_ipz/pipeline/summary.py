@@ -54,6 +54,8 @@ def summarise(run: RunFolder) -> str:
             lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
     seconds = sum(entry.get("seconds", 0.0) for entry in run.record.get("stages", {}).values())
     lines.append(f"{'results':<12}{run.path}  ({seconds:.1f} s of computing)")
+    if "report" in run.record.get("stages", {}) and not run.is_stale("report"):
+        lines.append(f"{'page':<12}{run.path / 'report.html'}")
     return "\n".join(lines)
 
 
@@ -120,8 +122,9 @@ def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    findings = [("", finding.statement) for finding in diagnosis.findings]
-    return [("diagnosis", diagnosis.statement), *findings, *_warnings(diagnosis.warnings)]
+    said = diagnosis.statement
+    findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in said]
+    return [("diagnosis", said), *findings, *_warnings(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:

@@ -76,7 +76,7 @@ class RunContents:
     @property
     def is_lumped(self) -> bool:
         """The model is made of springs: its geometry is a row of masses, not positions."""
-        return bool(len(self.parts)) and bool((self.parts["kind"] == "spring").all())
+        return self.geometry is not None and self.geometry.is_a_row
 
     @property
     def frfs(self) -> FrfSet | None:
@@ -173,7 +173,7 @@ def read_contents(folder: RunFolder) -> RunContents:
     """
     stages = folder.record.get("stages", {})
     has_model = "reduce" in stages
-    model = folder.load("model") if has_model else None
+    model = folder.load("model") if "model" in stages else None
     return RunContents(
         record=folder.record,
         recordings=folder.load("ingest"),

@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.dofs import Dof
-from frf_ipz.structure import Geometry
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -98,10 +97,9 @@ def _with_dofs(
         mass_all=mass,
         stiffness_all=stiffness,
         damping_all=damping,
-        geometry=Geometry(
+        geometry=replace(
+            geometry,
             nodes=np.concatenate([geometry.nodes, [dof.node for dof in fresh]]).astype(np.int64),
             coordinates_m=np.vstack([geometry.coordinates_m, *([here[None]] * count)]),
-            lines=geometry.lines,
-            supports=geometry.supports,
         ),
     )

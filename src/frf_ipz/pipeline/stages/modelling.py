@@ -35,6 +35,22 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
+def outline(desk: Desk, model: StructuralModel, *, corrected_by: Diagnosis | None = None) -> None:
+    """Keep where the nodes are, and what joins them: pictures of the structure need no more of a model.
+
+    Parameters
+    ----------
+    desk : Desk
+        The work.
+    model : StructuralModel
+        The FE model.
+    corrected_by : Diagnosis, optional
+        What the model was corrected by, if it was.
+    """
+    key = {"model": desk.job.model_key, "corrected": corrections(corrected_by)}
+    desk.stage("model", key, lambda _: model.geometry)
+
+
 def reduce(
     desk: Desk, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
 ) -> ReducedModel:
@@ -58,7 +74,6 @@ def reduce(
     """
     job = desk.job
     options = job.pipeline.file.reduce
-    desk.stage("model", {"model": job.model_key, "corrected": corrections(corrected_by)}, lambda _: model.geometry)
     return desk.stage(
         "reduce",
         {
