@@ -91,12 +91,16 @@ def _map(diagnosis: Diagnosis) -> Picture:
     return Picture(
         name="mismatch",
         title="Where model and measurement disagree: misfit over what noise and tolerances explain",
-        alt=f"Two maps of FRFs by bands, of the model as it is and with the findings. {diagnosis.mismatch_where}",
+        alt=f"Two maps of FRFs by bands, of the model as it is and {_explained(diagnosis)}. {diagnosis.mismatch_where}",
         traces=tuple(traces),
         layout=panels(x, *axes),
-        note=f"1 is as good as the measurement. {diagnosis.mismatch_where}",
+        note=f"1 is as good as the measurement. {diagnosis.mismatch_where}{_of_law(diagnosis)}",
         height_px=int(np.clip(240 + 44 * len(names), 380, 900)),
     )
+
+
+def _of_law(diagnosis: Diagnosis) -> str:
+    return "" if diagnosis.linearised is None else " Both models are linear: what the force law explains follows below."
 
 
 def _heat(
@@ -251,7 +255,8 @@ def _bars(values: Sequence[tuple[str, float]], name: str, colour: str, pattern: 
 
 
 def _explained(diagnosis: Diagnosis) -> str:
-    return "with the findings" if diagnosis.findings else "within its tolerances"
+    """Name the better of the two linear models that are compared: one that holds no force law."""
+    return "with the findings" if diagnosis.findings and diagnosis.linearised is None else "within its tolerances"
 
 
 def _curves(curves: Curves, band_hz: tuple[float, float], explained: str) -> Picture:
