@@ -48,3 +48,22 @@ def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_
     second = Ranking(base=one.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_places)), n_tried=9)
     both = decision._beside(SimpleNamespace(kind="hammer"), one, second)
     assert (both and both.verdict) == verdict
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(2.0, "unexplained"), (40.0, "explained")])
+def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, gain, verdict):
+    """The nominal model leaves a little too much, and a cause a little less."""
+    null, best = a_fit(ALONE, ""), a_fit(ALONE + gain, "attached_resonator")
+    best.is_nearly_all = True
+    monkeypatch.setattr(decision, "fit_nothing", lambda _: null)
+    monkeypatch.setattr(
+        decision,
+        "goodness",
+        lambda _, fit: SimpleNamespace(is_good=fit is best, score=1.01 if fit is null else 0.9, needed_nats=30.0),
+    )
+    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
+    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
+    decided = decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None)
+    assert decided.verdict == verdict
+    assert decided.final is (best if verdict == "explained" else null)

@@ -87,8 +87,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
         return replace(one, verdict=CONSISTENT, final=null, good=null_good)
     progress(0.6, "searching for a second cause")
     if good.is_good:
-        second = settle_ties(bench, search_beside(bench, best, LIMITS[bench.kind].beside_nats))
-        return _beside(bench, one, second) or one
+        return _enough(bench, one)
     second = settle_ties(bench, search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good))
     two = _beside(bench, one, second)
     if two is None:
@@ -101,6 +100,15 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search_beside(bench, second.best, STRONG_NATS))
     return three if three is not None and three.verdict == EXPLAINED else two
+
+
+def _enough(bench: Bench, one: Decision) -> Decision:
+    """Take a cause that leaves nothing to explain, if it explains anything, and what explains much beside it."""
+    limits = LIMITS[bench.kind]
+    if gain_over(one.final, one.null) < limits.found_nats:
+        return replace(one, verdict=UNEXPLAINED, final=one.null, good=one.null_good)
+    second = settle_ties(bench, search_beside(bench, one.final, limits.beside_nats))
+    return _beside(bench, one, second) or one
 
 
 def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
