@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
 from frf_ipz.diagnosis.judging.another_force import describe_another, find_another
+from frf_ipz.diagnosis.judging.another_kind import another_kind
 from frf_ipz.diagnosis.judging.decision import (
     CONSISTENT,
     EXPLAINED,
@@ -32,7 +33,6 @@ from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
 from frf_ipz.diagnosis.judging.gates import check
 from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.judging.one_place import another_kind
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.measured.source import divide

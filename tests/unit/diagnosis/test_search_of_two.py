@@ -14,8 +14,8 @@ from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.together import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.judging.another_kind import another_kind
 from frf_ipz.diagnosis.judging.decision import decide
-from frf_ipz.diagnosis.judging.one_place import another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pairs

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
-from frf_ipz.diagnosis.judging.verdict import LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
+from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
 from frf_ipz.diagnosis.search.elsewhere import look_elsewhere
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
@@ -104,10 +104,9 @@ def decide(bench: Bench, progress: Progress) -> Decision:
 
 def _enough(bench: Bench, one: Decision) -> Decision:
     """Take a cause that leaves nothing to explain, if it explains anything, and what explains much beside it."""
-    limits = LIMITS[bench.kind]
-    if gain_over(one.final, one.null) < limits.found_nats:
+    if not one.null_good.is_good and gain_over(one.final, one.null) < FOUND_NATS:
         return replace(one, verdict=UNEXPLAINED, final=one.null, good=one.null_good)
-    second = settle_ties(bench, search_beside(bench, one.final, limits.beside_nats))
+    second = settle_ties(bench, search_beside(bench, one.final, LIMITS[bench.kind].beside_nats))
     return _beside(bench, one, second) or one
 
 
