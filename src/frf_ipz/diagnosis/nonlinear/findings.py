@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
 WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
+TOLD = 3.0  # standard deviations of a number from zero: laws that were there had 9 and more, others 2 and less
 MOST_PLACES = 12
 LISTED = 0.95
 
@@ -87,6 +88,24 @@ def findings_of(
             location_set=tuple(dict(plant.places[fits[i].place].location) for i in listed),
         )
     return tuple(found.values())
+
+
+def is_told(fit: LawFit, scale: float) -> bool:
+    """Say whether recordings determine any number of a law: if none, a force that is hardly there is no explanation.
+
+    Parameters
+    ----------
+    fit : LawFit
+        A law at its place.
+    scale : float
+        Expected mean square of the misfit.
+
+    Returns
+    -------
+    bool
+        Not so where all numbers may as well be zero.
+    """
+    return any(abs(number.value) > TOLD * number.std for number in _numbers(fit, scale).values())
 
 
 def _numbers(fit: LawFit, scale: float) -> dict[str, Estimate]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
-from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of
+from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, Track, find_candidates
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE, anywhere, whereabouts
@@ -323,8 +323,10 @@ def _complaint(
     """Say what is wrong with a law; nothing where it explains the recordings."""
     if np.fmin(gain, agreement.gain) < FOUND_NATS:
         return "gains no more than a linear system could"
-    part = relative_misfit(track.stretches, best.misfit)
     left = best.cost / best.n_rows
+    if not is_told(best, max(1.0, left)):
+        return "has numbers that the recordings do not tell from zero"
+    part = relative_misfit(track.stretches, best.misfit)
     if left > MOST_MISFIT and part > (CLOSE_MOVING if track.stretches.moving.any() else CLOSE):
         return f"leaves {np.sqrt(left):.3g} times the expected misfit"
     if agreement.left > MOST_APART and part > NEARLY:

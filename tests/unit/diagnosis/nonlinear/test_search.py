@@ -7,6 +7,7 @@ from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging import law_beside
 from frf_ipz.diagnosis.judging.law_beside import STRAINED
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+from frf_ipz.diagnosis.nonlinear.findings import is_told
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate, without_law
@@ -68,6 +69,21 @@ def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, stri
     assert found.findings == ()
     assert found.alternatives[0].effect == "cubic_stiffness"
     assert "no more than a linear system" in found.statement
+
+
+def test_a_law_whose_numbers_may_as_well_be_zero_is_no_explanation(chain, strike, monkeypatch):
+    law, where, *_ = CASES["cubic_stiffness"]
+    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.findings.WIDER", 1e6)
+    found = search_laws(chain.model, strike(law, where), DiagnoseOptions())
+    assert found.verdict == "unexplained"
+    assert "do not tell from zero" in found.statement
+
+
+@pytest.mark.parametrize(("gap_variance", "told"), [(1e-10, True), (1e-8, False)])
+def test_one_number_that_is_told_is_enough(gap_variance, told):
+    """How stiff a hard stop is, recordings hardly say: its gap they do."""
+    fit = SimpleNamespace(numbers={"contact_stiffness_N_m": (1e4, 9e8), "gap_m": (1e-4, gap_variance)})
+    assert is_told(fit, 1.0) == told
 
 
 @pytest.mark.parametrize(
