@@ -124,7 +124,7 @@ def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Ob
 
 def _whole(observations: Observations, freedom: Freedom, fit: LawFit) -> tuple[PlaceInTime, March]:
     """Go through whole records."""
-    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows))
+    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows), loudest=False)
     stretches = transform(observations, freedom.plant, read_noise(observations), whole)
     if stretches.moving.any():
         raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")

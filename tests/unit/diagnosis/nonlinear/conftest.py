@@ -1,5 +1,6 @@
 """A chain of four masses, struck and measured, integrated by SciPy's adaptive Runge-Kutta method."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -90,3 +91,18 @@ def strike(chain):
         return Observations(kind="hammer", blows=blows, band_hz=BAND_HZ)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def random_records():
+    def make(observations, loud_s):
+        """Turn blows into records of a shaker from rest, thirty times as strong about a time."""
+        records = []
+        for seed, blow in enumerate(observations.blows[:2]):
+            time = blow.step_s * np.arange(blow.n_samples)
+            noise = np.convolve(np.random.default_rng(seed).standard_normal(len(time)), np.ones(8) / 8, "same")
+            force = noise * np.clip(20 * time / time[-1], 0, 1) * (1 + 29 * np.exp(-(((time - loud_s) / 0.05) ** 2)))
+            records.append(replace(blow, force=force, responses=np.tile(force, (len(blow.sensors), 1))))
+        return replace(observations, kind="random", blows=tuple(records))
+
+    return make

@@ -1,5 +1,6 @@
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from frf_ipz.diagnosis import diagnose as whole
@@ -126,6 +127,14 @@ def test_recordings_without_the_law_are_those_of_a_linear_chain(solved):
     *_, observations, found = solved
     rest = without_law(observations, found.freedom, found.fit)
     assert assess_linearity(rest).score < 0.1 * found.linearity.score
+
+
+def test_a_law_is_taken_out_of_whole_records_from_rest_that_are_loudest_late(solved, random_records):
+    *_, observations, found = solved
+    records = random_records(observations, 2.0)
+    rest = without_law(records, found.freedom, found.fit)
+    changed = [np.abs(one.responses - was.responses).max() for one, was in zip(rest.blows, records.blows, strict=True)]
+    assert min(changed) > 0
 
 
 def test_a_law_alone_does_not_strain_the_model(solved):

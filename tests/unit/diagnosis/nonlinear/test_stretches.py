@@ -21,19 +21,8 @@ def test_lines_that_are_left_out_are_not_fitted(chain, strike):
     assert not np.any((used_hz > 30.0 - width_hz) & (used_hz < 40.0 + width_hz))
 
 
-def random_records(observations, loud_s):
-    """Turn blows into records of a shaker from rest, thirty times as strong about a time; sensors show the force."""
-    records = []
-    for seed, blow in enumerate(observations.blows[:2]):
-        time = blow.step_s * np.arange(blow.n_samples)
-        noise = np.convolve(np.random.default_rng(seed).standard_normal(len(time)), np.ones(8) / 8, "same")
-        force = noise * np.clip(20 * time / time[-1], 0, 1) * (1 + 29 * np.exp(-(((time - loud_s) / 0.05) ** 2)))
-        records.append(replace(blow, force=force, responses=np.tile(force, (len(blow.sensors), 1))))
-    return replace(observations, kind="random", blows=tuple(records))
-
-
 @pytest.mark.parametrize(("loud_s", "expected"), [(2.0, [False, True]), (0.1, [False])], ids=["late", "early"])
-def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, loud_s, expected):
+def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, random_records, loud_s, expected):
     observations = random_records(strike(), loud_s)
     plant, noise = make_plant(chain.model, observations), read_noise(observations)
     stretches = transform(observations, plant, noise, Window(duration_s=1.0))
@@ -42,7 +31,7 @@ def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, loud_s, expect
         assert start < loud_s < start + 0.3  # what lies early in a stretch counts most
 
 
-def test_a_record_is_looked_at_once_where_that_is_enough(chain, strike):
+def test_a_record_is_looked_at_once_where_that_is_enough(chain, strike, random_records):
     observations = random_records(strike(), 2.0)
     plant, noise = make_plant(chain.model, observations), read_noise(observations)
     assert not transform(observations, plant, noise, Window(duration_s=1.0, loudest=False)).moving.any()
