@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured.from_running import FINEST, finer_frfs
+from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_running import FINEST, fineness, finer_frfs
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.identification.options import FitOptions
@@ -57,6 +58,25 @@ def test_all_finer_lines_together_know_no_more_than_the_record(seen):
     own, of_record = ((1 / frfs.variance[lines]).sum() for frfs, lines in zip((finer, seen.frfs), between, strict=True))
     assert own == pytest.approx(of_record, rel=0.1)  # pieces that happen to scatter more count, others do not
     assert finer.correlated_lines == FINEST
+
+
+@pytest.mark.parametrize(("n_lines", "expected"), [(100, FINEST), (7000, FINEST), (20_000, 3), (100_000, 1)])
+def test_a_band_of_many_lines_is_looked_at_as_finely_as_can_be_paid(n_lines, expected):
+    assert fineness(n_lines) == expected
+
+
+@pytest.mark.parametrize(("finer", "most"), [(FINEST, 0.01), (5, 0.04)])
+def test_a_resonance_a_quarter_of_a_line_wide_is_seen_off_the_axis(seen, finer, most):
+    spacing_hz, pole = 1 / finer, 2 * np.pi * (-0.24 + 50.03j)
+    frequency_hz = np.arange(round(20 / spacing_hz), round(90 / spacing_hz)) * spacing_hz
+    s = 2j * np.pi * frequency_hz
+    values = np.repeat((1 / (s - pole))[:, None], len(seen.frfs.labels), axis=1)
+    even = np.full(values.shape, 1e-12)
+    lines = replace(seen.frfs, frequency_hz=frequency_hz, values=values, variance=even, coherence=even)
+    found = survey_frfs(lines, (30.0, 80.0))
+    off = measure_frfs(found, found.least_decay_1_s + 2j * np.pi * np.linspace(49.5, 50.5, 60))
+    assert np.abs(off.values[:, 0] * (off.s - pole) - 1).max() < most
+    assert np.abs(off.values[:, 0] * (off.s - pole) - 1).max() > most / 4
 
 
 def test_lines_on_which_the_force_happens_to_be_weak_are_known_to_err(seen):
