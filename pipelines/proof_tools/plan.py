@@ -13,7 +13,7 @@ from simulator.effects.catalogue import CONTRACT, NONLINEAR, OUTSIDE
 FULL = {"linear": 200, "null": 100, "nonlinear": 60, "pair": 60, "unknown": 60}
 SLICE = {"linear": 8, "null": 4, "nonlinear": 3, "pair": 2, "unknown": 3}
 FIRST_SEEDS = {
-    "linear": 136_000_000, "null": 137_000_000, "nonlinear": 138_000_000, "pair": 139_000_000, "unknown": 140_000_000,
+    "linear": 161_000_000, "null": 162_000_000, "nonlinear": 163_000_000, "pair": 164_000_000, "unknown": 165_000_000,
 }  # fmt: skip
 ORDER_SEED = 60  # of the order in which the effects of a group take turns
 
