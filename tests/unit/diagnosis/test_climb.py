@@ -1,5 +1,7 @@
 """Steps from a cause to its neighbours and to what looks like it, alone and in pairs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,20 @@ def climbed(bench, base, fit):
     fits = {fit.hypothesis.causes[-1].key: fit}
     climb.climb_all(bench, base, fits)
     return likeliest(fits.values())
+
+
+@pytest.mark.parametrize(("times", "is_settled"), [(3.0, True), (30.0, False)])
+def test_a_fit_beside_the_best_that_was_given_up_is_gone_on_with(nominal, times, is_settled):
+    bench = bench_with(nominal, ("local_damper",), [("local_damper", 12)], [20.0])
+    base = fit_nothing(bench)
+    near = bench.go_on(bench.fit((cause_at(bench, "local_damper", 11),), np.array([20.0])))
+    true = bench.fit((cause_at(bench, "local_damper", 12),), np.array([20.0]))
+    assert true.log_evidence > near.log_evidence
+    on_its_way = replace(true, converged=False, misfit=2 * times * near.cost, log_evidence=near.log_evidence - 100)
+    fits = {fit.hypothesis.causes[-1].key: fit for fit in (near, on_its_way)}
+    climb._climb(bench, base, near, fits)
+    assert fits[true.hypothesis.causes[-1].key].converged == is_settled
+    assert (likeliest(fits.values()).hypothesis.causes[-1].place.location == {"nodes": [12]}) == is_settled
 
 
 def test_a_spring_whose_other_end_hardly_moves_is_tried_as_a_support(nominal):

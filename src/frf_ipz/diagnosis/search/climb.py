@@ -26,6 +26,7 @@ Fits: TypeAlias = dict[tuple[object, ...], Fit]
 CLIMBED = 6  # effects whose neighbours are looked at
 HOPELESS, BEHIND = 2000.0, 300.0  # nats behind the best, and behind one that explains all: not looked at any more
 WANTED = 2.0  # times the cost of one that explains all: a fit on its way there may have reached that much
+UNSETTLED = 4.0  # times the cost of the best place: a fit beside it that has not converged may yet fall below that
 GAIN = 0.5  # nats: a neighbour must be better by that
 MOST_STEPS = 12
 MOST_STARTS = 64  # of an effect that looks like another one
@@ -102,12 +103,24 @@ def are_alike(one: Effect, other: Effect) -> bool:
 def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
     for _ in range(MOST_STEPS):
         cause = fit.hypothesis.causes[-1]
-        better = _best_of(bench, base, fit, cause.effect.neighbours(bench.specimen, cause.place), fits)
+        beside = cause.effect.neighbours(bench.specimen, cause.place)
+        better = _best_of(bench, base, fit, beside, fits)
+        if better is fit:
+            _settle(bench, fit, beside, fits)
+            better = _best_of(bench, base, fit, beside, fits)
         if better is fit and fit.is_nearly_right:
             better = _best_of(bench, base, fit, _promising_around(bench, fit), fits)
         if better is fit:
             return
         fit = better
+
+
+def _settle(bench: Bench, fit: Fit, places: Sequence[Place], fits: Fits) -> None:
+    """Go on with fits beside the best place that were given up on their way: small steps may lead far down."""
+    cause = fit.hypothesis.causes[-1]
+    for key in (replace(cause, place=place).key for place in places):
+        if not fits[key].converged and fits[key].cost < UNSETTLED * fit.cost + BEHIND:
+            fits[key] = bench.go_on(fits[key])
 
 
 def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
