@@ -249,7 +249,7 @@ def test_a_law_that_explains_all_but_little_of_the_first_moments_is_believed(
     short = SimpleNamespace(
         stretches=SimpleNamespace(moving=moving),
         linear=SimpleNamespace(cost=1e4, freedom=None),
-        shoot_afresh=lambda *_: SimpleNamespace(cost=left, n_rows=300, misfit=None),
+        shoot_afresh=lambda *_: SimpleNamespace(cost=left, n_rows=300, misfit=None, numbers={"cubic": (1.0, 1e-4)}),
     )
     monkeypatch.setattr(search, "agreement_with", lambda *_: Agreement(1e4, disagree))
     monkeypatch.setattr(search, "relative_misfit", lambda *_: 0.03)
