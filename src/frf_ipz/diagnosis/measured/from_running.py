@@ -18,9 +18,7 @@ from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.signals.transients import pieces_without_transients
 
 MOST_LINES = 2**16  # in the band
-FINEST = (
-    8  # lines for one of the record: of a mode a quarter of a line wide, 5 leave 3 % of its peak out, 8 half a per cent
-)
+FINEST = 8  # lines for one of the record: off the axis 5 miss 3 % of a peak a quarter of a line wide, these 0.7 %
 AROUND = 2  # lines of the record over which scatter is averaged
 KNOWN = 8.0  # what the stated variance of a line counts against its scatter, in degrees of freedom
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
 WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
-TOLD = 3.0  # standard deviations of a number from zero: laws that were there had 9 and more, others 2 and less
+TOLD = 3.0  # standard deviations from zero: laws that were there had 9 and more, two that explained without being 2
 MOST_PLACES = 12
 LISTED = 0.95
 
