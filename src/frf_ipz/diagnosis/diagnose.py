@@ -233,7 +233,7 @@ def _nonlinear(
     if not bench.effects:
         beside = None
     elif laws.verdict == UNEXPLAINED:
-        beside = search_beside_linear(bench, decision, model, observations, laws_of)
+        beside = search_beside_linear(bench, decision, laws, model, observations, laws_of)
     else:
         beside = search_beside_law(bench_of, laws, model, observations, laws_of)
     if beside is not None:

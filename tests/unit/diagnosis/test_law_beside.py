@@ -1,5 +1,6 @@
 """A law beside a linear cause, which goes into the model or out of the recordings before the law is sought."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,20 +32,25 @@ def nominal(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("beam"))
 
 
+def a_law(verdict, strain=0.0):
+    return SimpleNamespace(verdict=verdict, strain=strain, fit=object())
+
+
 class Laws:
     """Stands for the search for a law, and remembers what it was given."""
 
-    def __init__(self, verdict):
-        self.verdict, self.given = verdict, []
+    def __init__(self, verdict, strain=0.0):
+        self.law, self.given = a_law(verdict, strain), []
 
     def __call__(self, model, observations):
         self.given.append((model, observations))
-        return SimpleNamespace(verdict=self.verdict)
+        return self.law
 
 
-def beside(model, frfs, names, laws):
+def beside(model, frfs, names, laws, *, alone=0.0, linear=only_null):
+    """Search; without a linear cause a law strains the model by `alone`."""
     bench = bench_of(model, frfs, names)
-    return search_beside_linear(bench, only_null(bench), model, observed(frfs), laws)
+    return search_beside_linear(bench, linear(bench), a_law("unexplained", alone), model, observed(frfs), laws)
 
 
 def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
@@ -64,6 +70,30 @@ def test_without_a_law_nothing_is_named(nominal):
     laws = Laws("unexplained")
     assert beside(nominal, frfs, ("added_mass",), laws) is None
     assert len(laws.given) == 1
+
+
+@pytest.mark.parametrize(("alone", "with_it", "said"), [(50.0, 5.0, True), (50.0, 40.0, False), (5.0, 1.0, False)])
+def test_a_cause_that_relieves_a_strained_model_is_named_beside_a_law_that_does_not_explain(
+    nominal, alone, with_it, said
+):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    found = beside(nominal, frfs, ("added_mass",), Laws("unexplained", with_it), alone=alone)
+    assert (found is not None) == said
+    if said:
+        assert found[0].verdict == "unexplained"
+        assert found[1].effect == "added_mass"
+
+
+def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):
+    """The misfit falls to a half only, but the pull of the tolerances from ten times as much to none."""
+
+    def strained(bench):
+        nothing = only_null(bench)
+        size = float(nothing.null.n_values)
+        return replace(nothing, null=replace(nothing.null, misfit=2 * size, pull=10 * size))
+
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    assert beside(nominal, frfs, ("added_mass",), Laws("explained"), linear=strained) is not None
 
 
 def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.structure import StructuralModel
 
-MOST_LEFT = 1 / 3  # of the linear misfit: a law's own traces are not explained so well by one linear cause
+MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
 STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
 EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
 
@@ -33,6 +33,7 @@ EASED = 0.5  # times the strain: what a linear cause beside a law must come down
 def search_beside_linear(
     bench: Bench,
     linear: Decision,
+    alone: LawSearch,
     model: StructuralModel,
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
@@ -45,6 +46,8 @@ def search_beside_linear(
         Data, model and linear effects.
     linear : Decision
         What a linear search came to; where none was made, it is made here.
+    alone : LawSearch
+        What the search for a law with the nominal model came to.
     model : StructuralModel
         The nominal model.
     observations : Observations
@@ -55,18 +58,19 @@ def search_beside_linear(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear cause; None where no linear cause explains most of the misfit, or no law the rest.
+        The law and the linear cause; None where no linear cause explains most of the misfit, or no law the rest. A law
+        that does not explain it is given where the cause relieves the nominal model of what it was strained by.
     """
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search(bench, null)
     best = ranking.best
-    if best is null or best.misfit > MOST_LEFT * null.misfit or not is_significant(best, -1):
+    if best is null or best.cost > MOST_LEFT * null.cost or not is_significant(best, -1):
         return None
     if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), restore(observations, change))
-    if laws.verdict != EXPLAINED:
+    if laws.verdict != EXPLAINED and not _relieves(laws, alone):
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
@@ -111,7 +115,12 @@ def search_beside_law(
         return None
     change = best.hypothesis.change(best.values)
     again = search_laws(with_change(model, change), restore(observations, change))
-    if again.verdict != EXPLAINED or again.strain > EASED * laws.strain:
+    if again.verdict != EXPLAINED or not _relieves(again, laws):
         return None
     scale = max(1.0, best.mean_misfit)
     return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+
+
+def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
+    """Say whether a law strains the nominal model, and much less so beside a linear cause."""
+    return beside.fit is not None and alone.strain >= STRAINED and beside.strain <= EASED * alone.strain

@@ -184,6 +184,13 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
     assert len(fits) == 4  # each place once
 
 
+def test_fits_that_come_close_to_the_best_are_settled_before_they_are_compared():
+    """Further steps take 20 off; the second one is 10 from the best, the third 50."""
+    fits = [a_fit(100.0, settled=True), a_fit(110.0, settled=False), a_fit(150.0, settled=False)]
+    candidates._settle_ties(SimpleNamespace(shoot=lambda fit, _: a_fit(fit.cost - 20, settled=True)), fits)
+    assert [fit.cost for fit in fits] == [100.0, 90.0, 150.0]
+
+
 @pytest.mark.parametrize(("settled", "beside"), [(0.5, True), (0.999, False)])
 def test_places_beside_are_fitted_again_if_the_numbers_moved(monkeypatch, settled, beside):
     asked = []
@@ -202,7 +209,8 @@ def test_blows_that_were_compared_already_are_not_compared_again(monkeypatch):
 
 
 def a_law_at(place, cost):
-    return SimpleNamespace(law=SimpleNamespace(name="cubic"), place=place, cost=cost, n_rows=100, strength=1.0)
+    law = SimpleNamespace(name="cubic")
+    return SimpleNamespace(law=law, place=place, cost=cost, n_rows=100, strength=1.0, settled=True)
 
 
 @pytest.mark.parametrize(

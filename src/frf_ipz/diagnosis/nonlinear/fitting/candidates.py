@@ -42,6 +42,7 @@ LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighb
 CLIMBS = 8  # steps to better neighbours
 EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
 EXCHANGES = 3  # times that this may lead to a better place
+TIED = 20.0  # of the cost: fits that close to the best must be settled before they are compared
 ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it settles, and steps of a fresh one
 
 
@@ -163,6 +164,7 @@ def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
                 break
             _settle(track, fits)
             has_moved = True
+        _settle_ties(track, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
 
@@ -224,6 +226,14 @@ def _settle(track: Track, fits: list[LawFit]) -> None:
         else:  # what is strongly nonlinear has other minima, in which starts of stretches are taken for the law
             again, is_fresh = track.shoot_afresh(fit, FRESH), True
             fits[best] = min(fit, again, key=lambda one: one.cost)
+
+
+def _settle_ties(track: Track, fits: list[LawFit]) -> None:
+    """Fit further what comes so close to the best fit that where it was given up might decide between the two."""
+    least = min(fit.cost for fit in fits)
+    for number, fit in enumerate(fits):
+        if not fit.settled and fit.cost < least + TIED:
+            fits[number] = min(fit, track.shoot(fit, MORE), key=lambda one: one.cost)
 
 
 def _exchange(track: Track, fits: list[LawFit], *, beside: bool) -> bool:
