@@ -72,7 +72,9 @@ def test_without_a_law_nothing_is_named(nominal):
     assert len(laws.given) == 1
 
 
-@pytest.mark.parametrize(("alone", "with_it", "said"), [(50.0, 5.0, True), (50.0, 40.0, False), (5.0, 1.0, False)])
+@pytest.mark.parametrize(
+    ("alone", "with_it", "said"), [(50.0, 5.0, True), (50.0, 12.0, False), (12.0, 7.0, False), (5.0, 1.0, False)]
+)
 def test_a_cause_that_relieves_a_strained_model_is_named_beside_a_law_that_does_not_explain(
     nominal, alone, with_it, said
 ):

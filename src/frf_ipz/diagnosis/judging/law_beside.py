@@ -70,7 +70,7 @@ def search_beside_linear(
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), restore(observations, change))
-    if laws.verdict != EXPLAINED and not _relieves(laws, alone):
+    if laws.verdict != EXPLAINED and not (_relieves(laws, alone) and laws.strain < STRAINED):
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
