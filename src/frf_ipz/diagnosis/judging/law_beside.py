@@ -70,7 +70,8 @@ def search_beside_linear(
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), restore(observations, change))
-    if laws.verdict != EXPLAINED and not (_relieves(laws, alone) and laws.strain < STRAINED):
+    is_relieved = laws.fit is not None and laws.strain < STRAINED and _relieves(laws, alone)
+    if laws.verdict != EXPLAINED and not is_relieved:
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
@@ -123,4 +124,4 @@ def search_beside_law(
 
 def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
     """Say whether a law strains the nominal model, and much less so beside a linear cause."""
-    return beside.fit is not None and alone.strain >= STRAINED and beside.strain <= EASED * alone.strain
+    return alone.strain >= STRAINED and beside.strain <= EASED * alone.strain

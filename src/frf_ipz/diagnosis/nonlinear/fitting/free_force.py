@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
 from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.plant import respond
@@ -107,7 +107,7 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
         reach = response.to_sensors(place)[:, used] * weight
         across = as_real(_across(reach, np.concatenate([columns, misfit[None]])))
         rows, left = across[:-1], across[-1]
-        step = linalg.solve(rows @ rows.T + np.eye(len(rows)), rows @ left - unknowns, assume_a="pos")
+        step = solve_even(rows @ rows.T + np.eye(len(rows)), rows @ left - unknowns)
         unknowns = unknowns + step
         left = left - step @ rows
         force = -_along(reach, misfit - np.tensordot(step, columns, 1))

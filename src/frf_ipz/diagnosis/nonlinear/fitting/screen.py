@@ -15,6 +15,7 @@ from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, no_deviations, respond
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ def _settled_cost(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) 
         best = cost
         columns = as_real(freedom.columns(stretches, response.on(used), nothing, None, unknowns))
         normal = columns @ columns.T + np.eye(len(columns))
-        unknowns = unknowns + linalg.solve(normal, columns @ misfit - unknowns, assume_a="pos")
+        unknowns = unknowns + solve_even(normal, columns @ misfit - unknowns)
     return best
 
 
