@@ -31,6 +31,7 @@ DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e
 BEFORE = 2  # samples before the pulse
 UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
 LEAST_RECORDS = 2
+LEAST_COLUMN = 1e-200  # norm of a column: nothing moves
 REACH = 2.0  # lines: so far a tone is seen beside its own
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
 
@@ -161,7 +162,9 @@ def _left_by(poles: int, force: ComplexArray, motion: ComplexArray, energies: Fl
     least = np.inf
     for _ in range(ROUNDS):
         weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
-        found, *_ = np.linalg.lstsq(columns * weight[:, None], motion.ravel() * weight, rcond=1e-12)
+        weighted = columns * weight[:, None]
+        sizes = np.maximum(np.linalg.norm(weighted, axis=0), LEAST_COLUMN)  # motions are far smaller than forces
+        found = np.linalg.lstsq(weighted / sizes, motion.ravel() * weight, rcond=1e-12)[0] / sizes
         denominator = 1 + below @ found[:poles]
         frf = (above @ found[poles : poles + ZEROS + 1]) / denominator
         left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator

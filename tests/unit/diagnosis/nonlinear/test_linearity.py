@@ -63,6 +63,16 @@ def test_a_local_quotient_does_not_follow_loud_noise():
     assert max(misfits) < 1.6  # of 1 that is expected: 66 squared moduli, the worst of many groups
 
 
+@pytest.mark.parametrize("compliance", [1.0, 1e-13])
+def test_a_resonance_of_a_stiff_machine_agrees_as_one_of_a_soft_machine_does(compliance):
+    """A mode of a third of the group's width, motions in metres for forces in newtons."""
+    rng = np.random.default_rng(7)
+    force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
+    motion = compliance * force / (1j * (ACROSS - 0.1) + 0.3)
+    noise = (1e-4 * compliance) ** 2
+    assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, noise)])) < 1.0
+
+
 def decayed(blow):
     """(n_samples,) window that makes a response die out within its record."""
     return np.exp(-4.0 * blow.step_s * np.arange(blow.n_samples))
