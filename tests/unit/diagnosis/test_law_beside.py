@@ -86,6 +86,14 @@ def test_a_cause_that_relieves_a_strained_model_is_named_beside_a_law_that_does_
         assert found[1].effect == "added_mass"
 
 
+def test_blows_that_agree_beside_a_linear_cause_are_no_law(nominal):
+    laws = Laws("linear")
+    laws.law.fit = None
+    assert (
+        beside(nominal, measured(with_point_masses(nominal, {12: MASS_KG})), ("added_mass",), laws, alone=50.0) is None
+    )
+
+
 def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):
     """The misfit falls to a half only, but the pull of the tolerances from ten times as much to none."""
 

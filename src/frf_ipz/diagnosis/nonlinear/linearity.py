@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import LEAST_COLUMN
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e
 BEFORE = 2  # samples before the pulse
 UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
 LEAST_RECORDS = 2
-LEAST_COLUMN = 1e-200  # norm of a column: nothing moves
 REACH = 2.0  # lines: so far a tone is seen beside its own
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
 

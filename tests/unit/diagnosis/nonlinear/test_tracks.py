@@ -184,11 +184,18 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
     assert len(fits) == 4  # each place once
 
 
-def test_fits_that_come_close_to_the_best_are_settled_before_they_are_compared():
+def test_fits_that_come_close_to_the_best_are_settled_before_they_are_compared(monkeypatch):
     """Further steps take 20 off; the second one is 10 from the best, the third 50."""
     fits = [a_fit(100.0, settled=True), a_fit(110.0, settled=False), a_fit(150.0, settled=False)]
-    candidates._settle_ties(SimpleNamespace(shoot=lambda fit, _: a_fit(fit.cost - 20, settled=True)), fits)
-    assert [fit.cost for fit in fits] == [100.0, 90.0, 150.0]
+    monkeypatch.setattr(candidates, "_different", list)
+    monkeypatch.setattr(candidates, "_simulated", lambda _, fits, **__: list(fits))
+    monkeypatch.setattr(candidates, "_climb", lambda *_: None)
+    monkeypatch.setattr(candidates, "_exchange", lambda *_, **__: False)
+    track = SimpleNamespace(
+        shoot=lambda fit, _: a_fit(fit.cost - 20, settled=True),
+        shoot_afresh=lambda fit, _: a_fit(fit.cost, settled=True),
+    )
+    assert [fit.cost for fit in candidates._finished(track, fits)] == [90.0, 100.0, 150.0]
 
 
 @pytest.mark.parametrize(("settled", "beside"), [(0.5, True), (0.999, False)])
