@@ -13,6 +13,7 @@ from frf_ipz.diagnosis.observations import Blow
 
 LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
 ABOVE_NOISE = 6.0  # standard deviations
+LEAST_QUIET = 4  # samples that say anything of the noise
 RINGING = 25  # samples before and after the pulse that are kept whole: a converter's filter rings
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
 QUIET = 200  # samples after the pulse that are left out when the force's noise is read
@@ -50,7 +51,8 @@ def isolate_pulse(blow: Blow) -> Pulse:
     """
     size = np.abs(blow.force)
     top = int(np.argmax(size))
-    noise = float(np.std(blow.force[: max(top // 2, 1)])) if top > 8 else 0.0
+    quiet = np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]])
+    noise = float(np.std(quiet)) if len(quiet) > LEAST_QUIET else 0.0
     above = np.flatnonzero(size > max(ABOVE_NOISE * noise, LEAST_PART * size[top]))
     sample = np.arange(blow.n_samples)
     outside = np.maximum(int(above[0]) - RINGING - sample, sample - int(above[-1]) - RINGING)
