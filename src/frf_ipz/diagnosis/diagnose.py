@@ -230,11 +230,10 @@ def _nonlinear(
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
 ) -> Diagnosis:
     """Look for a linear cause beside a law, where that strains the model or none explains by itself."""
-    if not bench.effects:
-        beside = None
-    elif laws.verdict == UNEXPLAINED:
+    beside = None
+    if bench.effects and laws.verdict == UNEXPLAINED:
         beside = search_beside_linear(bench, decision, laws, model, observations, laws_of)
-    else:
+    if bench.effects and beside is None:
         beside = search_beside_law(bench_of, laws, model, observations, laws_of)
     if beside is not None:
         law, cause = beside

@@ -1,6 +1,7 @@
 """A nonlinear law beside a linear cause: the one is taken out of the recordings, and the other is searched for.
 
-The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model.
+The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model,
+or where that led to nothing.
 """
 
 from __future__ import annotations
@@ -64,14 +65,15 @@ def search_beside_linear(
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search(bench, null)
     best = ranking.best
-    if best is null or best.cost > MOST_LEFT * null.cost or not is_significant(best, -1):
+    is_most = best.cost <= MOST_LEFT * null.cost
+    if best is null or not (is_most or alone.strain >= STRAINED) or not is_significant(best, -1):
         return None
     if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), restore(observations, change))
     is_relieved = laws.fit is not None and laws.strain < STRAINED and _relieves(laws, alone)
-    if laws.verdict != EXPLAINED and not is_relieved:
+    if not (is_most or is_relieved) or not (laws.verdict == EXPLAINED or (is_most and is_relieved)):
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
@@ -84,7 +86,7 @@ def search_beside_law(
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
 ) -> tuple[LawSearch, Finding] | None:
-    """Search for a linear cause beside a law that explains.
+    """Search for a linear cause beside a law that strains the nominal model, whether it explains by itself or not.
 
     Parameters
     ----------
