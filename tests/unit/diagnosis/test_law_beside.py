@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import beam, bench_of, measured, observed
+from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.judging.decision import only_null
 from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
@@ -15,6 +16,7 @@ from frf_ipz.diagnosis.measured.restored import restore
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.diagnosis.search.search import search
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.quantities import FrfQuantity
@@ -92,6 +94,64 @@ def test_blows_that_agree_beside_a_linear_cause_are_no_law(nominal):
     assert (
         beside(nominal, measured(with_point_masses(nominal, {12: MASS_KG})), ("added_mass",), laws, alone=50.0) is None
     )
+
+
+@pytest.mark.parametrize(
+    ("alone", "verdict", "with_it", "said"),
+    [(50.0, "explained", 1.0, True), (50.0, "explained", 40.0, False), (50.0, "unexplained", 1.0, False)],
+)
+def test_a_cause_that_leaves_half_is_named_where_beside_it_a_law_explains_and_strains_nothing(
+    nominal, alone, verdict, with_it, said
+):
+    def halved(bench):
+        nothing = only_null(bench)
+        ranking = search(bench, nothing.null)
+        null = replace(nothing.null, misfit=2 * ranking.best.cost, pull=0.0)
+        return replace(nothing, null=null, ranking=ranking)
+
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    laws = Laws(verdict, with_it)
+    assert (beside(nominal, frfs, ("added_mass",), laws, alone=alone, linear=halved) is not None) == said
+    assert len(laws.given) == 1
+
+
+def test_a_cause_that_leaves_half_is_not_looked_at_beside_a_law_that_strains_nothing(nominal):
+    def halved(bench):
+        nothing = only_null(bench)
+        best = search(bench, nothing.null).best
+        return replace(nothing, null=replace(nothing.null, misfit=2 * best.cost, pull=0.0))
+
+    laws = Laws("explained", 1.0)
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    assert beside(nominal, frfs, ("added_mass",), laws, alone=5.0, linear=halved) is None
+    assert laws.given == []
+
+
+@pytest.mark.parametrize(
+    ("verdict", "linear_first", "asked"),
+    [("unexplained", False, ["linear", "law"]), ("unexplained", True, ["linear"]), ("explained", False, ["law"])],
+)
+def test_a_cause_is_looked_for_beside_the_law_where_the_other_way_led_to_nothing(
+    monkeypatch, verdict, linear_first, asked
+):
+    seen, nothing = [], SimpleNamespace(findings=(), statement="")
+    cause = SimpleNamespace(log_evidence_gain=1.0, statement="")
+
+    def first(*_):
+        seen.append("linear")
+        return (nothing, cause) if linear_first else None
+
+    replaced = {
+        "search_beside_linear": first,
+        "search_beside_law": lambda *_: seen.append("law"),
+        "_with_law": lambda *_: nothing,
+        "replace": lambda found, **_: found,
+    }
+    for name, stub in replaced.items():
+        monkeypatch.setattr(diagnose, name, stub)
+    bench = SimpleNamespace(effects={"added_mass": None})
+    diagnose._nonlinear(nothing, bench, None, None, None, None, SimpleNamespace(verdict=verdict), None)
+    assert seen == asked
 
 
 def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):

@@ -141,7 +141,8 @@ def mass_matrices(elements: BeamElements) -> FloatArray:
     order its work is h^2 / 12 times the integral of (z rho A w)^2 / (kappa G A) plus that of
     (z rho I theta)^2 Phi / (E I (1 + Phi)). The mode's own balance, z rho A w = -V' and z rho I theta = -(M' + V), and
     integration by parts over the beam turn one z of each into strains: w' gamma, and theta'^2 and theta gamma. At
-    supports the terms at the ends vanish. Without shear nothing is added.
+    supports the terms at the ends vanish. Without shear nothing is added. Modal masses, of which the bubble is twice
+    that part, stay of the second order.
 
     Parameters
     ----------
