@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
 STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
+FOLLOWED = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
 EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
 
 
@@ -108,6 +109,8 @@ def search_beside_law(
     """
     if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
         return None
+    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
+        return None  # what such a law leaves is no linear system
     bench = bench_of(without_law(observations, laws.freedom, laws.fit))
     null = fit_nothing(bench)
     ranking = search(bench, null)

@@ -142,11 +142,18 @@ def test_a_law_alone_does_not_strain_the_model(solved):
 
 
 @pytest.mark.parametrize(
-    ("strain", "again", "doubt", "both"),
-    [(50.0, 2.0, "", True), (50.0, 40.0, "", False), (5.0, 0.1, "", False), (50.0, 2.0, "hardly swings", False)],
+    ("strain", "alone", "again", "doubt", "both"),
+    [
+        (50.0, ("explained", 2.0), 2.0, "", True),
+        (50.0, ("unexplained", 0.5), 2.0, "", True),
+        (50.0, ("unexplained", 2.0), 2.0, "", False),
+        (50.0, ("explained", 2.0), 40.0, "", False),
+        (5.0, ("explained", 2.0), 0.1, "", False),
+        (50.0, ("explained", 2.0), 2.0, "hardly swings", False),
+    ],
 )
-def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, again, doubt, both):
-    """A cause that is what it looks like gains 1000 nats on the recordings without the law."""
+def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, alone, again, doubt, both):
+    """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
     hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,))
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
@@ -161,7 +168,9 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strai
     }
     for name, stub in replaced.items():
         monkeypatch.setattr(law_beside, name, stub)
-    laws = SimpleNamespace(strain=strain, fit="fit", freedom=SimpleNamespace(moving=()))
+    verdict, left = alone
+    after = SimpleNamespace(training_noise=left)
+    laws = SimpleNamespace(strain=strain, verdict=verdict, after=after, fit="fit", freedom=SimpleNamespace(moving=()))
     eased = SimpleNamespace(verdict="explained", strain=again)
     bench = SimpleNamespace(kind="hammer")
     found = law_beside.search_beside_law(lambda _: bench, laws, "model", "measured", lambda *_: eased)
