@@ -241,6 +241,8 @@ class _Window:
 def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     """Fit damped sinusoids, whose amplitudes are those in the middle of the window."""
     time = np.asarray(step_s * (np.arange(len(signal)) - (len(signal) - 1) / 2), float)
+    size = max(float(np.abs(signal).max()), np.finfo(float).tiny)
+    signal = signal / size  # in m rounding would cut columns off
     for _ in range(STEPS):
         columns, found = _amplitudes(signal, time, poles)
         slopes = _slopes(time, poles, found)
@@ -258,8 +260,8 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     covariance = variance * np.linalg.pinv(all_columns.T @ all_columns, hermitian=True)
     return _Window(
         poles=poles,
-        amplitude=np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
-        amplitude_std=float(np.sqrt(2 * variance / len(signal))),
+        amplitude=size * np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
+        amplitude_std=size * float(np.sqrt(2 * variance / len(signal))),
         covariance=covariance[columns.shape[1] :, columns.shape[1] :],
         misfit=float(np.sqrt(variance) / max(signal.std(), 1e-300)),
     )

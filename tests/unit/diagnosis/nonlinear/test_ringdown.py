@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from frf_ipz.diagnosis.nonlinear.ringdown import fit_amplitude_law, name_family, track_ringdown
@@ -31,19 +32,29 @@ def laws_of(force):
     return fit_amplitude_law(tracks, "frequency_hz"), fit_amplitude_law(tracks, "damping_ratio")
 
 
-def test_two_linear_modes_keep_their_poles():
+def two_modes():
     time = np.arange(2000) / 500.0
     signal = np.zeros(2000)
     for hz, ratio, size in ((12.0, 0.004, 1.0), (31.0, 0.002, 0.3)):
         omega = 2 * np.pi * hz
         signal += size * np.exp(-ratio * omega * time) * np.cos(omega * np.sqrt(1 - ratio**2) * time + size)
-    signal += 1e-3 * np.random.default_rng(3).standard_normal(2000)
-    tracks = track_ringdown(signal, 1 / 500.0, [12.1, 30.8], 0.5)
+    return signal + 1e-3 * np.random.default_rng(3).standard_normal(2000)
+
+
+def test_two_linear_modes_keep_their_poles():
+    tracks = track_ringdown(two_modes(), 1 / 500.0, [12.1, 30.8], 0.5)
     for track, hz, ratio in zip(tracks, (12.0, 31.0), (0.004, 0.002), strict=True):
         assert len(track.time_s) > 8
         assert np.all(np.abs(track.frequency_hz - hz) < SIGMAS * track.frequency_std_hz)
         assert np.all(np.abs(track.damping_ratio - ratio) < SIGMAS * track.damping_ratio_std)
         assert track.frequency_std_hz.max() < 0.02
+
+
+def test_deviations_do_not_depend_on_the_unit():
+    (in_m, _), (in_nm, _) = (track_ringdown(unit * two_modes(), 1 / 500.0, [12.1, 30.8], 0.5) for unit in (1.0, 1e-9))
+    assert_allclose(in_nm.frequency_std_hz, in_m.frequency_std_hz, rtol=1e-6)
+    assert_allclose(in_nm.damping_ratio_std, in_m.damping_ratio_std, rtol=1e-6)
+    assert_allclose(in_nm.amplitude, 1e-9 * in_m.amplitude, rtol=1e-6)
 
 
 def test_a_cubic_spring_raises_the_frequency_with_the_square_of_the_amplitude():
