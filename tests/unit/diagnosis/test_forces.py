@@ -20,7 +20,7 @@ def blow(force):
         sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
         step_s=1e-3,
         force=force,
-        responses=np.zeros((1, SAMPLES)),
+        responses=np.zeros((1, len(force))),
     )
 
 
@@ -38,9 +38,25 @@ def test_noise_of_a_long_record_is_no_part_of_a_weak_blow():
     assert max(pulse.stop - pulse.start for pulse in pulses) <= longest
 
 
-@pytest.mark.parametrize("second", [60, 400])
+@pytest.mark.parametrize("second", [60, 400, 12_000, 19_000])
 def test_a_second_touch_is_kept(second):
     force = a_force(0, TOP, second)
     pulse = isolate_pulse(blow(force))
     np.testing.assert_array_equal(pulse.blow.force[TOP - 3 : second + PULSE + 3], force[TOP - 3 : second + PULSE + 3])
     assert np.abs(pulse.blow.force[second + PULSE + 2 * (RINGING + TAPER) :]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("samples", "starts"), [(1000, (100, 700)), (2000, (30, 1200, 1500))])
+def test_late_touches_of_short_records_are_no_noise(samples, starts):
+    force = 0.01 * np.random.default_rng(1).standard_normal(SAMPLES)[:samples]
+    for part, start in zip((1.0, 0.8, 0.12), starts, strict=False):
+        force[start : start + 20] += 100.0 * part * np.sin(np.pi * (np.arange(20) + 0.5) / 20)
+    kept = isolate_pulse(blow(force)).blow.force
+    np.testing.assert_array_equal(kept[starts[0] : starts[-1] + 20], force[starts[0] : starts[-1] + 20])
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5])
+def test_a_blow_that_noise_hides_is_kept_where_it_is_largest(level):
+    force = level * a_force(3)
+    top = int(np.argmax(np.abs(force)))
+    assert isolate_pulse(blow(force)).blow.force[top] == force[top]

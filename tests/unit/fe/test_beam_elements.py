@@ -140,3 +140,18 @@ def test_geometric_stiffness_of_euler_bernoulli_is_the_textbook_one():
 def test_shear_coefficient_of_a_rectangle():
     assert_allclose(shear_coefficient(0.0), 10 / 12, rtol=ROUNDING)
     assert_allclose(shear_coefficient(0.3), 13 / 15.3, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("thickness", [0.01, 0.3, 1.0, 4.0, 30.0])
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.3, 0.5])
+def test_mass_of_isotropic_beams_is_positive_however_thick(thickness, poisson_ratio):
+    """Thickness over the length of the element; E, rho and the width are 1."""
+    ratio = 2 * (1 + poisson_ratio) / shear_coefficient(poisson_ratio)
+    element = BeamElements(
+        length=np.ones(1),
+        bending_stiffness=np.array([thickness**3 / 12]),
+        shear_parameter=np.array([ratio * thickness**2]),
+        mass_per_length=np.array([thickness]),
+        rotary_inertia_per_length=np.array([thickness**3 / 12]),
+    )
+    assert np.linalg.eigvalsh(mass_matrices(element)[0]).min() > 0

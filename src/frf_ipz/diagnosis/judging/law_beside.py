@@ -1,7 +1,7 @@
 """A nonlinear law beside a linear cause: the one is taken out of the recordings, and the other is searched for.
 
 The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model,
-or where that led to nothing.
+or where the linear cause first led to nothing and the law follows the recordings all the same.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def search_beside_linear(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear cause; None where no linear cause explains most of the misfit, or no law the rest. A law
-        that does not explain it is given where the cause relieves the nominal model of what it was strained by.
+        The law and the linear cause, where two of three hold: the cause explains most of the misfit, the law the rest,
+        and beside the cause the law no longer strains the nominal model. None where less holds.
     """
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search(bench, null)
@@ -74,7 +74,7 @@ def search_beside_linear(
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), restore(observations, change))
     is_relieved = laws.fit is not None and laws.strain < STRAINED and _relieves(laws, alone)
-    if not (is_most or is_relieved) or not (laws.verdict == EXPLAINED or (is_most and is_relieved)):
+    if sum((is_most, laws.verdict == EXPLAINED, is_relieved)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
@@ -105,11 +105,13 @@ def search_beside_law(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear cause; None where the law does not strain the model, or no cause relieves it.
+        The law and the linear cause, which both explain; None where the law did not strain the model, where it did not
+        even follow the recordings, or where no cause relieves the model.
     """
     if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
         return None
-    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
+    explains = laws.verdict == EXPLAINED
+    if not explains and (laws.after is None or laws.after.training_noise > FOLLOWED):
         return None  # what such a law leaves is no linear system
     bench = bench_of(without_law(observations, laws.freedom, laws.fit))
     null = fit_nothing(bench)
@@ -117,11 +119,12 @@ def search_beside_law(
     best = ranking.best
     if best is null or gain_over(best, null) < LIMITS[bench.kind].found_nats or not is_significant(best, -1):
         return None
-    if any(best.hypothesis.doubts(best.values)):
+    follows_traces = best.hypothesis.causes[-1].effect.has_dynamics
+    if any(best.hypothesis.doubts(best.values)) or (follows_traces and not explains):
         return None
     change = best.hypothesis.change(best.values)
     again = search_laws(with_change(model, change), restore(observations, change))
-    if again.verdict != EXPLAINED or not _relieves(again, laws):
+    if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.strain < STRAINED):
         return None
     scale = max(1.0, best.mean_misfit)
     return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)

@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.observations import Blow
 
 LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
 ABOVE_NOISE = 6.0  # standard deviations
-LEAST_QUIET = 4  # samples that say anything of the noise
+STRETCHES = 16  # of what is quiet: a second touch, which falls into few of them, is no noise
 RINGING = 25  # samples before and after the pulse that are kept whole: a converter's filter rings
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
 QUIET = 200  # samples after the pulse that are left out when the force's noise is read
@@ -51,14 +51,21 @@ def isolate_pulse(blow: Blow) -> Pulse:
     """
     size = np.abs(blow.force)
     top = int(np.argmax(size))
-    quiet = np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]])
-    noise = float(np.std(quiet)) if len(quiet) > LEAST_QUIET else 0.0
-    above = np.flatnonzero(size > max(ABOVE_NOISE * noise, LEAST_PART * size[top]))
+    noise = _noise_of(np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]]))
+    above = np.flatnonzero(size >= min(max(ABOVE_NOISE * noise, LEAST_PART * size[top]), size[top]))
     sample = np.arange(blow.n_samples)
     outside = np.maximum(int(above[0]) - RINGING - sample, sample - int(above[-1]) - RINGING)
     window = np.cos(np.pi / 2 * np.clip(outside / TAPER, 0, 1)) ** 2
     kept = np.flatnonzero(window > 0.5)
     return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+
+
+def _noise_of(quiet: FloatArray) -> float:
+    """Read the standard deviation that most stretches show."""
+    if not len(quiet):
+        return 0.0
+    squares = np.array_split((quiet - np.median(quiet)) ** 2, min(STRETCHES, len(quiet)))
+    return float(np.sqrt(np.median([stretch.mean() for stretch in squares])))
 
 
 def force_noise(blows: tuple[Blow, ...], pulses: tuple[Pulse, ...]) -> Noise:

@@ -218,7 +218,9 @@ def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[f
     pole = start
     middle, scale = s.mean(), np.ptp(s.imag)
     away = (s - middle) / scale
-    values = values / max(float(np.abs(values).max()), np.finfo(float).tiny)  # in m/N rounding would cut them off
+    values = values / max(
+        float(np.abs(values).max()), np.finfo(float).tiny
+    )  # in m/N their column would be lost beside the constant one
     deviation = 0.0
     for _ in range(ROUNDS):
         weight = 1 / np.abs(s - pole)

@@ -241,13 +241,11 @@ class _Window:
 def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     """Fit damped sinusoids, whose amplitudes are those in the middle of the window."""
     time = np.asarray(step_s * (np.arange(len(signal)) - (len(signal) - 1) / 2), float)
-    size = max(float(np.abs(signal).max()), np.finfo(float).tiny)
-    signal = signal / size  # in m rounding would cut columns off
     for _ in range(STEPS):
         columns, found = _amplitudes(signal, time, poles)
         slopes = _slopes(time, poles, found)
         left = signal - columns @ found
-        step = np.linalg.lstsq(np.hstack([columns, slopes]), left, rcond=1e-13)[0][columns.shape[1] :]
+        step = _even_solution(np.hstack([columns, slopes]), left)[columns.shape[1] :]
         change = step[: len(poles)] + 1j * step[len(poles) :]
         decay = np.clip(-(poles + change).real / np.abs(poles), SLOWEST, FASTEST) * np.abs(poles)
         poles = -decay + 1j * (poles + change).imag
@@ -257,11 +255,12 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     all_columns = np.hstack([columns, _slopes(time, poles, found)])
     left = signal - columns @ found
     variance = float(left @ left) / max(len(signal) - all_columns.shape[1], 1)
-    covariance = variance * np.linalg.pinv(all_columns.T @ all_columns, hermitian=True)
+    even, sizes = _even(all_columns)
+    covariance = variance * np.linalg.pinv(even.T @ even, hermitian=True) / np.outer(sizes, sizes)
     return _Window(
         poles=poles,
-        amplitude=size * np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
-        amplitude_std=size * float(np.sqrt(2 * variance / len(signal))),
+        amplitude=np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
+        amplitude_std=float(np.sqrt(2 * variance / len(signal))),
         covariance=covariance[columns.shape[1] :, columns.shape[1] :],
         misfit=float(np.sqrt(variance) / max(signal.std(), 1e-300)),
     )
@@ -271,8 +270,18 @@ def _amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tu
     """Columns of cosines, sines and a constant, and how much of each is in a signal."""
     turning = np.exp(np.outer(time, poles))
     columns = np.hstack([turning.real, turning.imag, np.ones((len(time), 1))])
-    found, *_ = np.linalg.lstsq(columns, signal, rcond=1e-13)
-    return columns, np.asarray(found)
+    return columns, _even_solution(columns, signal)
+
+
+def _even_solution(columns: FloatArray, signal: FloatArray) -> FloatArray:
+    even, sizes = _even(columns)
+    return np.asarray(np.linalg.lstsq(even, signal, rcond=1e-13)[0] / sizes)
+
+
+def _even(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns of norm one, and their norms: slopes by poles are as small as a unit or a weak mode makes them."""
+    sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    return columns / sizes, sizes
 
 
 def _slopes(time: FloatArray, poles: ComplexArray, found: FloatArray) -> FloatArray:

@@ -142,19 +142,25 @@ def test_a_law_alone_does_not_strain_the_model(solved):
 
 
 @pytest.mark.parametrize(
-    ("strain", "alone", "again", "doubt", "both"),
+    ("strain", "alone", "again", "doubt", "has_dynamics", "both"),
     [
-        (50.0, ("explained", 2.0), 2.0, "", True),
-        (50.0, ("unexplained", 0.5), 2.0, "", True),
-        (50.0, ("unexplained", 2.0), 2.0, "", False),
-        (50.0, ("explained", 2.0), 40.0, "", False),
-        (5.0, ("explained", 2.0), 0.1, "", False),
-        (50.0, ("explained", 2.0), 2.0, "hardly swings", False),
+        (50.0, ("explained", 2.0), 2.0, "", False, True),
+        (50.0, ("explained", 2.0), 20.0, "", True, True),
+        (50.0, ("unexplained", 0.5), 2.0, "", False, True),
+        (50.0, ("unexplained", 0.5), 20.0, "", False, False),
+        (50.0, ("unexplained", 0.5), 2.0, "", True, False),
+        (50.0, ("unexplained", 2.0), 2.0, "", False, False),
+        (50.0, ("explained", 2.0), 40.0, "", False, False),
+        (5.0, ("explained", 2.0), 0.1, "", False, False),
+        (50.0, ("explained", 2.0), 2.0, "hardly swings", False, False),
     ],
 )
-def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(monkeypatch, strain, alone, again, doubt, both):
+def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
+    monkeypatch, strain, alone, again, doubt, has_dynamics, both
+):
     """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
-    hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,))
+    cause = SimpleNamespace(effect=SimpleNamespace(has_dynamics=has_dynamics))
+    hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,), causes=(cause,))
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
         "without_law": lambda *_: "rest",
