@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
     from frf_ipz.structure import Matrix, StructuralModel
 
+LEAST_SQUARE = 0.01  # of the model's: a mode below the band is pulled wherever lines above it want, but stays stable
+
 
 def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     """Put what was fitted within tolerances into a model.
@@ -36,7 +38,7 @@ def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     Returns
     -------
     StructuralModel
-        With the fitted modes.
+        With the fitted modes; one below the band whose stiffness would be negative gets little of it.
     """
     values = unknown.copy()
     sizes = hypothesis.nuisance.sizes
@@ -48,7 +50,8 @@ def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
     back = linalg.inv(modes.rotation)
     mass = back.T @ back - np.eye(m)
-    stiffness = back.T @ np.diag(modes.squares[:m]) @ back - np.diag(modes.omega[:m] ** 2)
+    squares = np.maximum(modes.squares[:m], LEAST_SQUARE * modes.omega[:m] ** 2)
+    stiffness = back.T @ np.diag(squares) @ back - np.diag(modes.omega[:m] ** 2)
     return replace(
         model,
         mass_all=_with(model.mass_all, momentum, mass),
