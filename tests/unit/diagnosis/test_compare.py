@@ -9,9 +9,11 @@ import frf_ipz
 from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.comparing.learn import bench_of, learn, nominal_after
 from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
+from frf_ipz.diagnosis.comparing.nominal import LEAST_SQUARE, as_fitted
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import scaled_parts, with_point_masses
+from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import model_frfs
 
 FEW = frf_ipz.CompareOptions(
@@ -107,6 +109,18 @@ def test_the_corrected_model_has_the_measured_frfs(nominal, real):
     s = 2j * np.pi * np.linspace(*BAND_HZ, 300)
     wanted, got, plain = (model_frfs(model, labels(), s) for model in (real, corrected, nominal))
     assert np.linalg.norm(got - wanted) < 0.02 * np.linalg.norm(plain - wanted)
+
+
+def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
+    """Modes below the band are pulled wherever lines above them want."""
+    one = state(nominal, real, 1)
+    bench = bench_of(one, divide(one.observed), FEW.model)
+    unknown = np.zeros(bench.nuisance.size)
+    unknown[bench.nuisance.frequency_places[0]] = -1.1 / bench.nuisance.kappa_std[0, 0]
+    found = solve_modes(as_fitted(bench.suppose(()), unknown)).natural_frequency_hz
+    stated = solve_modes(nominal).natural_frequency_hz
+    assert found[0] == pytest.approx(np.sqrt(LEAST_SQUARE) * stated[0], rel=1e-6)
+    np.testing.assert_allclose(found[1:4], stated[1:4], rtol=1e-6)
 
 
 def test_a_node_cannot_lose_more_than_it_has(nominal):
