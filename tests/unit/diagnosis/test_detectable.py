@@ -1,0 +1,31 @@
+"""The evidence of an effect that no scatter explains."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.judging import detectable
+
+
+@pytest.mark.parametrize("size", [1.0, 1e9])
+def test_what_scatter_explains_is_no_evidence_however_much_it_changes(monkeypatch, size):
+    """Two of the three columns are alike to the last bits; only a part of 2 lies across all of them."""
+    rng = np.random.default_rng(0)
+    basis = np.linalg.qr(rng.standard_normal((40, 4)))[0]
+    columns = size * np.stack([basis[:, 0], basis[:, 0] * (1 + 1e-15), basis[:, 1]], 1)
+    white = 3 * basis[:, 0] + basis[:, 1] + 2 * basis[:, 2]
+    monkeypatch.setattr(detectable, "nuisance_jacobian", lambda *_: columns)
+    answer = SimpleNamespace(values=np.zeros((40, 1)))
+    data = SimpleNamespace(
+        measured=SimpleNamespace(s=None),
+        slopes=lambda _, changes: white[:, None] if changes.ndim == 3 else changes,
+    )
+    hypothesis = SimpleNamespace(respond=lambda *_: answer)
+    bench = SimpleNamespace(data=data, nuisance=SimpleNamespace(size=3), specimen=SimpleNamespace(layout=None))
+    null = SimpleNamespace(hypothesis=hypothesis, values=None)
+    found = detectable._evidence(bench, null)(hypothesis, None)
+    left = np.linalg.lstsq(np.vstack([columns, np.eye(3)]), np.concatenate([white, np.zeros(3)]), rcond=1e-15)
+    expected = 0.5 * float(np.sum((white - columns @ left[0]) ** 2) + np.sum(left[0] ** 2))
+    assert found == pytest.approx(expected, rel=1e-6)
+    assert found > 2.0 - 1e-6
