@@ -9,6 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
+from frf_ipz.numerics.prior_factor import factor_with_prior
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
@@ -120,7 +121,7 @@ def score_on(bench: Bench, base: Fit, data: Data) -> Score:
         data=data,
         misfit=data.misfit(response) + columns @ pulls,
         columns=columns,
-        factor=linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]), lower=True),
+        factor=factor_with_prior(columns.T),
         pulls=pulls,
         response=response,
     )

@@ -17,6 +17,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, no_deviations, respond
+from frf_ipz.numerics.prior_factor import factor_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -120,7 +121,7 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     nothing = np.zeros((stretches.n_blows, len(used)), complex)
     columns = as_real(freedom.columns(stretches, on_used, nothing, None))
     misfit = as_real(beyond[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
-    factor = linalg.cholesky(columns @ columns.T + np.eye(len(columns)), lower=True)
+    factor = factor_with_prior(columns)
     seen = linalg.solve_triangular(factor, columns @ misfit, lower=True)
     unknowns = linalg.solve_triangular(factor.T, seen, lower=False)
     beyond[freedom.moving] -= freedom.sensor_starts(unknowns, response)
