@@ -9,6 +9,7 @@ from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.numerics.prior_factor import factor_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,12 +64,12 @@ def _evidence(bench: Bench, null: Fit) -> Callable[[Hypothesis, FloatArray], flo
     data, nothing = bench.data, np.zeros(bench.nuisance.size)
     nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
     columns = data.slopes(nominal, nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout))
-    by_scatter = linalg.qr(np.vstack([columns, np.eye(columns.shape[1])]), mode="economic")[0][: len(columns)]
+    factor = factor_with_prior(columns.T)
 
     def evidence(hypothesis: Hypothesis, values: FloatArray) -> float:
         changed = hypothesis.respond(values, nothing, data.measured.s)
         white = data.slopes(nominal, (changed.values - nominal.values)[:, :, None])[:, 0]
-        seen = by_scatter.T @ white
+        seen = linalg.solve_triangular(factor, columns.T @ white, lower=True)
         return 0.5 * float(white @ white - seen @ seen)
 
     return evidence

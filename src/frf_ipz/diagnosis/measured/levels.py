@@ -18,6 +18,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import pieces_without_transients
+from frf_ipz.numerics.even_columns import even, solve_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -218,18 +219,16 @@ def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[f
     pole = start
     middle, scale = s.mean(), np.ptp(s.imag)
     away = (s - middle) / scale
-    values = values / max(
-        float(np.abs(values).max()), np.finfo(float).tiny
-    )  # in m/N their column would be lost beside the constant one
     deviation = 0.0
     for _ in range(ROUNDS):
         weight = 1 / np.abs(s - pole)
-        columns = np.column_stack([values, np.ones_like(s), away]) * weight[:, None]
-        found, *_ = np.linalg.lstsq(columns, s * values * weight, rcond=None)
+        columns = np.asarray(np.column_stack([values, np.ones_like(s), away]) * weight[:, None], np.complex128)
+        found = solve_columns(columns, np.asarray(s * values * weight, np.complex128))
         left = s * values * weight - columns @ found
         variance = float(np.vdot(left, left).real) / (len(s) - columns.shape[1])
-        covariance = np.linalg.pinv(columns.conj().T @ columns)[0, 0].real * variance
-        pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2))
+        scaled, sizes = even(columns)
+        covariance = np.linalg.pinv(scaled.conj().T @ scaled)[0, 0].real * variance
+        pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2) / sizes[0])
     size = abs(pole)
     is_near = np.abs(pole.imag - middle.imag) < scale / 2
     if not np.isfinite(size) or not is_near or pole.real >= 0 or deviation > UNSURE * size:

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import LEAST_COLUMN
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
+from frf_ipz.numerics.even_columns import solve_columns
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations
@@ -32,6 +32,7 @@ DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e
 BEFORE = 2  # samples before the pulse
 UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
 LEAST_RECORDS = 2
+CUT = 1e-12  # of the largest singular value of the local polynomials
 REACH = 2.0  # lines: so far a tone is seen beside its own
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
 
@@ -162,9 +163,8 @@ def _left_by(poles: int, force: ComplexArray, motion: ComplexArray, energies: Fl
     least = np.inf
     for _ in range(ROUNDS):
         weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
-        weighted = columns * weight[:, None]
-        sizes = np.maximum(np.linalg.norm(weighted, axis=0), LEAST_COLUMN)  # motions are far smaller than forces
-        found = np.linalg.lstsq(weighted / sizes, motion.ravel() * weight, rcond=1e-12)[0] / sizes
+        weighted = np.asarray(columns * weight[:, None], np.complex128)
+        found = solve_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
         denominator = 1 + below @ found[:poles]
         frf = (above @ found[poles : poles + ZEROS + 1]) / denominator
         left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator

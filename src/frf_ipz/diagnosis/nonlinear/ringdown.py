@@ -21,9 +21,11 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
+from frf_ipz.numerics.even_columns import even, solve_columns
 
 WINDOWS_APART = 0.5  # of a window: from one to the next
 STEPS = 12
+CUT = 1e-13  # of the largest singular value of sinusoids and their slopes
 SETTLED = 1e-9  # relative change of the poles
 SLOWEST, FASTEST = 1e-5, 0.2  # damping ratios that are believed
 FARTHEST = 0.03  # relative: a frequency that runs away from its mode
@@ -245,7 +247,7 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
         columns, found = _amplitudes(signal, time, poles)
         slopes = _slopes(time, poles, found)
         left = signal - columns @ found
-        step = _even_solution(np.hstack([columns, slopes]), left)[columns.shape[1] :]
+        step = solve_columns(np.hstack([columns, slopes]), left, CUT)[columns.shape[1] :]
         change = step[: len(poles)] + 1j * step[len(poles) :]
         decay = np.clip(-(poles + change).real / np.abs(poles), SLOWEST, FASTEST) * np.abs(poles)
         poles = -decay + 1j * (poles + change).imag
@@ -255,8 +257,8 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     all_columns = np.hstack([columns, _slopes(time, poles, found)])
     left = signal - columns @ found
     variance = float(left @ left) / max(len(signal) - all_columns.shape[1], 1)
-    even, sizes = _even(all_columns)
-    covariance = variance * np.linalg.pinv(even.T @ even, hermitian=True) / np.outer(sizes, sizes)
+    scaled, sizes = even(all_columns)
+    covariance = variance * np.linalg.pinv(scaled.T @ scaled, hermitian=True) / sizes / sizes[:, None]
     return _Window(
         poles=poles,
         amplitude=np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
@@ -270,18 +272,7 @@ def _amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tu
     """Columns of cosines, sines and a constant, and how much of each is in a signal."""
     turning = np.exp(np.outer(time, poles))
     columns = np.hstack([turning.real, turning.imag, np.ones((len(time), 1))])
-    return columns, _even_solution(columns, signal)
-
-
-def _even_solution(columns: FloatArray, signal: FloatArray) -> FloatArray:
-    even, sizes = _even(columns)
-    return np.asarray(np.linalg.lstsq(even, signal, rcond=1e-13)[0] / sizes)
-
-
-def _even(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns of norm one, and their norms: slopes by poles are as small as a unit or a weak mode makes them."""
-    sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    return columns / sizes, sizes
+    return columns, solve_columns(columns, signal, CUT)
 
 
 def _slopes(time: FloatArray, poles: ComplexArray, found: FloatArray) -> FloatArray:
