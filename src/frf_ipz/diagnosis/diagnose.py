@@ -31,7 +31,7 @@ from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
-from frf_ipz.diagnosis.judging.gates import check
+from frf_ipz.diagnosis.judging.gates import check, warn
 from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
@@ -124,7 +124,8 @@ def _diagnose(
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
     linear = _linear(bench, found, proof, gates, held=source.held)
-    linear = replace(linear, statement=_statement(found, linear.findings, complaint), remains=complaint)
+    statement = _statement(found, linear.findings, complaint)
+    linear = replace(linear, statement=statement, remains=complaint, warnings=warn(source, gates))
     if excess <= 1:
         return linear
     laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
@@ -193,7 +194,6 @@ def _linear(bench: Bench, found: Decision, proof: Proof, gates: tuple[Gate, ...]
         detectability=detectable_sizes(bench, found.null, found.null_good.needed_nats),
         curves=proof.curves,
         numbers=_numbers(found),
-        warnings=tuple(gate.statement for gate in gates if not gate.passed),
     )
 
 

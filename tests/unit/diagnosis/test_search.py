@@ -14,7 +14,7 @@ from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
 from frf_ipz.diagnosis.judging.tracing import trace
 from frf_ipz.diagnosis.judging.verdict import goodness
 from frf_ipz.diagnosis.measured.source import divide
-from frf_ipz.diagnosis.measured.transfer import FAINT, without_faint
+from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs, without_faint
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import solved
@@ -182,6 +182,13 @@ def test_faint_frfs_are_known_no_better_than_the_large_ones(nominal):
     assert_allclose(faint.size[:, 0], data.size[:, 0], rtol=0)
     assert_allclose(faint.size[:, 1], FAINT * data.size[:, 0], rtol=SAME)
     assert_allclose(without_faint(data).size, data.size, rtol=0)
+
+
+def test_faint_frfs_are_named(nominal):
+    data = divide(observed(measured(nominal))).training
+    assert not faint_frfs(data)
+    faint = replace(data, values=data.values * np.array([1.0, 1e-3]))
+    assert faint_frfs(faint) == data.labels[1:2] == faint_frfs(without_faint(faint))
 
 
 def fit_of(name, evidence, value, std, place):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Gate
+from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -35,6 +36,34 @@ def check(source: Source, linearity: Linearity | None) -> tuple[Gate, ...]:
         Homogeneity, reciprocity, coherence.
     """
     return homogeneity(linearity), reciprocity(source.training), coherence(source.training)
+
+
+def warn(source: Source, gates: tuple[Gate, ...]) -> tuple[str, ...]:
+    """Say what a user has to know before they believe a diagnosis.
+
+    Parameters
+    ----------
+    source : Source
+        What was measured.
+    gates : tuple of Gate
+        As `check` gives them.
+
+    Returns
+    -------
+    tuple of str
+        What failed, and which FRFs were too faint to tell anything.
+    """
+    failed = tuple(gate.statement for gate in gates if not gate.passed)
+    faint = faint_frfs(source.training)
+    if not faint:
+        return failed
+    subject, verb, they = ("FRF", "stays", "it tells") if len(faint) == 1 else ("FRFs", "stay", "they tell")
+    return (
+        *failed,
+        f"{subject} {', '.join(map(str, faint))} {verb} below {100 * FAINT:.0f} % of the largest of the same blow: so "
+        f"faint that {they} nothing, for a sensor a little out of line makes as much. What is missing may hide there; "
+        "put the sensor elsewhere.",
+    )
 
 
 def homogeneity(linearity: Linearity | None) -> Gate:

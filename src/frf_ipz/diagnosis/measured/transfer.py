@@ -16,6 +16,7 @@ SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
 ROUGH_PART = 0.15  # of the tolerance: the same from point to point
 NOISY = 25.0  # points whose noise is a fifth of the FRF tell nothing of gains
 FAINT = 0.01  # of the largest FRF of a quantity: transverse sensitivity and asymmetry make smaller ones
+ALWAYS = 0.9  # of the points: an FRF that is faint at so many tells nothing
 NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
 
 
@@ -105,14 +106,37 @@ def without_faint(measured: Measured) -> Measured:
     Measured
         The same, with sizes that are not far below that of the largest FRF of the same quantity and blow.
     """
-    size = measured.size.copy()
+    return replace(measured, size=np.maximum(measured.size, FAINT * _largest(measured, measured.size)))
+
+
+def faint_frfs(measured: Measured) -> tuple[FrfLabel, ...]:
+    """Find the FRFs that are too faint to be known over nearly all of the band.
+
+    Parameters
+    ----------
+    measured : Measured
+        Transfer functions, before or after `without_faint`.
+
+    Returns
+    -------
+    tuple of FrfLabel
+        What changes the model there is not seen in them.
+    """
+    size = np.abs(measured.values)
+    faint = np.mean(size < FAINT * _largest(measured, measured.size), axis=0) > ALWAYS
+    return tuple(label for label, is_faint in zip(measured.labels, faint, strict=True) if is_faint)
+
+
+def _largest(measured: Measured, size: FloatArray) -> FloatArray:
+    """Give the size of the largest FRF of the same quantity and blow, (n_points, n_frfs) array."""
+    largest = np.zeros_like(size)
     quantities = np.array([label.quantity.power for label in measured.labels])
     for quantity in np.unique(quantities):
         for place in np.unique(measured.input_of):
             frfs = np.flatnonzero((quantities == quantity) & (measured.input_of == place))
             if len(frfs):
-                size[:, frfs] = np.maximum(size[:, frfs], FAINT * size[:, frfs].max(axis=1, keepdims=True))
-    return replace(measured, size=size)
+                largest[:, frfs] = size[:, frfs].max(axis=1, keepdims=True)
+    return largest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

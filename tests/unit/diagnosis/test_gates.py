@@ -1,0 +1,31 @@
+"""What a user is told before they believe a diagnosis."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosed import beam, measured, observed
+from frf_ipz.diagnosis.judging.gates import check, warn
+from frf_ipz.diagnosis.measured.source import divide
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return divide(observed(measured(beam(tmp_path_factory.mktemp("beam")))))
+
+
+def test_nothing_is_said_of_a_good_measurement(source):
+    assert warn(source, check(source, None)) == ()
+
+
+def test_frfs_that_are_too_faint_to_tell_anything_are_named(source):
+    training = replace(source.training, values=source.training.values * np.array([1.0, 1e-3]))
+    (said,) = warn(replace(source, training=training), check(source, None))
+    assert said.startswith(f"FRF {training.labels[1]} stays below 1 % of the largest of the same blow")
+
+
+def test_a_gate_that_failed_is_said(source):
+    gates = check(source, None)
+    failed = replace(gates[-1], value=2 * gates[-1].limit, statement="It drowns in noise.")
+    assert warn(source, (*gates[:-1], failed)) == ("It drowns in noise.",)
