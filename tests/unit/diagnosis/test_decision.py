@@ -50,9 +50,17 @@ def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_
     assert (both and both.verdict) == verdict
 
 
-@pytest.mark.parametrize(("gain", "verdict"), [(2.0, "unexplained"), (40.0, "explained")])
-def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, gain, verdict):
-    """The nominal model leaves a little too much, and a cause a little less."""
+@pytest.mark.parametrize(
+    ("kind", "gain", "verdict"),
+    [
+        ("hammer", 2.0, "unexplained"),
+        ("hammer", 3.1, "explained"),
+        ("frf", 29.0, "unexplained"),
+        ("frf", 40.0, "explained"),
+    ],
+)
+def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain, verdict):
+    """The nominal model leaves a little too much, and a cause a little less: odds of twenty to one."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + gain, "attached_resonator")
     best.is_nearly_all = True
     monkeypatch.setattr(decision, "fit_nothing", lambda _: null)
@@ -64,6 +72,6 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, gain, verd
     monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
-    decided = decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None)
+    decided = decision.decide(SimpleNamespace(kind=kind), lambda *_: None)
     assert decided.verdict == verdict
     assert decided.final is (best if verdict == "explained" else null)

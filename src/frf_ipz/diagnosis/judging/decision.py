@@ -104,7 +104,8 @@ def decide(bench: Bench, progress: Progress) -> Decision:
 
 def _enough(bench: Bench, one: Decision) -> Decision:
     """Take a cause that leaves nothing to explain, if it explains anything, and what explains much beside it."""
-    if not one.null_good.is_good and gain_over(one.final, one.null) < FOUND_NATS:
+    least = min(FOUND_NATS, LIMITS[bench.kind].second_nats)  # the nominal model does not explain: what is likelier does
+    if not one.null_good.is_good and gain_over(one.final, one.null) < least:
         return replace(one, verdict=UNEXPLAINED, final=one.null, good=one.null_good)
     second = settle_ties(bench, search_beside(bench, one.final, LIMITS[bench.kind].beside_nats))
     return _beside(bench, one, second) or one
