@@ -77,6 +77,12 @@ class Ambiguity:
     separation_nats: float
     resolve_by: str
 
+    @property
+    def statement(self) -> str:
+        """What is not told apart and what would do so, in a sentence or two."""
+        *others, last = (effect.replace("_", " ") for effect in self.effects)
+        return f"These data cannot tell apart: {', '.join(others)} and {last}. {self.resolve_by}".strip()
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Curves:

@@ -124,7 +124,8 @@ def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """
     said = diagnosis.statement
     findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in said]
-    return [("diagnosis", said), *findings, *_warnings(diagnosis.warnings)]
+    alike = [("", one.statement) for one in diagnosis.ambiguity]
+    return [("diagnosis", said), *findings, *alike, *_warnings(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.diagnosis import Ambiguity
+from frf_ipz.pipeline.summary import diagnosis_lines
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.findings import marked_nodes, mismatch_nodes, plain_signs, said_in_short, verdict_of
 from frf_ipz.report.picture import Picture
@@ -128,6 +130,16 @@ def test_proof_on_held_out_data_is_in_percent(run):
 
 def test_what_cannot_be_told_apart_is_a_note_with_its_remedy(run):
     assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in build(run).notes
+
+
+def test_what_cannot_be_told_apart_is_said_on_the_command_line(run):
+    said = [text for _, text in diagnosis_lines(run.diagnosis)]
+    assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in said
+
+
+def test_three_that_cannot_be_told_apart_are_a_list():
+    alike = Ambiguity(effects=("axial_load", "added_mass", "time_delay"), separation_nats=1.0, resolve_by="")
+    assert alike.statement == "These data cannot tell apart: axial load, added mass and time delay."
 
 
 def test_checks_that_could_not_be_made_are_only_in_the_table(run):

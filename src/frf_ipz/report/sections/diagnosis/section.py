@@ -59,15 +59,10 @@ def build(run: RunContents) -> Section | None:
     lead = plain_signs(diagnosis.statement) or verdict_of(diagnosis)[0]
     notes = (
         *place_of_mismatch(diagnosis),
-        *[_ambiguity(one.effects, one.resolve_by) for one in diagnosis.ambiguity],
+        *[one.statement for one in diagnosis.ambiguity],
         *map(plain_signs, diagnosis.warnings),
     )
     return Section(anchor="diagnosis", title="Diagnosis", lead=lead, blocks=tuple(blocks), notes=notes)
-
-
-def _ambiguity(effects: Sequence[str], advice: str) -> str:
-    names = " and ".join(_plain(effect) for effect in effects)
-    return f"These data cannot tell apart: {names}. {advice}".strip()
 
 
 def _map(diagnosis: Diagnosis) -> Picture:
