@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.search.bench import weights_of
 from frf_ipz.diagnosis.search.climb import Fits, bar_of, climb_all
+from frf_ipz.diagnosis.search.far.refine import refine
+from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR
 from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.polish import polish, same_modes
-from frf_ipz.diagnosis.search.search import Ranking, ranked
+from frf_ipz.diagnosis.search.search import Ranking, keep, ranked
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
@@ -43,11 +46,16 @@ def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
     effect = best.hypothesis.causes[-1].effect
     starts = wide_search(replace(bench, effects={effect.name: effect}), base)
     fits: Fits = {fit.hypothesis.causes[-1].key: fit for fit in ranking.fits}
+    weights = weights_of(bench.coarse, REFINED_ERROR)
     for start in [start for start in starts if start.cause.key not in fits][:FITTED]:
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-        values = np.concatenate([base.values, start.values])
-        unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
-        bar = bar_of(fits.values())
-        fits[start.cause.key] = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
+        moved, _ = refine(
+            hypothesis, bench.coarse, weights, best.values
+        )  # as far from the axis as everything is smooth
+        for values in (np.concatenate([base.values, start.values]), moved):
+            unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
+            bar = bar_of(fits.values())
+            fit = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
+            keep(fits, fit)
     climb_all(bench, base, fits)
     return replace(ranking, fits=ranked(bench, fits.values()), n_tried=ranking.n_tried + len(starts))

@@ -169,7 +169,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
     fits: Fits = {}
     found = close_search(bench, base)
     for start in _most_promising(found, PROMISED_PART * least):
-        _keep(fits, _fit_close(bench, base, start, bar_of((base, *fits.values()))))
+        keep(fits, _fit_close(bench, base, start, bar_of((base, *fits.values()))))
     if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
         climb_all(bench, base, fits, _how_many_climb(base, fits))
     return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=len(found))
@@ -184,9 +184,9 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     for start in starts:
         bar = bar_of((base, *fits.values()))
         fit = _fit_close(bench, base, start, bar)
-        _keep(fits, fit)
+        keep(fits, fit)
         if fit.cost - base.cost - start.cost > max(BROKEN, -BROKEN_PART * start.cost):
-            _keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values]), bar=bar))
+            keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values]), bar=bar))
     return len(found)
 
 
@@ -206,7 +206,16 @@ def _fit_close(bench: Bench, base: Fit, start: Start, bar: float) -> Fit:
     return bench.fit_beside(hypothesis, np.concatenate([base.values, start.values]), base, bar=bar)
 
 
-def _keep(fits: Fits, fit: Fit) -> None:
+def keep(fits: Fits, fit: Fit) -> None:
+    """Add a fit, unless a better one with the same last cause is known.
+
+    Parameters
+    ----------
+    fits : dict
+        By the key of their last cause.
+    fit : Fit
+        To be added.
+    """
     key = fit.hypothesis.causes[-1].key
     if key not in fits or fits[key].log_evidence < fit.log_evidence:
         fits[key] = fit
@@ -225,7 +234,7 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     fits: Fits = {}
     for fit in early[: how_many(early, FITTED_EXACTLY)]:
         if fit.cost < FAR_BEHIND * early[0].cost + SLACK:
-            _keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
+            keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
     if not early[0].is_hopeless:
         _fit_imitators(bench, early, fits)
     return fits
@@ -257,7 +266,7 @@ def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
         effect = fit.hypothesis.causes[-1].effect
         if are_alike(effect, best) and effect.name not in fitted:
             fitted.add(effect.name)
-            _keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
+            keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
 
 
 def _how_many_climb(base: Fit, fits: Fits) -> int:
