@@ -9,7 +9,11 @@ from scipy import sparse
 from diagnosed import beam, bench_of, labels, measured
 from frf_ipz.diagnosis.catalogue.supports import coupling_spring
 from frf_ipz.diagnosis.judging import decision
+from frf_ipz.diagnosis.physics.attach import with_change
+from frf_ipz.diagnosis.search import elsewhere
+from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.wide import wide_search
+from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
 from frf_ipz.dofs import Dof
 from frf_ipz.progress import silent
@@ -59,3 +63,27 @@ def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(benc
     (cause,) = found.final.hypothesis.causes
     assert nodes_of(cause) == ENDS
     assert found.final.values[0] == pytest.approx(STIFFNESS_N_M, rel=EXACTLY)
+
+
+TRUE, ASTRAY, RESONATOR = 13, 14, np.array([0.02, 150.0, 0.02])  # nodes; kg, Hz, 1
+
+
+def at_node(bench, node):
+    effect = bench.effects["attached_resonator"]
+    place = next(place for place in effect.places(bench.specimen) if place.location == {"nodes": [node]})
+    return Cause(effect=effect, place=place, n_places=1)
+
+
+def test_another_place_is_fitted_from_the_best_values_where_a_wide_search_finds_none(tmp_path_factory, monkeypatch):
+    nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
+    one = bench_of(nominal, measured(nominal), ("attached_resonator",))
+    cause = at_node(one, TRUE)
+    true = with_change(nominal, cause.effect.build(one.specimen, cause.place)(RESONATOR))
+    bench = bench_of(nominal, measured(true), ("attached_resonator",))
+    wrong = bench.fit((at_node(bench, ASTRAY),), RESONATOR)
+    lost = Start(cause=at_node(bench, TRUE), values=np.array([1e-4, 900.0, 0.5]), cost=0.0)
+    monkeypatch.setattr(elsewhere, "wide_search", lambda *_: [lost])
+    monkeypatch.setattr(elsewhere, "climb_all", lambda *_: None)
+    found = elsewhere.look_elsewhere(bench, Ranking(base=fit_nothing(bench), fits=(wrong,), n_tried=0))
+    assert found.best.hypothesis.causes[-1].place.location == {"nodes": [TRUE]}
+    assert found.best.values[:2] == pytest.approx(RESONATOR[:2], rel=EXACTLY)
