@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, bench_of, measured, observed
 from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.judging import law_beside
 from frf_ipz.diagnosis.judging.decision import only_null
-from frf_ipz.diagnosis.judging.law_beside import search_beside_linear
+from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.measured.restored import restore
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 from frf_ipz.diagnosis.physics.attach import with_change
@@ -187,6 +188,24 @@ def pulse(shift_s):
     """A smooth pulse far below half the rate."""
     time = np.arange(SAMPLES) / RATE_HZ - 0.2 - shift_s
     return np.exp(-((time / 0.01) ** 2)) * np.cos(2 * np.pi * 60 * time)
+
+
+@pytest.mark.parametrize("left", [np.inf, np.nan, 1e30])
+def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkeypatch, left):
+    blow = Blow(
+        name="a",
+        input_channel="force",
+        input_dof=parse_dof("5:+z"),
+        step_s=1 / RATE_HZ,
+        force=np.ones(SAMPLES),
+        responses=np.ones((1, SAMPLES)),
+        sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
+    )
+    observations = Observations(kind="hammer", blows=(blow,), band_hz=(10.0, 500.0))
+    gone = replace(observations, blows=(replace(blow, responses=np.full((1, SAMPLES), left)),))
+    monkeypatch.setattr(law_beside, "without_law", lambda *_: gone)
+    law = SimpleNamespace(verdict="explained", strain=99.0, fit=object(), freedom=SimpleNamespace(moving=()))
+    assert search_beside_law(pytest.fail, law, nominal, observations, pytest.fail) is None
 
 
 def test_recordings_are_restored():

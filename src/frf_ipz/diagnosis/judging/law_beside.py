@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
 from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
 STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
 FOLLOWED = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
+RUN_AWAY = 100.0  # times the largest response: no structure moves so much more without a law
 EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
 
 
@@ -108,12 +111,10 @@ def search_beside_law(
         The law and the linear cause, which both explain; None where the law did not strain the model, where it did not
         even follow the recordings, or where no cause relieves the model.
     """
-    if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
+    without = _without(observations, laws)
+    if without is None:
         return None
-    explains = laws.verdict == EXPLAINED
-    if not explains and (laws.after is None or laws.after.training_noise > FOLLOWED):
-        return None  # what such a law leaves is no linear system
-    bench = bench_of(without_law(observations, laws.freedom, laws.fit))
+    explains, bench = laws.verdict == EXPLAINED, bench_of(without)
     null = fit_nothing(bench)
     ranking = search(bench, null)
     best = ranking.best
@@ -128,6 +129,21 @@ def search_beside_law(
         return None
     scale = max(1.0, best.mean_misfit)
     return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+
+
+def _without(observations: Observations, laws: LawSearch) -> Observations | None:
+    """Take a law out that strained the model; None where it did not, or where what it leaves is no linear system."""
+    if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
+        return None
+    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
+        return None
+    without = without_law(observations, laws.freedom, laws.fit)
+    sizes = [
+        [np.abs(blow.responses).max(initial=0.0) for blow in both]
+        for both in zip(without.blows, observations.blows, strict=True)
+    ]
+    runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)  # it was fitted to the first moments
+    return None if runs_away else without
 
 
 def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
