@@ -137,12 +137,13 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
         return None
     if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
         return None
-    without = without_law(observations, laws.freedom, laws.fit)
+    with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
+        without = without_law(observations, laws.freedom, laws.fit)
     sizes = [
         [np.abs(blow.responses).max(initial=0.0) for blow in both]
         for both in zip(without.blows, observations.blows, strict=True)
     ]
-    runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)  # it was fitted to the first moments
+    runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)
     return None if runs_away else without
 
 
