@@ -159,11 +159,12 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     monkeypatch, strain, alone, again, doubt, has_dynamics, both
 ):
     """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
+    seen = SimpleNamespace(blows=())
     cause = SimpleNamespace(effect=SimpleNamespace(has_dynamics=has_dynamics))
     hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,), causes=(cause,))
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
-        "without_law": lambda *_: "rest",
+        "without_law": lambda *_: seen,
         "fit_nothing": lambda _: SimpleNamespace(log_evidence=0.0),
         "search": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
         "is_significant": lambda *_: True,
@@ -179,5 +180,5 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     laws = SimpleNamespace(strain=strain, verdict=verdict, after=after, fit="fit", freedom=SimpleNamespace(moving=()))
     eased = SimpleNamespace(verdict="explained", strain=again)
     bench = SimpleNamespace(kind="hammer")
-    found = law_beside.search_beside_law(lambda _: bench, laws, "model", "measured", lambda *_: eased)
+    found = law_beside.search_beside_law(lambda _: bench, laws, "model", seen, lambda *_: eased)
     assert found == ((eased, "spring") if both else None)
