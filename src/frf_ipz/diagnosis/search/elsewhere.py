@@ -49,13 +49,10 @@ def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
     weights = weights_of(bench.coarse, REFINED_ERROR)
     for start in [start for start in starts if start.cause.key not in fits][:FITTED]:
         hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-        moved, _ = refine(
-            hypothesis, bench.coarse, weights, best.values
-        )  # as far from the axis as everything is smooth
+        moved, _ = refine(hypothesis, bench.coarse, weights, best.values)  # far from the axis, where all is smooth
         for values in (np.concatenate([base.values, start.values]), moved):
             unknown = same_modes(hypothesis, hypothesis.physical(hypothesis.start_at(values)), best)
             bar = bar_of(fits.values())
-            fit = polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar)
-            keep(fits, fit)
+            keep(fits, polish(hypothesis, bench.data, values, unknown=unknown, iterations=ITERATIONS, bar=bar))
     climb_all(bench, base, fits)
     return replace(ranking, fits=ranked(bench, fits.values()), n_tried=ranking.n_tried + len(starts))
