@@ -106,7 +106,7 @@ def without_faint(measured: Measured) -> Measured:
     Measured
         The same, with sizes that are not far below that of the largest FRF of the same quantity and blow.
     """
-    return replace(measured, size=np.maximum(measured.size, FAINT * _largest(measured, measured.size)))
+    return replace(measured, size=np.maximum(measured.size, FAINT * _largest(measured)))
 
 
 def faint_frfs(measured: Measured) -> tuple[FrfLabel, ...]:
@@ -122,20 +122,19 @@ def faint_frfs(measured: Measured) -> tuple[FrfLabel, ...]:
     tuple of FrfLabel
         What changes the model there is not seen in them.
     """
-    size = np.abs(measured.values)
-    faint = np.mean(size < FAINT * _largest(measured, measured.size), axis=0) > ALWAYS
+    faint = np.mean(np.abs(measured.values) < FAINT * _largest(measured), axis=0) > ALWAYS
     return tuple(label for label, is_faint in zip(measured.labels, faint, strict=True) if is_faint)
 
 
-def _largest(measured: Measured, size: FloatArray) -> FloatArray:
+def _largest(measured: Measured) -> FloatArray:
     """Give the size of the largest FRF of the same quantity and blow, (n_points, n_frfs) array."""
-    largest = np.zeros_like(size)
+    largest = np.zeros_like(measured.size)
     quantities = np.array([label.quantity.power for label in measured.labels])
     for quantity in np.unique(quantities):
         for place in np.unique(measured.input_of):
             frfs = np.flatnonzero((quantities == quantity) & (measured.input_of == place))
             if len(frfs):
-                largest[:, frfs] = size[:, frfs].max(axis=1, keepdims=True)
+                largest[:, frfs] = measured.size[:, frfs].max(axis=1, keepdims=True)
     return largest
 
 
