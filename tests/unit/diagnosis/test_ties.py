@@ -33,6 +33,14 @@ def test_a_place_that_needs_more_of_the_tolerances_falls_behind_where_the_model_
     assert ahead(settled) > 2 * ahead(found)
 
 
+def test_a_model_that_is_ten_times_better_than_stated_tells_still_more(nominal, monkeypatch):
+    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
+    found = search(bench, fit_nothing(bench))
+    finely = settle_ties(bench, found)
+    monkeypatch.setattr(ties, "PARTS", (0.3,))
+    assert ahead(finely) > ahead(settle_ties(bench, found)) + 1  # nats
+
+
 def test_places_stay_alike_where_the_model_needs_its_tolerances(nominal, tmp_path):
     true = with_point_masses(beam(tmp_path, thickness_m=0.005 * THICKER), {12: 2 * LITTLE_KG})
     bench = bench_of(nominal, measured(true), ("added_mass",))

@@ -14,6 +14,8 @@ from frf_ipz.diagnosis.search.fit import Data, Fit
 from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
 from frf_ipz.diagnosis.search.polish import polish, same_modes
 
+LAST_STEPS = 90  # along a bent valley many are small
+
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.measured.transfer import Measured
@@ -94,7 +96,7 @@ class Bench:
 
     def go_on(self, fit: Fit) -> Fit:
         """Go on with a fit that has not converged."""
-        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=30)
+        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=LAST_STEPS)
 
 
 def weights_of(measured: Measured, error: float) -> FloatArray:

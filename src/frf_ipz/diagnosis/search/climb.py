@@ -85,7 +85,7 @@ def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
     for effect in bench.effects.values():
         for other in causes_of(effect, bench.specimen) if are_alike(effect, cause.effect) else ():
             if _is_within(other.place, cause.place) and other.key not in fits:
-                fits[other.key] = _from_neighbour(bench, base, other, best, bar_of(fits.values()))
+                fits[other.key] = fit_from_neighbour(bench, base, other, best, bar_of(fits.values()))
 
 
 def _is_within(one: Place, other: Place) -> bool:
@@ -132,7 +132,7 @@ def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: F
         if other.key in fits:
             tried = fits[other.key]
         else:
-            tried = fits[other.key] = _from_neighbour(bench, base, other, fit, bar_of(fits.values()))
+            tried = fits[other.key] = fit_from_neighbour(bench, base, other, fit, bar_of(fits.values()))
         if tried.log_evidence > better.log_evidence + GAIN:
             better = tried
     return better
@@ -178,7 +178,27 @@ def further_around(
     return [(there, at) for _, there, at in sorted(found, key=lambda one: one[0])]
 
 
-def _from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
+def fit_from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
+    """Fit a cause from the values and the scatter of a fit of a similar one.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already.
+    cause : Cause
+        One more.
+    fit : Fit
+        Of another last cause beside the same base.
+    bar : float
+        Cost that the fit is wanted below.
+
+    Returns
+    -------
+    Fit
+        Of all causes.
+    """
     causes = (*base.hypothesis.causes, cause)
     hypothesis = bench.suppose(causes)
     weights = weights_of(bench.coarse, REFINED_ERROR)

@@ -2,18 +2,19 @@
 
 Tolerances are bounds that a user states; many a model is better. Where it is, a cause at a wrong place needs more of
 them than the right one, and that counts for little as long as they are thought to be large. Each contender's evidence
-is the mean of what it is with the stated tolerances and with a part of them: a model that needs them as they are makes
-the second vanish, and nothing changes. How much of its FRFs no parameter of the model stands for is a part of the
+is the mean of what it is with the stated tolerances and with parts of them: a model that needs them as they are makes
+those vanish, and nothing changes. How much of its FRFs no parameter of the model stands for is a part of the
 tolerance too; the best explanation says which part is likely.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.search.contenders import TIE, fit_contenders
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking
 from frf_ipz.diagnosis.search.set_up import with_errors
@@ -22,14 +23,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data, Fit
 
-PART = 0.3  # of the tolerances of stiffness, mass and frequencies
+PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
-TIE = 8.0  # nats behind the best
 MOST = 24  # fits that are weighed again
 
 
 def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
-    """Weigh again what is nearly as probable as the best.
+    """Fit what may be as probable as the best, and weigh again what is.
 
     Parameters
     ----------
@@ -41,19 +41,25 @@ def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
     Returns
     -------
     Ranking
-        The same fits with other evidences relative to each other; the largest stays what it was.
+        With other evidences relative to each other; the largest stays what it was.
     """
     if not ranking.fits or not ranking.fits[0].is_nearly_all:
         return ranking
+    if ranking.fits[0].log_evidence > ranking.base.log_evidence + TIE:
+        ranking = fit_contenders(bench, ranking)
     best = ranking.fits[0].log_evidence
     near = [fit for fit in ranking.fits if fit.log_evidence > best - TIE][:MOST]
     if len(near) < 2:
         return ranking
-    strict = replace(bench, nuisance=bench.nuisance.with_part(PART), data=_likely_errors(bench, near[0]))
-    settled = [_weighed(bench, strict, fit) for fit in near]
-    shift = best - max(fit.log_evidence for fit in settled)
-    settled = [replace(fit, log_evidence=fit.log_evidence + shift) for fit in settled]
-    fits = sorted([*settled, *ranking.fits[len(near) :]], key=lambda fit: -fit.log_evidence)
+    data = _likely_errors(bench, near[0])
+    settled = [_Weighed(best=fit, last=fit, log_evidence=fit.log_evidence) for fit in near]
+    for part in PARTS:
+        strict = replace(bench, nuisance=bench.nuisance.with_part(part), data=data)
+        bar = max(one.log_evidence for one in settled) - TIE
+        settled = [_weigh(bench, strict, part, one) if one.log_evidence > bar else one for one in settled]
+    shift = best - max(one.log_evidence for one in settled)
+    weighed = [replace(one.best, log_evidence=one.log_evidence + shift) for one in settled]
+    fits = sorted([*weighed, *ranking.fits[len(near) :]], key=lambda fit: -fit.log_evidence)
     return replace(ranking, fits=tuple(fits))
 
 
@@ -71,24 +77,35 @@ def _likely_errors(bench: Bench, best: Fit) -> Data:
     return data
 
 
-def _weighed(bench: Bench, strict: Bench, fit: Fit) -> Fit:
-    """Give a fit the mean evidence, and the values of the likelier one."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Weighed:
+    """A fit with the likeliest values of all tolerances so far, with those of the last, and its evidence with all."""
+
+    best: Fit
+    last: Fit
+    log_evidence: float
+
+
+def _weigh(bench: Bench, strict: Bench, part: float, one: _Weighed) -> _Weighed:
+    """Add the evidence with a part of the tolerances, and take the values if they are likelier."""
     nuisance = bench.nuisance
-    hypothesis = strict.suppose(fit.hypothesis.causes)
-    unknown = nuisance.in_parts(fit.unknown, PART)
-    again = polish(hypothesis, strict.data, fit.values, unknown=unknown, iterations=8, tolerance=0.1)
-    strictly = again.log_evidence + strict.data.whitening.log_density - bench.data.whitening.log_density
-    mean = float(np.logaddexp(fit.log_evidence, strictly))
-    if strictly < fit.log_evidence:
-        return replace(fit, log_evidence=mean)
-    back = nuisance.in_parts(again.unknown, 1 / PART)
+    hypothesis = strict.suppose(one.last.hypothesis.causes)
+    unknown = nuisance.in_parts(one.last.unknown, part)
+    again = polish(hypothesis, strict.data, one.last.values, unknown=unknown, iterations=8, tolerance=0.1)
+    evidence = again.log_evidence + strict.data.whitening.log_density - bench.data.whitening.log_density
+    back = nuisance.in_parts(again.unknown, 1 / part)
     pulls, _ = nuisance.pulls(back)
-    white = bench.data.misfit(fit.hypothesis.respond(again.values, back, bench.data.measured.s))
-    return replace(
-        fit,
+    white = bench.data.misfit(one.last.hypothesis.respond(again.values, back, bench.data.measured.s))
+    last = replace(
+        one.last,
         values=again.values,
         unknown=back,
         misfit=float(white @ white),
         pull=float(pulls @ pulls),
-        log_evidence=mean,
+        log_evidence=evidence,
+    )
+    return _Weighed(
+        best=max(one.best, last, key=lambda fit: fit.log_evidence),
+        last=last,
+        log_evidence=float(np.logaddexp(one.log_evidence, evidence)),
     )

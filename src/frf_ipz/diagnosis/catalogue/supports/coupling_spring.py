@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch
 from frf_ipz.diagnosis.catalogue.supports.grounded_spring import floating, is_floating
 from frf_ipz.diagnosis.physics.change import Change
@@ -32,11 +33,9 @@ class CouplingSpring(Effect):
     def places(self, specimen: Specimen) -> Sequence[Place]:
         """All pairs of nodes that are apart and not joined by a spring already."""
         dofs = specimen.moving_dofs
-        most = MOST_IN_A_ROW if specimen.model.kind == "beam" else MOST_NODES
-        thinned = dofs[:: -(-len(dofs) // most)]
         return [
             _place(first.node, second.node, first.direction)
-            for first, second in combinations(thinned, 2)
+            for first, second in combinations(dofs[:: _stride(specimen)], 2)
             if first.direction == second.direction and _is_new(specimen, first.node, second.node)
         ]
 
@@ -51,6 +50,11 @@ class CouplingSpring(Effect):
         unit = sparse.csr_array(motion @ motion.T)
         floats = is_floating(place)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
+
+    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+        """Share what a pair is worth among those that stand behind it where not all are listed."""
+        del place, values
+        return -2 * float(np.log(_stride(specimen)))
 
     def sketch(self, specimen: Specimen, place: Place) -> Sketch:
         """Draw a constant."""
@@ -86,6 +90,12 @@ class CouplingSpring(Effect):
             f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
             "the model lacks it."
         )
+
+
+def _stride(specimen: Specimen) -> int:
+    """One of how many nodes is listed."""
+    most = MOST_IN_A_ROW if specimen.model.kind == "beam" else MOST_NODES
+    return -(-len(specimen.moving_dofs) // most)
 
 
 def _place(first: int, second: int, direction: str) -> Place:
