@@ -6,59 +6,111 @@ import pytest
 from diagnosed import beam, bench_of, labels, measured
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.supports import coupling_spring
-from frf_ipz.diagnosis.search import contenders
-from frf_ipz.diagnosis.search.contenders import fit_contenders
+from frf_ipz.diagnosis.search import ties
+from frf_ipz.diagnosis.search.contenders import fit_far, next_beside
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
 from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.fe.changes import with_point_masses
 
 NODES, TRUE, MIRRORED, ADDED_KG = 25, 6, 20, 2e-3
+LITTLE_KG = 5e-5  # of which the place is hardly seen
 MIDDLE = labels(outputs=("13:+z",), inputs=("13:+z",))  # a sensor and blows that do not tell left from right
+ASTRAY = 9
 
 
 @pytest.fixture(scope="module")
-def symmetric(tmp_path_factory):
-    """A beam clamped at both ends, looked at in its middle."""
-    nominal = beam(tmp_path_factory.mktemp("beam"), elements=NODES - 1, right="clamped")
+def nominal(tmp_path_factory):
+    """A beam clamped at both ends."""
+    return beam(tmp_path_factory.mktemp("beam"), elements=NODES - 1, right="clamped")
+
+
+@pytest.fixture(scope="module")
+def symmetric(nominal):
+    """Looked at in its middle."""
     return bench_of(nominal, measured(with_point_masses(nominal, {TRUE: ADDED_KG}), MIDDLE), ("added_mass",))
 
 
-def only(bench, *nodes):
+def only(bench, *nodes, added_kg=ADDED_KG):
     """A ranking of a search that came to some nodes only."""
     effect, null = bench.effects["added_mass"], fit_nothing(bench)
     places = {place.location["nodes"][0]: place for place in effect.places(bench.specimen)}
     causes = [Cause(effect=effect, place=places[node], n_places=len(places)) for node in nodes]
-    return Ranking(base=null, fits=tuple(bench.fit((cause,), np.array([ADDED_KG])) for cause in causes), n_tried=0)
+    fits = [bench.fit((cause,), np.array([added_kg])) for cause in causes]
+    return Ranking(base=null, fits=tuple(sorted(fits, key=lambda fit: -fit.log_evidence)), n_tried=0)
 
 
-def nodes_of(ranking, nats=np.inf):
-    least = ranking.fits[0].log_evidence - nats
-    return {fit.hypothesis.causes[-1].place.location["nodes"][0] for fit in ranking.fits if fit.log_evidence > least}
+def node_of(cause):
+    return cause.place.location["nodes"][0]
+
+
+def evidence(fits):
+    return {node_of(fit.hypothesis.causes[-1]): fit.log_evidence for fit in fits}
+
+
+def by_key(ranking):
+    return {fit.hypothesis.causes[-1].key: fit for fit in ranking.fits}
 
 
 def test_what_explains_as_well_on_the_far_side_is_found(symmetric):
-    found = fit_contenders(symmetric, only(symmetric, TRUE))
-    assert {TRUE, MIRRORED} <= nodes_of(found, nats=1.0)
-    evidence = {fit.hypothesis.causes[-1].place.location["nodes"][0]: fit.log_evidence for fit in found.fits}
-    assert evidence[MIRRORED] == pytest.approx(evidence[TRUE], abs=0.1)
+    ranking = only(symmetric, TRUE)
+    fits = by_key(ranking)
+    fit_far(symmetric, ranking, fits)
+    found = evidence(fits.values())
+    assert found[MIRRORED] == pytest.approx(found[TRUE], abs=0.1)
 
 
-def test_places_beside_all_that_is_nearly_as_good_are_fitted(symmetric, monkeypatch):
-    monkeypatch.setattr(contenders, "FAR", 0)
-    found = nodes_of(fit_contenders(symmetric, only(symmetric, TRUE, MIRRORED)))
-    assert {TRUE - 1, TRUE, TRUE + 1, MIRRORED - 1, MIRRORED, MIRRORED + 1} <= found
+def test_places_around_what_is_better_far_off_are_fitted_too(nominal):
+    """Of a search that went astray, seen from where left and right are told apart."""
+    true = with_point_masses(nominal, {TRUE: ADDED_KG})
+    bench = bench_of(nominal, measured(true, labels(outputs=("8:+z",), inputs=("10:+z",))), ("added_mass",))
+    ranking = only(bench, MIRRORED)
+    fits = by_key(ranking)
+    fit_far(bench, ranking, fits)
+    found = evidence(fits.values())
+    assert max(found, key=found.get) == TRUE
+    assert {TRUE - 1, TRUE + 1} <= found.keys()
 
 
-def test_no_more_places_are_fitted_than_can_be_waited_for(symmetric, monkeypatch):
-    monkeypatch.setattr(contenders, "FAR", 0)
-    monkeypatch.setattr(contenders, "TIE", np.inf)
-    monkeypatch.setattr(contenders, "MOST", 5)
-    assert len(fit_contenders(symmetric, only(symmetric, TRUE)).fits) == 1 + 5
+def test_the_next_place_is_beside_the_best_that_has_one(symmetric):
+    best, second = only(symmetric, TRUE, MIRRORED).fits
+    effect = symmetric.effects["added_mass"]
+    places = effect.neighbours(symmetric.specimen, best.hypothesis.causes[-1].place)
+    around = [Cause(effect=effect, place=place, n_places=1).key for place in places]
+    cause, beside = next_beside(symmetric, (best, second), around[1:])
+    assert (cause.key, beside) == (around[0], best)
+    cause, beside = next_beside(symmetric, (best, second), around)
+    assert cause.key not in around
+    assert beside is second
+    assert next_beside(symmetric, (best,), around) is None
 
 
-def test_ties_are_settled_among_all_contenders(symmetric):
-    assert {TRUE, MIRRORED} <= nodes_of(settle_ties(symmetric, only(symmetric, TRUE)), nats=3.0)
+@pytest.fixture
+def valley(nominal, monkeypatch):
+    """So little mass that all places near the true one explain alike."""
+    monkeypatch.setattr(ties, "fit_far", lambda *_: 0)
+    true = with_point_masses(nominal, {TRUE: LITTLE_KG})
+    return bench_of(nominal, measured(true, labels(outputs=("8:+z",), inputs=("10:+z",))), ("added_mass",))
+
+
+def test_ties_are_settled_along_a_valley_as_far_as_it_is_level(valley):
+    """Of a search that came to one end of it."""
+    found = settle_ties(valley, only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG))
+    assert evidence(found.fits)[TRUE] > found.best.log_evidence - 1
+
+
+def test_no_more_places_are_weighed_than_can_be_waited_for(valley, monkeypatch):
+    monkeypatch.setattr(ties, "MOST_BESIDE", 1)
+    assert len(settle_ties(valley, only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)).fits) == 2 + 1
+
+
+def test_what_was_not_weighed_again_is_no_contender(valley, monkeypatch):
+    monkeypatch.setattr(ties, "EACH", 2)
+    monkeypatch.setattr(ties, "MOST_BESIDE", 0)
+    alike = only(valley, TRUE - 1, TRUE, TRUE + 1, added_kg=LITTLE_KG)
+    assert alike.fits[2].log_evidence > alike.fits[0].log_evidence - ties.TIE
+    found = settle_ties(valley, alike)
+    assert [fit.log_evidence > found.fits[0].log_evidence - ties.TIE for fit in found.fits] == [True, True, False]
 
 
 def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypatch):

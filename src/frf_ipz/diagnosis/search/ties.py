@@ -5,16 +5,21 @@ them than the right one, and that counts for little as long as they are thought 
 is the mean of what it is with the stated tolerances and with parts of them: a model that needs them as they are makes
 those vanish, and nothing changes. How much of its FRFs no parameter of the model stands for is a part of the
 tolerance too; the best explanation says which part is likely.
+
+What a search says is alike may so fall apart, and the best lie beside all that it came to: places beside the best are
+weighed too, until all there are worse.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from frf_ipz.diagnosis.search.contenders import TIE, fit_contenders
+from frf_ipz.diagnosis.search.climb import Fits, bar_of, fit_from_neighbour
+from frf_ipz.diagnosis.search.contenders import fit_far, next_beside
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking
 from frf_ipz.diagnosis.search.set_up import with_errors
@@ -25,11 +30,24 @@ if TYPE_CHECKING:
 
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
-MOST = 24  # fits that are weighed again
+TIE = 8.0  # nats behind the best: what is so near is weighed again
+EACH = 8  # places of an effect that are
+BESIDE, MOST_BESIDE = 4.0, 30  # nats behind the best of these, beside which places are looked at, and how many
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Weighed:
+    """A fit with the values of the likeliest tolerances, and its evidence with all of them."""
+
+    fit: Fit
+    log_evidence: float
+
+
+_Settled: TypeAlias = dict[tuple[object, ...], _Weighed]
 
 
 def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
-    """Fit what may be as probable as the best, and weigh again what is.
+    """Weigh again what is nearly as probable as the best, with what may be.
 
     Parameters
     ----------
@@ -45,22 +63,62 @@ def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
     """
     if not ranking.fits or not ranking.fits[0].is_nearly_all:
         return ranking
-    if ranking.fits[0].log_evidence > ranking.base.log_evidence + TIE:
-        ranking = fit_contenders(bench, ranking)
-    best = ranking.fits[0].log_evidence
-    near = [fit for fit in ranking.fits if fit.log_evidence > best - TIE][:MOST]
-    if len(near) < 2:
-        return ranking
-    data = _likely_errors(bench, near[0])
-    settled = [_Weighed(best=fit, last=fit, log_evidence=fit.log_evidence) for fit in near]
-    for part in PARTS:
-        strict = replace(bench, nuisance=bench.nuisance.with_part(part), data=data)
-        bar = max(one.log_evidence for one in settled) - TIE
-        settled = [_weigh(bench, strict, part, one) if one.log_evidence > bar else one for one in settled]
-    shift = best - max(one.log_evidence for one in settled)
-    weighed = [replace(one.best, log_evidence=one.log_evidence + shift) for one in settled]
-    fits = sorted([*weighed, *ranking.fits[len(near) :]], key=lambda fit: -fit.log_evidence)
-    return replace(ranking, fits=tuple(fits))
+    fits: Fits = {fit.hypothesis.causes[-1].key: fit for fit in ranking.fits}
+    is_found = ranking.best.log_evidence > ranking.base.log_evidence + TIE
+    n_tried = ranking.n_tried + (fit_far(bench, ranking, fits) if is_found else 0)
+    near = _nearest(fits)
+    settled: _Settled = {}
+    if len(near) > 1:
+        data = _likely_errors(bench, near[0])
+        stricts = {part: replace(bench, nuisance=bench.nuisance.with_part(part), data=data) for part in PARTS}
+        settled = {fit.hypothesis.causes[-1].key: _weigh(bench, stricts, fit) for fit in near}
+        _look_beside(bench, ranking.base, fits, settled, stricts)
+    return replace(ranking, fits=_in_order(fits, settled), n_tried=n_tried)
+
+
+def _nearest(fits: Fits) -> list[Fit]:
+    """Give what is nearly as probable as the best, some places of each effect, the best first."""
+    order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
+    counts = Counter[str]()
+    near: list[Fit] = []
+    for fit in order:
+        effect = fit.hypothesis.causes[-1].effect.name
+        counts[effect] += 1
+        if fit.log_evidence > order[0].log_evidence - TIE and counts[effect] <= EACH:
+            near.append(fit)
+    return near
+
+
+def _look_beside(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]) -> None:
+    """Weigh places beside the best ones until all that are left are worse."""
+    far: set[tuple[object, ...]] = set()
+    for _ in range(MOST_BESIDE):
+        order = sorted(settled.values(), key=lambda one: -one.log_evidence)
+        near = [one.fit for one in order if one.log_evidence > order[0].log_evidence - BESIDE]
+        found = next_beside(bench, near, far | settled.keys())
+        if found is None:
+            return
+        cause, beside = found
+        if cause.key not in fits:
+            fits[cause.key] = fit_from_neighbour(bench, base, cause, beside, bar_of(fits.values()))
+        fit = fits[cause.key]
+        if fit.log_evidence > max(one.log_evidence for one in fits.values()) - TIE:
+            settled[cause.key] = _weigh(bench, stricts, fit)
+        else:
+            far.add(cause.key)
+
+
+def _in_order(fits: Fits, settled: _Settled) -> tuple[Fit, ...]:
+    """Sort fits by falling evidence; what was not weighed is worse than what was by as much as counts."""
+    if not settled:
+        return tuple(sorted(fits.values(), key=lambda fit: -fit.log_evidence))
+    most = max(fit.log_evidence for fit in fits.values())
+    shift = most - max(one.log_evidence for one in settled.values())
+    weighed = [replace(one.fit, log_evidence=one.log_evidence + shift) for one in settled.values()]
+    others = [
+        replace(fit, log_evidence=min(fit.log_evidence, most - TIE)) for key, fit in fits.items() if key not in settled
+    ]
+    return tuple(sorted([*weighed, *others], key=lambda fit: -fit.log_evidence))
 
 
 def _likely_errors(bench: Bench, best: Fit) -> Data:
@@ -77,35 +135,30 @@ def _likely_errors(bench: Bench, best: Fit) -> Data:
     return data
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Weighed:
-    """A fit with the likeliest values of all tolerances so far, with those of the last, and its evidence with all."""
+def _weigh(bench: Bench, stricts: dict[float, Bench], fit: Fit) -> _Weighed:
+    """Give a fit the mean evidence, and the values of the likeliest tolerances."""
+    best, mean, last = fit, fit.log_evidence, fit
+    for part, strict in stricts.items():
+        last = _with_part(bench, strict, part, last)
+        mean = float(np.logaddexp(mean, last.log_evidence))
+        best = max(best, last, key=lambda one: one.log_evidence)
+    return _Weighed(fit=replace(best, log_evidence=fit.log_evidence), log_evidence=mean)
 
-    best: Fit
-    last: Fit
-    log_evidence: float
 
-
-def _weigh(bench: Bench, strict: Bench, part: float, one: _Weighed) -> _Weighed:
-    """Add the evidence with a part of the tolerances, and take the values if they are likelier."""
+def _with_part(bench: Bench, strict: Bench, part: float, fit: Fit) -> Fit:
+    """Fit again with a part of the tolerances; everything but the evidence is given for all of them."""
     nuisance = bench.nuisance
-    hypothesis = strict.suppose(one.last.hypothesis.causes)
-    unknown = nuisance.in_parts(one.last.unknown, part)
-    again = polish(hypothesis, strict.data, one.last.values, unknown=unknown, iterations=8, tolerance=0.1)
-    evidence = again.log_evidence + strict.data.whitening.log_density - bench.data.whitening.log_density
+    hypothesis = strict.suppose(fit.hypothesis.causes)
+    unknown = nuisance.in_parts(fit.unknown, part)
+    again = polish(hypothesis, strict.data, fit.values, unknown=unknown, iterations=8, tolerance=0.1)
     back = nuisance.in_parts(again.unknown, 1 / part)
     pulls, _ = nuisance.pulls(back)
-    white = bench.data.misfit(one.last.hypothesis.respond(again.values, back, bench.data.measured.s))
-    last = replace(
-        one.last,
+    white = bench.data.misfit(fit.hypothesis.respond(again.values, back, bench.data.measured.s))
+    return replace(
+        fit,
         values=again.values,
         unknown=back,
         misfit=float(white @ white),
         pull=float(pulls @ pulls),
-        log_evidence=evidence,
-    )
-    return _Weighed(
-        best=max(one.best, last, key=lambda fit: fit.log_evidence),
-        last=last,
-        log_evidence=float(np.logaddexp(one.log_evidence, evidence)),
+        log_evidence=again.log_evidence + strict.data.whitening.log_density - bench.data.whitening.log_density,
     )
