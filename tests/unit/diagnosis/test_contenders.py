@@ -6,11 +6,11 @@ import pytest
 from diagnosed import beam, bench_of, labels, measured
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.supports import coupling_spring
-from frf_ipz.diagnosis.search import ties
-from frf_ipz.diagnosis.search.contenders import fit_far, next_beside
+from frf_ipz.diagnosis.search.alike import ties
+from frf_ipz.diagnosis.search.alike.contenders import fit_far, next_beside
+from frf_ipz.diagnosis.search.alike.ties import settle_ties
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
-from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.fe.changes import with_point_masses
 
 NODES, TRUE, MIRRORED, ADDED_KG = 25, 6, 20, 2e-3

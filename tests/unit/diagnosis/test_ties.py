@@ -8,10 +8,10 @@ from scipy import linalg
 
 from diagnosed import beam, bench_of, measured
 from frf_ipz.diagnosis.measured.transfer import points_of
-from frf_ipz.diagnosis.search import ties
+from frf_ipz.diagnosis.search.alike import ties
+from frf_ipz.diagnosis.search.alike.ties import settle_ties
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import with_errors
-from frf_ipz.diagnosis.search.ties import settle_ties
 from frf_ipz.fe.changes import with_point_masses
 
 LITTLE_KG, THICKER = 2e-4, 1.0015  # the thickness takes frequencies 0.15 % off, more than a part of 0.1 %

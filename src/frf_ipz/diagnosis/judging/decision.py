@@ -9,11 +9,11 @@ import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
-from frf_ipz.diagnosis.search.elsewhere import look_elsewhere
+from frf_ipz.diagnosis.search.alike.elsewhere import look_elsewhere
+from frf_ipz.diagnosis.search.alike.ties import settle_ties
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
-from frf_ipz.diagnosis.search.ties import settle_ties
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench

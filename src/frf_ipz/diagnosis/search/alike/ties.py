@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from frf_ipz.diagnosis.search.alike.contenders import fit_far, next_beside
 from frf_ipz.diagnosis.search.climb import Fits, bar_of, fit_from_neighbour
-from frf_ipz.diagnosis.search.contenders import fit_far, next_beside
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking
 from frf_ipz.diagnosis.search.set_up import with_errors
