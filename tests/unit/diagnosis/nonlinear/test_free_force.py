@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.nonlinear.fitting import candidates
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import start_at, whereabouts
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
@@ -59,3 +60,21 @@ def test_the_numbers_of_a_law_are_read_from_the_force(chain, strike, name, law, 
     assert start.strength == pytest.approx(strength, rel=READ)
     assert start.shape == pytest.approx(shape, rel=READ)
     assert np.isfinite(start.unknowns).all()
+
+
+@pytest.mark.parametrize("far_off", [True, False])
+def test_a_law_that_refining_leads_astray_is_simulated_as_it_was_read(chain, strike, monkeypatch, far_off):
+    stretches, linear = prepared(chain.model, strike(*LAWS["gap"][:2]))
+    track = candidates.Track(stretches=stretches, linear=linear, where=whereabouts(stretches, linear))
+    refined = candidates.refine
+
+    def led_astray(*given, **options):
+        fit = refined(*given, **options)
+        return replace(fit, shape=20 * abs(fit.shape), strength=1e-3 * fit.strength)  # a gap that is never closed
+
+    monkeypatch.setattr(candidates, "refine", led_astray)
+    if not far_off:
+        monkeypatch.setattr(candidates, "FAR_OFF", np.inf)
+    found = candidates.find_candidates(track, track, [GapContact()])
+    is_found = bool(found) and (found[0].strength, found[0].shape) == pytest.approx((3e4, 2e-4), rel=0.05)
+    assert is_found is far_off

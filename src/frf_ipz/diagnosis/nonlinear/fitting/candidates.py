@@ -35,6 +35,7 @@ FIRST, MORE = 2, 6  # steps of the fit by simulation: of all, and of those that 
 HOPELESS, HOPELESS_LATE = 10.0, 4.0  # times the smallest cost, on short and on long stretches
 HOPELESS_NEAR = 1.5  # times the cost of a neighbour that is good already
 FINALISTS = 3  # that are simulated on long stretches
+FAR_OFF = 4.0  # mean square over the expected one: with more, laws are simulated as they were read
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
 BETTER = 0.02  # relative drop of the cost that is worth more: by another start, or places beside to be fitted again
 NEIGHBOURS = 2
@@ -116,6 +117,8 @@ def find_candidates(
     early = _climbed(short, [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]])
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
     fits = _best_of_each(known + _finished(long, finalists))
+    if fits and fits[0].cost > FAR_OFF * fits[0].n_rows:
+        fits = _best_of_each(fits + _finished(long, _as_read(long, laws)))
     if first is None or _explain(fits):
         return fits
     again = _climbed(short, _first(first(), laws))
@@ -200,9 +203,19 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
 
 
 def _read(track: Track, laws: Sequence[Law]) -> list[LawFit]:
-    """Fit the laws from numbers that are read from the force at the likeliest places, whatever its law."""
+    """Fit the laws from numbers that are read from the force."""
+    return [refine(track.stretches, track.linear.freedom, start, n_turns=TURNS) for start in _starts(track, laws)]
+
+
+def _as_read(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+    """Simulate the laws with the numbers read, which refining may have led astray."""
+    return [shoot(track.stretches, track.linear.freedom, start, iterations=FIRST) for start in _starts(track, laws)]
+
+
+def _starts(track: Track, laws: Sequence[Law]) -> list[Start]:
+    """Read the laws from the force itself at the likeliest places, whatever its law."""
     starts = [start_at(track.stretches, track.linear, free, law) for free in track.where.forces[:READ] for law in laws]
-    return [refine(track.stretches, track.linear.freedom, start, n_turns=TURNS) for start in starts if start.strength]
+    return [start for start in starts if start.strength]
 
 
 def _simulated(
