@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 
@@ -62,3 +62,37 @@ class Finding:
     is_significant: bool = True
     key: tuple[object, ...] = ()
     values: tuple[float, ...] = ()
+
+
+def doubt_of_place(places: Sequence[Mapping[str, object]]) -> str:
+    """Say between which places a test does not decide.
+
+    Parameters
+    ----------
+    places : sequence of mapping
+        Locations as in `diagnosis.json`, the most probable first.
+
+    Returns
+    -------
+    str
+        A sentence with a space before it; empty for a single place.
+    """
+    if len(places) < 2:
+        return ""
+    kinds: dict[str, list[tuple[object, ...]]] = {}
+    for place in places:
+        for kind, value in list(place.items())[:1]:
+            kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list | tuple) else (value,))
+    words = " or ".join(f"{kind} {_in_words(kind, found)}" for kind, found in kinds.items())
+    return f" The test tells its place no closer than {words}."
+
+
+def _in_words(kind: str, found: list[tuple[object, ...]]) -> str:
+    """Single numbers as runs, stretches of elements from their first to their last, others as they are."""
+    numbers = sorted(number for (number, *more) in found if isinstance(number, int) and not more)
+    if len(numbers) == len(found):
+        breaks = [i for i in range(len(numbers)) if i == 0 or numbers[i] > numbers[i - 1] + 1]
+        runs = [numbers[a:b] for a, b in zip(breaks, [*breaks[1:], None], strict=True)]
+        return ", ".join(f"{run[0]}" if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs)
+    joined = " to " if kind == "elements" else " and "
+    return ", ".join(joined.join(str(part) for part in dict.fromkeys(place)) for place in found)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.diagnosis.finding import Estimate, Finding, doubt_of_place
 from frf_ipz.diagnosis.search.search import by_effect
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def describe(
         parameters={**cause.place.text, **numbers},
         probability=probability,
         log_evidence_gain=gain,
-        statement=cause.effect.statement(hypothesis.specimen, cause.place, numbers),
+        statement=cause.effect.statement(hypothesis.specimen, cause.place, numbers) + doubt_of_place(places),
         location_set=places,
         is_significant=is_significant(fit, place),
         key=cause.place.key,

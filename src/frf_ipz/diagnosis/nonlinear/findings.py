@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import Estimate, Finding
+from frf_ipz.diagnosis.finding import Estimate, Finding, doubt_of_place
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -78,14 +78,16 @@ def findings_of(
         share = np.cumsum(probability[mine]) / max(probability[mine].sum(), 1e-300)
         listed = mine[: min(int(np.searchsorted(share, LISTED)) + 1, MOST_PLACES)]
         numbers = _numbers(fit, scale)
+        places = tuple(dict(plant.places[fits[i].place].location) for i in listed)
+        says = f"At {place.words} sits {fit.law.phrase.format(f'{fit.strength:.3g}')} that the model lacks."
         found[fit.law.name] = Finding(
             effect=fit.law.name,
             location=dict(place.location),
             parameters=numbers,
             probability=float(probability[mine].sum()),
             log_evidence_gain=float(gains[index]),
-            statement=f"At {place.words} sits {fit.law.phrase.format(f'{fit.strength:.3g}')} that the model lacks.",
-            location_set=tuple(dict(plant.places[fits[i].place].location) for i in listed),
+            statement=says + doubt_of_place(places),
+            location_set=places,
         )
     return tuple(found.values())
 

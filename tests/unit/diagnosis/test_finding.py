@@ -1,0 +1,36 @@
+"""How a finding says between which places a test does not decide."""
+
+import pytest
+
+from diagnosed import beam, labels, measured, observed
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.finding import doubt_of_place
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.fe.changes import with_point_masses
+
+ADDED_KG = 2e-3
+
+
+@pytest.mark.parametrize(
+    ("places", "said"),
+    [
+        ([{"nodes": [7]}], ""),
+        ([{"nodes": [7]}, {"nodes": [5]}, {"nodes": [6]}, {"nodes": [12]}], "nodes 5 to 7, 12"),
+        ([{"nodes": [44, 64]}, {"nodes": [45, 63]}], "nodes 44 and 64, 45 and 63"),
+        ([{"elements": [36, 43]}, {"elements": [39, 39]}], "elements 36 to 43, 39"),
+        ([{"end": "right"}, {"nodes": [3]}, {"nodes": [2]}], "end right or nodes 2 to 3"),
+    ],
+)
+def test_places_that_a_test_does_not_tell_apart_are_said(places, said):
+    assert doubt_of_place(places) == (f" The test tells its place no closer than {said}." if said else "")
+
+
+def test_a_finding_says_how_closely_its_place_is_known(tmp_path):
+    """A beam clamped at both ends and looked at in its middle has no left and right."""
+    nominal = beam(tmp_path, elements=24, right="clamped")
+    frfs = measured(with_point_masses(nominal, {6: ADDED_KG}), labels(outputs=("13:+z",), inputs=("13:+z",)))
+    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    (finding,) = found.findings
+    assert {6, 20} <= {place["nodes"][0] for place in finding.location_set}
+    assert finding.statement.endswith(doubt_of_place(finding.location_set))
+    assert "no closer than nodes" in found.statement
