@@ -1,5 +1,7 @@
 """Places that explain a test as well as the best one that a search came to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,6 +113,11 @@ def test_what_was_not_weighed_again_is_no_contender(valley, monkeypatch):
     assert alike.fits[2].log_evidence > alike.fits[0].log_evidence - ties.TIE
     found = settle_ties(valley, alike)
     assert [fit.log_evidence > found.fits[0].log_evidence - ties.TIE for fit in found.fits] == [True, True, False]
+
+
+def test_nothing_is_looked_for_beside_what_explains_nothing(valley):
+    alike = only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)
+    assert len(settle_ties(valley, replace(alike, base=alike.fits[0])).fits) == 2
 
 
 def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypatch):

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
 TIE = 8.0  # nats behind the best: what is so near is weighed again
-EACH = 8  # places of an effect that are
+EACH, MOST = 8, 24  # places of an effect that are, and of all effects
 BESIDE, MOST_BESIDE = 4.0, 30  # nats behind the best of these, beside which places are looked at, and how many
 
 
@@ -72,7 +72,8 @@ def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
         data = _likely_errors(bench, near[0])
         stricts = {part: replace(bench, nuisance=bench.nuisance.with_part(part), data=data) for part in PARTS}
         settled = {fit.hypothesis.causes[-1].key: _weigh(bench, stricts, fit) for fit in near}
-        _look_beside(bench, ranking.base, fits, settled, stricts)
+        if is_found:
+            _look_beside(bench, ranking.base, fits, settled, stricts)
     return replace(ranking, fits=_in_order(fits, settled), n_tried=n_tried)
 
 
@@ -86,7 +87,7 @@ def _nearest(fits: Fits) -> list[Fit]:
         counts[effect] += 1
         if fit.log_evidence > order[0].log_evidence - TIE and counts[effect] <= EACH:
             near.append(fit)
-    return near
+    return near[:MOST]
 
 
 def _look_beside(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]) -> None:
