@@ -14,12 +14,12 @@ from frf_ipz.diagnosis.search.fit import Data, Fit
 from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
 from frf_ipz.diagnosis.search.polish import polish, same_modes
 
-LAST_STEPS = 90  # along a bent valley many are small
-
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.physics.nuisance import Nuisance
+
+LAST_STEPS = 90  # along a bent valley many are small
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
