@@ -109,7 +109,8 @@ def search_beside_law(
     -------
     tuple of LawSearch and Finding, or None
         The law and the linear cause, which both explain; None where the law did not strain the model, where it did not
-        even follow the recordings, or where no cause relieves the model.
+        even follow the recordings, where no cause relieves the model, or where the law explains first moments only,
+        with the cause as without it.
     """
     without = _without(observations, laws)
     if without is None:
@@ -126,6 +127,8 @@ def search_beside_law(
     change = best.hypothesis.change(best.values)
     again = search_laws(with_change(model, change), restore(observations, change))
     if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.strain < STRAINED):
+        return None
+    if laws.is_early and again.is_early:  # what the law misses later is no better explained
         return None
     scale = max(1.0, best.mean_misfit)
     return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)

@@ -142,21 +142,23 @@ def test_a_law_alone_does_not_strain_the_model(solved):
 
 
 @pytest.mark.parametrize(
-    ("strain", "alone", "again", "doubt", "has_dynamics", "both"),
+    ("strain", "alone", "again", "doubt", "has_dynamics", "early", "both"),
     [
-        (50.0, ("explained", 2.0), 2.0, "", False, True),
-        (50.0, ("explained", 2.0), 20.0, "", True, True),
-        (50.0, ("unexplained", 0.5), 2.0, "", False, True),
-        (50.0, ("unexplained", 0.5), 20.0, "", False, False),
-        (50.0, ("unexplained", 0.5), 2.0, "", True, False),
-        (50.0, ("unexplained", 2.0), 2.0, "", False, False),
-        (50.0, ("explained", 2.0), 40.0, "", False, False),
-        (5.0, ("explained", 2.0), 0.1, "", False, False),
-        (50.0, ("explained", 2.0), 2.0, "hardly swings", False, False),
+        (50.0, ("explained", 2.0), 2.0, "", False, (False, False), True),
+        (50.0, ("explained", 2.0), 20.0, "", True, (False, False), True),
+        (50.0, ("unexplained", 0.5), 2.0, "", False, (False, False), True),
+        (50.0, ("unexplained", 0.5), 20.0, "", False, (False, False), False),
+        (50.0, ("unexplained", 0.5), 2.0, "", True, (False, False), False),
+        (50.0, ("unexplained", 2.0), 2.0, "", False, (False, False), False),
+        (50.0, ("explained", 2.0), 40.0, "", False, (False, False), False),
+        (5.0, ("explained", 2.0), 0.1, "", False, (False, False), False),
+        (50.0, ("explained", 2.0), 2.0, "", False, (True, False), True),
+        (50.0, ("explained", 2.0), 2.0, "", False, (True, True), False),
+        (50.0, ("explained", 2.0), 2.0, "hardly swings", False, (False, False), False),
     ],
 )
 def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
-    monkeypatch, strain, alone, again, doubt, has_dynamics, both
+    monkeypatch, strain, alone, again, doubt, has_dynamics, early, both
 ):
     """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
     seen = SimpleNamespace(blows=())
@@ -177,8 +179,9 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
         monkeypatch.setattr(law_beside, name, stub)
     verdict, left = alone
     after = SimpleNamespace(training_noise=left)
-    laws = SimpleNamespace(strain=strain, verdict=verdict, after=after, fit="fit", freedom=SimpleNamespace(moving=()))
-    eased = SimpleNamespace(verdict="explained", strain=again)
+    at_rest = SimpleNamespace(moving=())
+    laws = SimpleNamespace(strain=strain, verdict=verdict, after=after, fit="fit", freedom=at_rest, is_early=early[0])
+    eased = SimpleNamespace(verdict="explained", strain=again, is_early=early[1])
     bench = SimpleNamespace(kind="hammer")
     found = law_beside.search_beside_law(lambda _: bench, laws, "model", seen, lambda *_: eased)
     assert found == ((eased, "spring") if both else None)

@@ -252,24 +252,41 @@ def test_first_moments_lead_to_a_law_where_short_stretches_do_not(monkeypatch, b
     assert [fit.place for fit in found] == expected
 
 
+def a_first_track(left: float, *, afresh: float) -> SimpleNamespace:
+    """Of which a linear model leaves 10000."""
+
+    def shoot(cost: float) -> SimpleNamespace:
+        return SimpleNamespace(cost=cost, n_rows=3000, misfit=None, numbers={"cubic": (1.0, 1e-4)})
+
+    return SimpleNamespace(
+        stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: False)),
+        linear=SimpleNamespace(cost=1e4, freedom=None),
+        shoot=lambda *_: shoot(left),
+        shoot_afresh=lambda *_: shoot(afresh),
+    )
+
+
 @pytest.mark.parametrize(
     ("left", "drop", "disagree", "explains"),
-    [(90.0, 50.0, 2.0, True), (200.0, 50.0, 2.0, False), (90.0, 200.0, 2.0, False), (90.0, 50.0, 50.0, False)],
+    [
+        ([(90.0, 90.0)], 50.0, 2.0, True),
+        ([(900.0, 900.0)], 50.0, 2.0, False),
+        ([(90.0, 90.0)], 250.0, 2.0, False),
+        ([(90.0, 90.0)], 50.0, 50.0, False),
+        ([(900.0, 900.0), (90.0, 90.0)], 50.0, 2.0, True),
+        ([(90.0, 900.0)], 50.0, 2.0, True),
+        ([(900.0, 90.0)], 50.0, 2.0, True),
+    ],
 )
 def test_a_law_that_explains_all_but_little_of_the_first_moments_is_believed(
     monkeypatch, left, drop, disagree, explains
 ):
-    """A linear model leaves 10000 there; errors of the model imitate a bend of 100."""
-    moving = SimpleNamespace(any=lambda: False)
-    short = SimpleNamespace(
-        stretches=SimpleNamespace(moving=moving),
-        linear=SimpleNamespace(cost=1e4, freedom=None),
-        shoot_afresh=lambda *_: SimpleNamespace(cost=left, n_rows=300, misfit=None, numbers={"cubic": (1.0, 1e-4)}),
-    )
+    """Of stretches of any length, by the better of both starts; errors of the model imitate a bend of 200."""
     monkeypatch.setattr(search, "agreement_with", lambda *_: Agreement(1e4, disagree))
     monkeypatch.setattr(search, "relative_misfit", lambda *_: 0.03)
     monkeypatch.setattr(search, "_bend", lambda *_: drop)
-    assert search._explains_first(short, SimpleNamespace()) == explains
+    firsts = (a_first_track(one, afresh=afresh) for one, afresh in left)
+    assert search._explains_first(firsts, SimpleNamespace()) == explains
 
 
 def test_what_leads_to_the_same_law_is_not_fitted_again():

@@ -70,6 +70,11 @@ class Track:
         """Mean square that the linear model leaves, over the expected one."""
         return self.linear.cost / self.linear.n_rows
 
+    @property
+    def duration_s(self) -> float:
+        """How long the stretches are, s."""
+        return self.stretches.duration_s
+
     def beside(self, place: int) -> list[int]:
         """Possible places among the two that move most like a place."""
         near = neighbours(self.linear.freedom.plant, place, NEIGHBOURS)
