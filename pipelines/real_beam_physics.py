@@ -19,8 +19,9 @@ sensor that is left out is predicted to 7.2 dB by updating the plain model, and 
 the first three or four alone it is predicted badly (15 and 48 dB): the update then pairs some resonances wrongly.
 
 What to expect of the free beam: its model, within these tolerances, lies on the measured FRFs; the gain of the driving
-point, 99 / 99, is 15 % below those of the other eight, and what is left beside the drift is largest below 100 Hz,
-where the beam moves in its cords.
+point, 99 / 99, is 15 % below those of the other eight, and what is left beside the drift, 2.1 times as much, is largest
+below 100 Hz, where the beam moves in its cords. What is added gains 50 to 170 nats each and leaves 2.0 times: none of
+it is the cords, and none is worth believing.
 """
 
 from __future__ import annotations
