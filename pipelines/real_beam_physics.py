@@ -16,7 +16,7 @@ which the plain beam has one each: its model lacks the bent legs and the wires t
 no word for them but resonator. A sensor a few millimetres off comes last (700 nats). The misfit falls from 10.3 to 3.5
 times the expected one, and all resonances are some 20 % lower than the model's and its tolerances say: unexplained. The
 sensor that is left out is predicted to 7.2 dB by updating the plain model, and to 5.2 dB with these causes in it. With
-the first three or four alone it is predicted badly (15 and 48 dB): the update then pairs some resonances wrongly.
+the first three or four alone it is predicted badly (15 and 48 dB): the update then goes astray.
 
 What to expect of the free beam: its model, within these tolerances, lies on the measured FRFs; the gain of the driving
 point, 99 / 99, is 15 % below those of the other eight, and what is left beside the drift, 2.1 times as much, is largest
