@@ -13,12 +13,14 @@ from frf_ipz.diagnosis.search.alike.contenders import fit_far, next_beside
 from frf_ipz.diagnosis.search.alike.ties import settle_ties
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
-from frf_ipz.fe.changes import with_point_masses
+from frf_ipz.dofs import parse_dof
+from frf_ipz.fe.changes import with_point_masses, with_springs
 
 NODES, TRUE, MIRRORED, ADDED_KG = 25, 6, 20, 2e-3
 LITTLE_KG = 5e-5  # of which the place is hardly seen
 MIDDLE = labels(outputs=("13:+z",), inputs=("13:+z",))  # a sensor and blows that do not tell left from right
 ASTRAY = 9
+SPRING_N_M = 5e3
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +124,24 @@ def test_what_was_not_weighed_again_is_no_contender(valley, monkeypatch):
 
 def test_nothing_is_looked_for_beside_what_explains_nothing(valley):
     assert len(settle_ties(valley, only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)).fits) == 2
+
+
+@pytest.mark.parametrize(("tried", "first"), [(2, "grounded_spring"), (0, "coupling_spring")])
+def test_what_looks_like_the_best_is_weighed_where_the_best_sits_now(nominal, monkeypatch, tried, first):
+    """A search that came to a spring to a node beside the clamped end, which hardly moves."""
+    monkeypatch.setattr(ties, "fit_far", lambda *_: 0)
+    monkeypatch.setattr(ties, "MOST_BESIDE", 0)
+    monkeypatch.setattr(ties, "MOST_ALIKE", tried)
+    true = with_springs(nominal, {parse_dof(f"{TRUE}:+z"): SPRING_N_M})
+    frfs = measured(true, labels(outputs=("8:+z",), inputs=("10:+z",)))
+    bench = bench_of(nominal, frfs, ("grounded_spring", "coupling_spring"))
+    effect = bench.effects["coupling_spring"]
+    places = effect.places(bench.specimen)
+    near_it = [place for place in places if place.location["nodes"] in ([2, TRUE], [2, TRUE + 1])]
+    causes = [Cause(effect=effect, place=place, n_places=len(places)) for place in near_it]
+    fits = sorted((bench.fit((cause,), np.array([SPRING_N_M])) for cause in causes), key=lambda fit: -fit.log_evidence)
+    found = settle_ties(bench, Ranking(base=fit_nothing(bench), fits=tuple(fits), n_tried=0))
+    assert found.best.hypothesis.causes[-1].effect.name == first
 
 
 def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypatch):

@@ -81,11 +81,31 @@ def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> 
 
 def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
     """Fit what looks like the best, at its place or at one end of it."""
-    cause = best.hypothesis.causes[-1]
-    for effect in bench.effects.values():
-        for other in causes_of(effect, bench.specimen) if are_alike(effect, cause.effect) else ():
-            if _is_within(other.place, cause.place) and other.key not in fits:
-                fits[other.key] = fit_from_neighbour(bench, base, other, best, bar_of(fits.values()))
+    for other in imitators_of(bench, best):
+        if other.key not in fits:
+            fits[other.key] = fit_from_neighbour(bench, base, other, best, bar_of(fits.values()))
+
+
+def imitators_of(bench: Bench, fit: Fit) -> list[Cause]:
+    """List what looks like the last cause of a fit, at its place or at one end of it.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    fit : Fit
+        With one cause at least.
+
+    Returns
+    -------
+    list of Cause
+        Of other effects.
+    """
+    cause = fit.hypothesis.causes[-1]
+    alike = [effect for effect in bench.effects.values() if are_alike(effect, cause.effect)]
+    return [
+        other for effect in alike for other in causes_of(effect, bench.specimen) if _is_within(other.place, cause.place)
+    ]
 
 
 def _is_within(one: Place, other: Place) -> bool:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from frf_ipz.diagnosis.search.alike.contenders import fit_far, next_beside
-from frf_ipz.diagnosis.search.climb import Fits, bar_of, fit_from_neighbour
+from frf_ipz.diagnosis.search.climb import Fits, bar_of, fit_from_neighbour, imitators_of
 from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking
 from frf_ipz.diagnosis.search.set_up import with_errors
@@ -27,12 +27,14 @@ from frf_ipz.diagnosis.search.set_up import with_errors
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data, Fit
+    from frf_ipz.diagnosis.search.hypothesis import Cause
 
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
 TIE = 8.0  # nats behind the best: what is so near is weighed again
 EACH, MOST = 8, 24  # places of an effect that are, and of all effects
 BESIDE, MOST_BESIDE = 4.0, 30  # nats behind the best of these, beside which places are looked at, and how many
+MOST_ALIKE = 2  # times that what looks like the best may lead elsewhere
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +76,7 @@ def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
         settled = {fit.hypothesis.causes[-1].key: _weigh(bench, stricts, fit) for fit in near}
         if is_found:
             _look_beside(bench, ranking.base, fits, settled, stricts)
+            _look_alike(bench, ranking.base, fits, settled, stricts)
     return replace(ranking, fits=_in_order(fits, settled), n_tried=n_tried)
 
 
@@ -100,13 +103,32 @@ def _look_beside(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts
         if found is None:
             return
         cause, beside = found
-        if cause.key not in fits:
-            fits[cause.key] = fit_from_neighbour(bench, base, cause, beside, bar_of(fits.values()))
-        fit = fits[cause.key]
-        if fit.log_evidence > max(one.log_evidence for one in fits.values()) - TIE:
-            settled[cause.key] = _weigh(bench, stricts, fit)
-        else:
+        if not _add(bench, base, cause, beside, fits, settled, stricts):
             far.add(cause.key)
+
+
+def _look_alike(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]) -> None:
+    """Weigh what looks like the best where that sits now, and places beside it: theirs were found elsewhere before."""
+    for _ in range(MOST_ALIKE):
+        best = max(settled.values(), key=lambda one: one.log_evidence)
+        others = [cause for cause in imitators_of(bench, best.fit) if cause.key not in settled]
+        added = [cause for cause in others if _add(bench, base, cause, best.fit, fits, settled, stricts)]
+        if all(settled[cause.key].log_evidence < best.log_evidence - BESIDE for cause in added):
+            return
+        _look_beside(bench, base, fits, settled, stricts)
+
+
+def _add(
+    bench: Bench, base: Fit, cause: Cause, like: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]
+) -> bool:
+    """Fit a cause from a similar one, and weigh it if it is near the best; False if it is not."""
+    if cause.key not in fits:
+        fits[cause.key] = fit_from_neighbour(bench, base, cause, like, bar_of(fits.values()))
+    fit = fits[cause.key]
+    is_near = fit.log_evidence > max(one.log_evidence for one in fits.values()) - TIE
+    if is_near:
+        settled[cause.key] = _weigh(bench, stricts, fit)
+    return is_near
 
 
 def _in_order(fits: Fits, settled: _Settled) -> tuple[Fit, ...]:
