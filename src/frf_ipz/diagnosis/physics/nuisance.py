@@ -28,6 +28,9 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.diagnosis.physics.layout import extents, kink_beside, motion_row, shift_rows
+from frf_ipz.fe.beams.beam_options import BeamFile
+from frf_ipz.fe.beams.variants import with_formulation
+from frf_ipz.fe.eigen import solve_basis
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -40,6 +43,7 @@ ACROSS = 0.5  # kappa and mu between two modes, over those of one: fields averag
 MASS_PART = 0.5  # tolerance of masses over that of stiffness
 CORDS = 0.02  # frequency of a free structure in its cords, over its first elastic one
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
+LOWERED = 1.2  # times the top of the band: modes that shear would bring there
 MOST_MODES = 16
 LESS_CONVERGED = 20.0  # growth of a mode's error with its frequency over the top of the band: meshes suit the band
 REDUCED = 80.0  # the same with the square: what is far beyond the band may be lost in a reduction
@@ -48,7 +52,7 @@ MOST_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
 STEEPER = 1.0  # per standard deviation: how much faster
 FARTHEST = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
-SUSPENSION_SPREAD = 0.5  # relative standard deviation of the damping of rigid-body modes in their cords
+UNSTATED_SPREAD = 0.5  # of the damping ratio of a mode that nobody states: in its cords, or far beyond the band
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -286,8 +290,8 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         The parameters.
     """
     frequencies = np.sqrt(basis.modes.eigenvalues)
-    n_modes = int(np.clip(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s), 1, MOST_MODES))
-    n_modes = min(n_modes, len(frequencies))
+    n_modes = max(int(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s)), 1, _lowered(basis))
+    n_modes = min(n_modes, MOST_MODES, len(frequencies))
     n_rigid = min(basis.modes.n_rigid, n_modes)
     stiffness, mass = options.stiffness_tolerance * UNIFORM, MASS_PART * options.stiffness_tolerance * UNIFORM
     kappa, mu = np.full((n_modes, n_modes), ACROSS * stiffness), np.full((n_modes, n_modes), ACROSS * mass)
@@ -308,7 +312,7 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         n_rigid=n_rigid,
         kappa_std=kappa,
         mu_std=mu,
-        damping_std=np.where(np.arange(n_modes) < n_rigid, SUSPENSION_SPREAD, options.damping_tolerance * UNIFORM),
+        damping_std=_damping_std(options.damping_tolerance * UNIFORM, growth, n_rigid),
         cords_std=(CORDS * first) ** 2,
         axes=axes,
         shift_std=shift_std,
@@ -319,6 +323,22 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         gain_std=options.gain_tolerance * UNIFORM,
         is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
     )
+
+
+def _lowered(basis: Basis) -> int:
+    """Count the modes that shear, where a thick beam was modelled without it, could bring into the band."""
+    source = basis.model.source
+    if not isinstance(source, BeamFile) or source.beam.formulation != "euler-bernoulli":
+        return 0
+    squares = solve_basis(with_formulation(basis.model, "timoshenko")).eigenvalues
+    return int(np.count_nonzero(np.sqrt(squares) <= LOWERED * basis.highest_rad_s))
+
+
+def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
+    """Relative standard deviations of damping ratios: modes beyond the band are measured by no one who states them."""
+    std = np.maximum(stated, np.minimum(stated * growth, UNSTATED_SPREAD))
+    std[:n_rigid] = UNSTATED_SPREAD
+    return std
 
 
 def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:

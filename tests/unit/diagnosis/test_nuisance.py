@@ -1,0 +1,69 @@
+"""What cannot be known: how many modes scatter, and how much."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from frf_ipz import read_model, solve_modes
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.basis import make_basis
+from frf_ipz.diagnosis.physics.layout import lay_out
+from frf_ipz.diagnosis.physics.nuisance import UNIFORM, make_nuisance
+from frf_ipz.dofs import Dof
+from frf_ipz.frf import FrfLabel, FrfQuantity
+
+BEAM = """
+[model]
+kind = "beam"
+[damping]
+modal_ratio = 0.01
+[beam]
+length_m = 0.6
+elements = 60
+formulation = "{formulation}"
+youngs_modulus_Pa = 2.1e11
+density_kg_m3 = 7800
+poisson_ratio = 0.3
+width_m = 0.03
+thickness_m = {thickness_m}
+left = "free"
+right = "free"
+"""
+
+
+def model_of(folder, *, thickness_m=0.01, formulation="euler-bernoulli"):
+    path = folder / f"{formulation}.toml"
+    path.write_text(BEAM.format(thickness_m=thickness_m, formulation=formulation))
+    return read_model(path)
+
+
+def nuisance_of(model, top_hz):
+    label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(12, "z"), quantity=FrfQuantity.ACCELERANCE)
+    places = [model.place(label.output_dof), model.place(label.input_dof)]
+    basis = make_basis(model, 2 * np.pi * top_hz, places)
+    return make_nuisance(basis, lay_out([label]), DiagnoseOptions())
+
+
+def test_nobody_states_the_damping_of_modes_beyond_the_band(tmp_path):
+    model, top_hz = model_of(tmp_path), 1500.0
+    nuisance = nuisance_of(model, top_hz)
+    frequency_hz = solve_modes(model, n_modes=nuisance.n_modes).natural_frequency_hz
+    inside, tolerance = frequency_hz <= top_hz, UNIFORM * DiagnoseOptions().damping_tolerance
+    assert_allclose(nuisance.damping_std[2:][inside[2:]], tolerance)
+    assert (nuisance.damping_std[~inside] > 1.5 * tolerance).all()
+    assert (nuisance.damping_std <= 0.5).all()
+
+
+@pytest.mark.parametrize(("thickness_m", "brings"), [(0.08, True), (0.01, False)])
+def test_modes_that_shear_brings_into_the_band_scatter(tmp_path, thickness_m, brings):
+    model = model_of(tmp_path, thickness_m=thickness_m)
+    sheared = model_of(tmp_path, thickness_m=thickness_m, formulation="timoshenko")
+    top_hz = 25_000.0 if brings else 3000.0
+    below = int(np.count_nonzero(solve_modes(sheared, n_modes=20).natural_frequency_hz <= top_hz))
+    twice = int(np.count_nonzero(solve_modes(model, n_modes=20).natural_frequency_hz <= 2 * top_hz))
+    assert (below > twice) == brings, "the case is not what it should be"
+    n_modes = nuisance_of(model, top_hz).n_modes
+    assert n_modes >= below
+    assert brings or n_modes == twice
