@@ -10,6 +10,7 @@ from pathlib import Path
 
 import tomlkit
 
+from frf_ipz.toml_files import read_text
 from proof_tools.commands import Step, code_digest, public_command, read_done, run_all
 from proof_tools.plan import Folders
 
@@ -84,7 +85,7 @@ def worth_predicting(name: str, folders: Folders) -> bool:
     done = read_done(folders.diagnosed, name)
     if done is None or done.status or not path.is_file():
         return False
-    pipeline = tomlkit.parse((folders.cases / name / "pipeline.toml").read_text(encoding="utf-8"))
+    pipeline = tomlkit.parse(read_text(folders.cases / name / "pipeline.toml"))
     verdict = json.loads(path.read_text(encoding="utf-8")).get("verdict")
     return verdict == "explained" and bool(pipeline.get("predict", {}).get("points"))
 
@@ -107,7 +108,7 @@ def write_pipeline(folders: Folders, name: str, *, applying: bool) -> Path:
         The file, with absolute paths.
     """
     case = (folders.cases / name).resolve()
-    document = tomlkit.parse((case / "pipeline.toml").read_text(encoding="utf-8"))
+    document = tomlkit.parse(read_text(case / "pipeline.toml"))
     head = document["pipeline"]
     for key in ("test", "model"):
         if key in head:

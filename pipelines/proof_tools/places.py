@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from frf_ipz.toml_files import read_text
+
 KEYS = ("nodes", "elements", "springs", "groups", "channels")
 EXACT, NEAR, WRONG = "exact", "near", "wrong"
 RANKS = {EXACT: 2, NEAR: 1, WRONG: 0}
@@ -77,12 +79,12 @@ def read_layout(case: Path) -> Layout:
     Layout
         Of its model.
     """
-    table = tomllib.loads((case / "model.toml").read_text(encoding="utf-8"))
+    table = tomllib.loads(read_text(case / "model.toml"))
     if "lumped" in table:
         return Layout(springs={one["id"]: tuple(one["nodes"]) for one in table["lumped"]["spring"]})
     if "beam" in table:
         return Layout(ends={"left": 1, "right": table["beam"]["elements"] + 1})
-    lines = (case / table["matrices"]["dofs"]).read_text(encoding="utf-8").split()
+    lines = read_text(case / table["matrices"]["dofs"]).split()
     rows = [line.split(",") for line in lines[1:]]
     return Layout(positions={int(row[0]): tuple(float(x) for x in row[2:5]) for row in rows})
 

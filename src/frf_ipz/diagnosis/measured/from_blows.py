@@ -6,18 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
-from scipy.fft import next_fast_len
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
 from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energies, window_energy
+from frf_ipz.diagnosis.measured.lines import Lines, lines_of_band, same_places
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer import Measured
 from frf_ipz.diagnosis.observations import Blow, Observations, spectra
 from frf_ipz.frf import FrfLabel
 
 ENOUGH = 8.0  # decays within a record: of a mode 3e-4 is left
-FINER = 4  # lines between those of the record: peaks are seen at their tops
 SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
 LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
 UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
@@ -70,11 +69,11 @@ def survey(observations: Observations) -> Survey:
     is_hammer = observations.kind == "hammer"
     groups, pulses = _prepared(observations)
     decay = ENOUGH / min(blow.duration_s for group in groups for blow in group)
-    line_sets = [_lines(group, observations.band_hz, decay) for group in groups]
+    line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
     if is_hammer:
         flat = tuple(p for group in pulses for p in group)
-        noise = force_noise(tuple(b for group in _groups(observations) for b in group), flat)
+        noise = force_noise(tuple(b for group in same_places(observations) for b in group), flat)
     else:
         noise = _noise_of_records(groups, line_sets)
     responses = _response_noise(groups, pulses, line_sets, noise)
@@ -111,26 +110,12 @@ def _prepared(
     observations: Observations,
 ) -> tuple[tuple[tuple[Blow, ...], ...], tuple[tuple[Pulse, ...], ...]]:
     """Blows of each place, and the pulses of hammers."""
-    groups = _groups(observations)
+    groups = same_places(observations)
     if observations.kind != "hammer":
         whole = tuple(tuple(Pulse(blow=blow, start=0, stop=blow.n_samples) for blow in group) for group in groups)
         return groups, whole
     pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
     return tuple(tuple(pulse.blow for pulse in group) for group in pulses), pulses
-
-
-def _groups(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
-    keys = dict.fromkeys(
-        (blow.input_dof, tuple((sensor.channel, sensor.dof) for sensor in blow.sensors)) for blow in observations.blows
-    )
-    return tuple(
-        tuple(
-            blow
-            for blow in observations.at(key[0])
-            if tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) == key[1]
-        )
-        for key in keys
-    )
 
 
 def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
@@ -139,47 +124,8 @@ def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
     return max(enough_1_s - SURE_PART * slowest, LEAST_PART * enough_1_s)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Lines:
-    s: ComplexArray
-    force: ComplexArray  # (n_lines, n_blows)
-    responses: ComplexArray  # (n_lines, n_blows, n_sensors)
-
-    @property
-    def frequency_hz(self) -> FloatArray:
-        return np.asarray(self.s.imag / (2 * np.pi))
-
-    @property
-    def power(self) -> FloatArray:
-        return np.asarray((np.abs(self.force) ** 2).sum(1))
-
-    @property
-    def values(self) -> ComplexArray:
-        crossed = (self.responses * self.force.conj()[:, :, None]).sum(1)
-        return np.asarray(crossed / self.power[:, None])
-
-    @property
-    def unexplained(self) -> FloatArray:
-        """Energy of each response, (n_lines, n_sensors), that the FRF of all blows does not explain."""
-        residual = self.responses - self.values[:, None, :] * self.force[:, :, None]
-        return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
-
-
-def _lines(group: tuple[Blow, ...], band_hz: tuple[float, float], decay: float) -> _Lines:
-    """Uniform lines by FFT; blows of a group may differ in length, the shortest counts."""
-    n, step = min(blow.n_samples for blow in group), group[0].step_s
-    window = np.exp(-decay * step * np.arange(n)) * step
-    padded = next_fast_len(FINER * n, real=True)
-    frequency = np.fft.rfftfreq(padded, step)
-    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = np.stack([np.fft.rfft(blow.force[:n] * window, padded)[inside] for blow in group], 1)
-    responses = np.stack([np.fft.rfft(blow.responses[:, :n] * window, padded)[:, inside].T for blow in group], 1)
-    s = np.asarray(decay + 2j * np.pi * frequency[inside], np.complex128)
-    return _Lines(s=s, force=force, responses=responses)
-
-
 def _response_noise(
-    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[_Lines], noise: Noise
+    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], noise: Noise
 ) -> dict[str, Noise]:
     found = {}
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
@@ -212,7 +158,7 @@ def _signals(groups: tuple[tuple[Blow, ...], ...], channel: str) -> list[FloatAr
     ]
 
 
-def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[_Lines]) -> Noise:
+def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines]) -> Noise:
     """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
     found = [
         fit_force_noise(
@@ -225,14 +171,14 @@ def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[_Lin
     return Noise(white=float(np.median(found)) if found else 0.0)
 
 
-def _gain(group: tuple[Blow, ...], lines: _Lines) -> FloatArray:
+def _gain(group: tuple[Blow, ...], lines: Lines) -> FloatArray:
     """Energy on each line of noise of density 1 over the whole record."""
     rate = 2 * lines.s.real
     return np.asarray((1 - np.exp(-rate * _duration_s(group))) / rate)
 
 
 def _noise_of_single(
-    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[_Lines], channel: str
+    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], channel: str
 ) -> Noise:
     """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
     white = 0.0
@@ -253,7 +199,7 @@ def _duration_s(group: tuple[Blow, ...]) -> float:
     return min(blow.duration_s for blow in group)
 
 
-def _resonances(line_sets: list[_Lines], decay: float) -> Resonances:
+def _resonances(line_sets: list[Lines], decay: float) -> Resonances:
     lines = line_sets[0]
     level = np.zeros(len(lines.frequency_hz))
     for one in line_sets:
@@ -305,16 +251,16 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
     )
 
 
-def _bias(found: Survey, place: int, points: _Lines) -> FloatArray:
+def _bias(found: Survey, place: int, points: Lines) -> FloatArray:
     """Undo what noise of the force takes off the FRFs: it adds to the force's power."""
     noise = found.force.density(points.frequency_hz)
     added = noise * np.sum([window_energies(points.s, pulse) for pulse in found.pulses[place]], axis=0)
     return np.asarray(1 / (1 - np.minimum(added / points.power, MOST_BIAS)))
 
 
-def _at(group: tuple[Blow, ...], s: ComplexArray) -> _Lines:
+def _at(group: tuple[Blow, ...], s: ComplexArray) -> Lines:
     pairs = spectra(group, s)
-    return _Lines(
+    return Lines(
         s=s,
         force=np.stack([force for force, _ in pairs], 1),
         responses=np.stack([responses for _, responses in pairs], 1),
@@ -328,7 +274,7 @@ def _record_noise(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexAr
     return np.asarray(np.outer(root, root) * (1 - np.exp(-rate * duration_s)) / rate)
 
 
-def _common(found: Survey, place: int, points: _Lines) -> ComplexArray:
+def _common(found: Survey, place: int, points: Lines) -> ComplexArray:
     """Errors that the force's noise puts on all FRFs of a place, as independent columns."""
     n = len(points.frequency_hz)
     if found.force.white == 0:

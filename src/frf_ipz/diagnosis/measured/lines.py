@@ -1,0 +1,111 @@
+"""Blows at one place with the same sensors, transformed on uniform lines beside the axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+FINER = 4  # lines between those of the record: peaks are seen at their tops
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lines:
+    """Transforms of some blows at one place.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        rad/s.
+    force : (n_lines, n_blows) complex array
+        N s.
+    responses : (n_lines, n_blows, n_sensors) complex array
+        SI.
+    """
+
+    s: ComplexArray
+    force: ComplexArray
+    responses: ComplexArray
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Frequencies of the lines, Hz."""
+        return np.asarray(self.s.imag / (2 * np.pi))
+
+    @property
+    def power(self) -> FloatArray:
+        """Energy of the force of all blows, (n_lines,)."""
+        return np.asarray((np.abs(self.force) ** 2).sum(1))
+
+    @property
+    def values(self) -> ComplexArray:
+        """FRFs of all blows together, (n_lines, n_sensors)."""
+        crossed = (self.responses * self.force.conj()[:, :, None]).sum(1)
+        return np.asarray(crossed / self.power[:, None])
+
+    @property
+    def unexplained(self) -> FloatArray:
+        """Energy of each response, (n_lines, n_sensors), that the FRF of all blows does not explain."""
+        residual = self.responses - self.values[:, None, :] * self.force[:, :, None]
+        return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
+
+
+def lines_of_band(group: tuple[Blow, ...], band_hz: tuple[float, float], decay_1_s: float) -> Lines:
+    """Transform blows to uniform lines of a band by FFT.
+
+    Parameters
+    ----------
+    group : tuple of Blow
+        At one place, with the same sensors; where they differ in length, the shortest counts.
+    band_hz : pair of float
+        Hz.
+    decay_1_s : float
+        Distance of the lines from the axis.
+
+    Returns
+    -------
+    Lines
+        `FINER` times as many as the shortest record has.
+    """
+    n, step = min(blow.n_samples for blow in group), group[0].step_s
+    window = np.exp(-decay_1_s * step * np.arange(n)) * step
+    padded = next_fast_len(FINER * n, real=True)
+    frequency = np.fft.rfftfreq(padded, step)
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    force = np.stack([np.fft.rfft(blow.force[:n] * window, padded)[inside] for blow in group], 1)
+    responses = np.stack([np.fft.rfft(blow.responses[:, :n] * window, padded)[:, inside].T for blow in group], 1)
+    s = np.asarray(decay_1_s + 2j * np.pi * frequency[inside], np.complex128)
+    return Lines(s=s, force=force, responses=responses)
+
+
+def same_places(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
+    """Gather the blows with the same place and the same sensors.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+
+    Returns
+    -------
+    tuple of tuple of Blow
+        The strongest of each place first.
+    """
+    keys = dict.fromkeys(
+        (blow.input_dof, tuple((sensor.channel, sensor.dof) for sensor in blow.sensors)) for blow in observations.blows
+    )
+    return tuple(
+        tuple(
+            blow
+            for blow in observations.at(key[0])
+            if tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) == key[1]
+        )
+        for key in keys
+    )
