@@ -72,8 +72,10 @@ def beam(folder: Path, *, elements=16, formulation="euler-bernoulli", thickness_
     return _read(folder, text)
 
 
-def lumped(folder: Path):
-    return _read(folder, LUMPED)
+def lumped(folder: Path, *, damping: str = "modal_ratio = 0.01", dashpot_Ns_m: float = 0.0):
+    """A frame; a dashpot acts across its last spring."""
+    text = LUMPED.replace("modal_ratio = 0.01", damping)
+    return _read(folder, text + (f"damping_Ns_m = {dashpot_Ns_m}\n" if dashpot_Ns_m else ""))
 
 
 def _read(folder, text):

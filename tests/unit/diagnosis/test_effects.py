@@ -1,5 +1,7 @@
 """What each effect changes, against formulas and models that were changed by other means."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,6 +20,7 @@ from frf_ipz.diagnosis.search.hypothesis import Cause, suppose
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.beams.variants import with_axial_force, with_formulation
 from frf_ipz.fe.changes import released, scaled_parts, with_point_masses, with_springs
+from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
@@ -179,12 +182,18 @@ def resonator(s):
     return 0.2 * (omega**2 + 2 * 0.05 * omega * s)
 
 
+def rising(ratio):
+    """Modulus of a loss factor of 0.04 over that where the ratio is i."""
+    return (1 + 0.04j) * (ratio / 1j) ** (2 / np.pi * np.arctan(0.04))
+
+
 @pytest.mark.parametrize(
     ("key", "modulus", "ratio"),
     [
-        ((), lambda _: 1 + 0.04j, 0.01),
-        (("causal",), lambda s: (1 + 0.04j) * (s / MIDDLE / 1j) ** (2 / np.pi * np.arctan(0.04)), 0.01),
-        (("of modes",), lambda _: 1, 0.03),
+        ((), lambda _, __: 1 + 0.04j, 0.01),
+        (("causal",), lambda s, _: rising(s / MIDDLE), 0.01),
+        (("causal, mode by mode",), lambda s, omega: rising(s / omega), 0.01),
+        (("of modes",), lambda _, __: 1, 0.03),
     ],
 )
 def test_structural_damping(tmp_path, key, modulus, ratio):
@@ -194,21 +203,64 @@ def test_structural_damping(tmp_path, key, modulus, ratio):
     k, m = frame.stiffness_all.toarray()[np.ix_(free, free)], frame.mass_all.toarray()[np.ix_(free, free)]
     squares, vectors = np.linalg.eigh(k / np.sqrt(np.outer(np.diag(m), np.diag(m))))
     shapes = vectors / np.sqrt(np.diag(m))[:, None]
-    stiffness = squares * np.broadcast_to(modulus(S), S.shape)[:, None]
+    stiffness = squares * modulus(S[:, None], np.sqrt(squares))
     modal = S[:, None] ** 2 + 2 * ratio * np.sqrt(squares) * S[:, None] + stiffness
     expected = ((shapes[2] * shapes[1]) / modal).sum(1)[:, None]
     assert_same(changed_frfs(frame, "structural_damping", key, [0.04], names), expected, REDUCED)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"damping": "rayleigh = { alpha_1_s = 3.0, beta_s = 2e-5 }"},
+        {"dashpot_Ns_m": 20.0},
+        {"damping": "rayleigh = { alpha_1_s = 0.0, beta_s = 2e-5 }", "dashpot_Ns_m": 20.0},
+    ],
+    ids=["rayleigh", "ratio and dashpot", "rayleigh and dashpot"],
+)
+def test_a_damping_matrix_is_that_of_the_fe_stage_and_its_modal_part_scatters(tmp_path, stated):
+    frame = lumped(tmp_path, **stated)
+    names = labels(("3:+x",), ("2:+x",))
+    specimen = specimen_of(frame, names)
+    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
+    nothing = suppose(specimen, nuisance, ())
+    none = np.zeros(nuisance.size)
+    assert_same(nothing.respond(np.zeros(0), none, S).values, model_frfs(frame, names, S), REDUCED)
+    modes = nothing.modes(np.zeros(0), none)
+    assert (modes.viscous is not None) == ("dashpot_Ns_m" in stated)
+    jacobian = nuisance_jacobian(nothing.respond(np.zeros(0), none, S), nuisance, specimen.layout)
+    for place in nuisance.damping_places[:3]:
+        step = np.where(np.arange(nuisance.size) == place, STEP, 0.0)
+        up, down = (nothing.respond(np.zeros(0), sign * step, S).values for sign in (1, -1))
+        slope = (up - down) / (2 * STEP)
+        assert np.linalg.norm(slope) > 0
+        assert np.linalg.norm(jacobian[:, :, place] - slope) < DIFFERENCE * np.linalg.norm(slope)
+
+
+def test_another_level_of_damping_replaces_a_damping_matrix(tmp_path):
+    frame = lumped(tmp_path, damping="rayleigh = { alpha_1_s = 3.0, beta_s = 2e-5 }")
+    names = labels(("3:+x",), ("2:+x",))
+    undamped = replace(frame, damping_all=0 * frame.damping_all, modal_damping=np.array([0.03]))
+    found = changed_frfs(frame, "damping_level", (), [0.03], names)
+    assert_same(found, model_frfs(undamped, names, S), REDUCED)
+    specimen = specimen_of(frame, names)
+    effect = shipped_effects()["damping_level"]
+    (place,) = effect.places(specimen)
+    corrected = with_change(frame, effect.build(specimen, place)(np.array([0.03])))
+    assert_same(model_frfs(corrected, names, S), model_frfs(undamped, names, S), EXACT)
+    (parameter,) = effect.parameters(specimen, place)
+    assert_allclose(parameter.neutral, np.median(solve_modes(frame).damping_ratio), rtol=1e-3)
 
 
 def test_another_level_of_damping_goes_before_half_a_loss_factor_for_each_mode(tmp_path):
     specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
     effect = shipped_effects()["structural_damping"]
     priors = {place.key: effect.log_prior(specimen, place, np.array([0.01])) for place in effect.places(specimen)}
-    assert priors["of modes",] < priors[()] == priors["causal",] == 0
+    assert priors["of modes",] < priors[()] == priors["causal",] == priors["causal, mode by mode",] == 0
     assert priors["of modes",] > -5.0  # nats: it stays among what is reported
 
 
-@pytest.mark.parametrize("key", [(), ("causal",), ("of modes",)])
+@pytest.mark.parametrize("key", [(), ("causal",), ("causal, mode by mode",), ("of modes",)])
 def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, key):
     specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
     builder = shipped_effects()["structural_damping"].build(specimen, Place(key=key))

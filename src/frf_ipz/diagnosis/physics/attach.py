@@ -48,6 +48,7 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
         stiffness_all=changed.stiffness_all
         if change.stiffness is None
         else sparse.csr_array(changed.stiffness_all + change.stiffness),
+        damping_all=changed.damping_all if change.modal_ratio is None else 0 * changed.damping_all,
         modal_damping=stated,
     )
     for attachment in change.attachments:

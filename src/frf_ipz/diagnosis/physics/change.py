@@ -62,6 +62,8 @@ class Change:
     reference_rad_s : float
         Where the stiffness is the model's: it rises with frequency, as causality asks of a constant loss factor. 0 for
         the same at all frequencies.
+    keeps_modes : bool
+        The stiffness of each mode is the model's at the mode's own frequency instead, and rises from there.
     channels : mapping of str to Transfer
         What a channel shows over what it should show.
     moved : mapping of str to int
@@ -78,6 +80,7 @@ class Change:
     added_ratio: float = 0.0
     loss_factor: float = 0.0
     reference_rad_s: float = 0.0
+    keeps_modes: bool = False
     channels: Mapping[str, Transfer] = field(default_factory=dict)
     moved: Mapping[str, int] = field(default_factory=dict)
 
@@ -94,6 +97,7 @@ class Change:
             added_ratio=self.added_ratio + other.added_ratio,
             loss_factor=self.loss_factor + other.loss_factor,
             reference_rad_s=self.reference_rad_s or other.reference_rad_s,
+            keeps_modes=self.keeps_modes or other.keeps_modes,
             channels=_product(self.channels, other.channels),
             moved={**self.moved, **other.moved},
         )

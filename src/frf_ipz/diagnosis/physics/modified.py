@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
 LEAST_RATIO = 1e-6  # where a model states no damping at all
+UNCOUPLED = 1e-3  # of the largest damping of a mode: what a matrix couples modes by that counts for nothing
 SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
 
 
@@ -32,13 +33,16 @@ class Modified:
     vectors : (q_basis, q) array
         The modes in terms of the basis.
     stated_ratio : (q,) array
-        Damping ratios.
+        Damping ratios, with what a damping matrix of the model adds to each mode.
+    is_coupled : bool
+        The damping matrix couples modes.
     """
 
     change: Change
     squares: FloatArray
     vectors: FloatArray
     stated_ratio: FloatArray
+    is_coupled: bool
 
 
 def modify(basis: Basis, change: Change) -> Modified:
@@ -65,8 +69,14 @@ def modify(basis: Basis, change: Change) -> Modified:
     if change.floating:
         squares[:n_rigid] = 0.0
     stated = _ratios(basis, change, squares) + change.added_ratio
+    is_coupled = False
+    if change.modal_ratio is None and basis.damping.any():
+        viscous = vectors.T @ basis.damping @ vectors
+        own, omega = np.diag(viscous).copy(), np.sqrt(np.abs(squares))
+        stated[n_rigid:] += own[n_rigid:] / (2 * omega[n_rigid:])
+        is_coupled = bool(np.abs(viscous - np.diag(own)).max() > UNCOUPLED * own.max())
     stated[:n_rigid] = SUSPENSION_RATIO
-    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated)
+    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled)
 
 
 def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:

@@ -50,7 +50,7 @@ class Modes:
     vectors : (q_basis, q) array
         The modes in terms of the basis.
     viscous : (q, q) array, optional
-        Damping of the model's matrix, where it has one.
+        What the model's damping matrix couples modes by; what it damps each mode by is in its ratio.
     """
 
     omega: FloatArray
@@ -172,7 +172,7 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
     turned[:, :m] = modified.vectors[:, :m] @ rotation
     ratio = modified.stated_ratio.copy()
     ratio[:m] *= 1 + unknowns.damping
-    viscous = turned.T @ basis.damping @ turned if basis.damping.any() else None
+    viscous = _coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
     return Modes(
         omega=omega,
         squares=scattered,
@@ -186,6 +186,10 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
         vectors=turned,
         viscous=viscous,
     )
+
+
+def _coupling(viscous: FloatArray) -> FloatArray:
+    return viscous - np.diag(np.diag(viscous))
 
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
@@ -234,7 +238,7 @@ def respond(
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
     loads = np.concatenate([left, right, attached])
-    motion = _solve(modes, _modulus(change, s), loads, s)
+    motion = _solve(modes, _modulus(change, modes, s), loads, s)
     own = motion[:, :, len(left) + len(right) :]
     stiffness = _coupled(own, attached, change, s)
     motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
@@ -253,18 +257,21 @@ def respond(
     )
 
 
-def _modulus(change: Change, s: ComplexArray) -> ComplexArray:
-    """Stiffness over that of the model, by its loss factor; of Kjartansson (1979) where it has to be causal."""
+def _modulus(change: Change, modes: Modes, s: ComplexArray) -> ComplexArray:
+    """Stiffness over that of the model, (n_points, 1 or q); of Kjartansson (1979) where it has to be causal."""
     loss = change.loss_factor
-    if not loss or not change.reference_rad_s:
-        return np.full(len(s), 1 + 1j * loss)
-    return np.asarray(np.hypot(1, loss) * (s / change.reference_rad_s) ** (2 / np.pi * np.arctan(loss)))
+    if not loss or not (change.reference_rad_s or change.keeps_modes):
+        return np.full((len(s), 1), 1 + 1j * loss)
+    middle = np.array([change.reference_rad_s])
+    if change.keeps_modes:
+        middle = np.where(modes.omega > 0, modes.omega, 1.0)  # rigid-body modes have no stiffness to lose energy
+    return np.asarray(np.hypot(1, loss) * (s[:, None] / middle) ** (2 / np.pi * np.arctan(loss)))
 
 
 def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArray) -> ComplexArray:
     """Modal motion under loads, (n_points, q, n_loads)."""
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
-    denominators = s[:, None] ** 2 + s[:, None] * damping + modulus[:, None] * modes.squares
+    denominators = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
     if modes.viscous is None:
         return np.asarray(loads.T[None] / denominators[:, :, None])
     dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))

@@ -9,7 +9,8 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
-from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.diagnosis.physics.change import NOTHING, Change
+from frf_ipz.diagnosis.physics.modified import LEAST_RATIO, modify
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.specimen import Specimen
@@ -66,5 +67,10 @@ class DampingLevel(Effect):
 
 
 def _stated(specimen: Specimen) -> float:
-    stated = specimen.model.modal_damping
-    return float(np.median(stated)) if stated.size and np.median(stated) > 0 else UNSTATED
+    """Typical damping ratio of the nominal modes of the band, whichever way the model states it."""
+    basis, low_high = specimen.basis, 2 * np.pi * np.array(specimen.band_hz)
+    modified = modify(basis, NOTHING)
+    omega, n_rigid = np.sqrt(np.abs(modified.squares)), basis.modes.n_rigid
+    inside = (omega >= low_high[0]) & (omega <= low_high[1]) & (np.arange(len(omega)) >= n_rigid)
+    stated = modified.stated_ratio[inside if inside.any() else slice(n_rigid, n_rigid + 1)]
+    return float(np.median(stated)) if stated.size and np.median(stated) > LEAST_RATIO else UNSTATED

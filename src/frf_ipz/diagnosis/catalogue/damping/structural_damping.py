@@ -1,8 +1,9 @@
 """Loss within the material: a loss factor of the whole stiffness.
 
 K (1 + i eta) is what the loss factor means, but answers before it is asked, which no structure does: a constant loss
-factor makes the stiffness rise with frequency (Kjartansson 1979), here from the model's in the middle of the band. Many
-simulations put eta / 2 to the damping ratio of each mode instead: the same at resonances. All three are tried.
+factor makes the stiffness rise with frequency (Kjartansson 1979), from the model's in the middle of the band, or for
+each mode from the model's at its own frequency. Many simulations put eta / 2 to the damping ratio of each mode instead:
+the same at resonances. All four are tried.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 1e-5, 1.0
-CAUSAL, OF_MODES = "causal", "of modes"
+CAUSAL, KEEPING_MODES, OF_MODES = "causal", "causal, mode by mode", "of modes"
 LESS_LIKELY = -3.0  # nats: less than what tells explanations apart, more than what priors of two numbers differ by
 TRIED = np.geomspace(2e-4, 0.5, 16)
 
@@ -33,9 +34,9 @@ class StructuralDamping(Effect):
     imitators = ("damping_level", "viscoelastic_joint", "local_damper")
 
     def places(self, specimen: Specimen) -> Sequence[Place]:
-        """Everywhere, in three forms."""
+        """Everywhere, in four forms."""
         del specimen
-        return [Place(key=()), Place(key=(CAUSAL,)), Place(key=(OF_MODES,))]
+        return [Place(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
 
     def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
         """Loss factor."""
@@ -46,6 +47,8 @@ class StructuralDamping(Effect):
         """Give it to the stiffness, or half of it to the ratio of each mode."""
         if place.key == (OF_MODES,):
             return lambda values: Change(added_ratio=float(values[0]) / 2)
+        if place.key == (KEEPING_MODES,):
+            return lambda values: Change(loss_factor=float(values[0]), keeps_modes=True)
         middle = 2 * np.pi * float(np.sqrt(specimen.band_hz[0] * specimen.band_hz[1])) if place.key else 0.0
         return lambda values: Change(loss_factor=float(values[0]), reference_rad_s=middle)
 
