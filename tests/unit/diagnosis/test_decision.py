@@ -17,8 +17,8 @@ def a_fit(log_evidence, name="local_stiffness"):
     return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence)
 
 
-def goodness_of(score):
-    return SimpleNamespace(is_good=score <= 1, score=score)
+def goodness_of(score, underrated=1.0):
+    return SimpleNamespace(is_good=score <= 1, score=score, times_underrated=underrated)
 
 
 def found(score):
@@ -67,7 +67,9 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
     monkeypatch.setattr(
         decision,
         "goodness",
-        lambda _, fit: SimpleNamespace(is_good=fit is best, score=1.01 if fit is null else 0.9, needed_nats=30.0),
+        lambda _, fit: SimpleNamespace(
+            is_good=fit is best, score=1.01 if fit is null else 0.9, needed_nats=30.0, times_underrated=1.0
+        ),
     )
     monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)

@@ -21,3 +21,14 @@ def test_the_complaint_names_the_figure_that_is_farthest_over_its_limit(worst):
     }
     assert words[worst] in found.complaint
     assert (worst == "worst_piece") == ("part of the band" in found.complaint)
+
+
+@pytest.mark.parametrize(("misfit", "piece", "times"), [(0.5, 0.6, 1.0), (0.5, 2.0, 2.0), (3.0, 2.0, 1.0)])
+def test_beside_a_model_whose_errors_are_underrated_somewhere_a_cause_must_explain_more(misfit, piece, times):
+    """Unless the model does not explain: then that it leaves much is no fault of its errors."""
+    limits = Limits(misfit=1.0, piece=4.0)
+    found = Goodness(
+        misfit=misfit, pull=0.0, worst_piece=piece, farthest=0.0, detuned=0.0, limits=limits, most_pull=45.0
+    )
+    assert found.times_underrated == times
+    assert found.needed_nats == times * limits.found_nats

@@ -128,7 +128,9 @@ def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
         return None
     good, limits = goodness(bench, ranking.best), LIMITS[bench.kind]
     gain = ranking.best_evidence - max(found.final.log_evidence, found.null.log_evidence)
-    needed = limits.beside_nats if found.good.is_good else limits.second_nats if good.is_good else PARTIAL_NATS
+    needed = limits.second_nats if good.is_good else PARTIAL_NATS
+    if found.good.is_good:
+        needed = found.good.times_underrated * limits.beside_nats
     if gain <= needed or good.score >= max(found.good.score, 1.0):
         return None
     verdict = EXPLAINED if good.is_good else UNEXPLAINED

@@ -124,10 +124,14 @@ class Goodness:
         return f"the best explanation {worst}"
 
     @property
+    def times_underrated(self) -> float:
+        """How much the errors of a good model are underrated somewhere: a cause beside it must explain as much more."""
+        return max(1.0, self.worst_piece) if self.is_good else 1.0
+
+    @property
     def needed_nats(self) -> float:
-        """Evidence that a cause beside this must have: the more, the more the errors of a good model are underrated."""
-        nats = self.limits.found_nats
-        return nats * max(1.0, self.worst_piece) if self.is_good else nats
+        """Evidence that a first cause must have where this is the nominal model."""
+        return self.times_underrated * self.limits.found_nats
 
     @property
     def _over_limits(self) -> tuple[float, float, float, float, float]:
