@@ -54,6 +54,8 @@ class Blow:
         First sample of the force that is its pulse, and the one after the last; outside there is only noise.
     rested : bool
         The structure was at rest at the first sample.
+    follows : bool
+        Another blow came before it in the same recording.
     marks : tuple of str
         What is wrong with it.
     used : bool
@@ -68,6 +70,7 @@ class Blow:
     trigger: int
     kept_force: tuple[int, int]
     rested: bool
+    follows: bool
     marks: tuple[str, ...]
     used: bool
 
@@ -186,6 +189,7 @@ def _calibrated(test: Test, facts: BlowFacts, signals: FloatArray) -> Blow:
         trigger=facts.trigger,
         kept_force=facts.kept_force,
         rested=facts.rested,
+        follows=facts.follows,
         marks=facts.marks,
         used=facts.used,
     )

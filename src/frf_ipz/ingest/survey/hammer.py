@@ -99,7 +99,8 @@ def _check_file(files: RecordingFiles, scan: FileScan, usual: int) -> list[BlowF
     blows = []
     for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
         name = blow_name(files.test, scan.path, number, len(bounds))
-        blows.append(_without_long_lead(check_blow(files.test, scan, name, rows, signals)))
+        facts = replace(check_blow(files.test, scan, name, rows, signals), follows=number > 1)
+        blows.append(_without_long_lead(facts))
     return blows
 
 

@@ -138,8 +138,8 @@ def split_blows(scan: FileScan, usual_length: int) -> tuple[tuple[int, int], ...
             starts.append(onset)
     if len(starts) == 1:
         return ((0, scan.n_rows),)
-    lead = min(starts[0], max(CELL, usual_length // 50))
-    bounds = [start - lead for start in starts] + [scan.n_rows]
+    lead = max(CELL, usual_length // 50)
+    bounds = [max(start - lead, 0) for start in starts] + [scan.n_rows]
     return tuple(pairwise(bounds))
 
 
