@@ -35,6 +35,9 @@ from frf_ipz.diagnosis.judging.gates import check, warn
 from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.judging.resolving import best_sensor
 from frf_ipz.diagnosis.judging.tracing import trace
+from frf_ipz.diagnosis.measured.cleaned.leftovers import without_leftovers
+from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
+from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
 from frf_ipz.diagnosis.nonlinear.linearised import linearise
@@ -108,14 +111,14 @@ def diagnose(
 def _diagnose(
     model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
 ) -> Diagnosis:
+    progress(0.0, "comparing weak and strong blows")
+    observations, linearity = _without_constants(observations)
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
-    progress(0.0, "measuring transfer functions")
+    progress(0.05, "measuring transfer functions")
     source = divide(observations)
     kept = _identifiable(chosen_effects(options, folder), scale)
     at_bench = partial(set_up, model, source, observations.band_hz, effects=kept, free_gains=scale)
     bench = at_bench(options)
-    progress(0.1, "comparing weak and strong blows")
-    linearity = _linearity(observations)
     gates = check(source, linearity)
     excess = linearity.score / linearity.limit if linearity and chosen_laws(options, folder) else 0.0
     certain = excess > CERTAIN
@@ -197,9 +200,22 @@ def _linear(bench: Bench, found: Decision, proof: Proof, gates: tuple[Gate, ...]
     )
 
 
+def _without_constants(observations: Observations) -> tuple[Observations, Linearity | None]:
+    """Take off what no structure does, and compare blows of several levels.
+
+    Constants are read from what blows of one linear system do not share, or, where they are of none, at rest.
+    """
+    linear = without_leftovers(observations)
+    linearity = _linearity(linear)
+    if linearity is None or not linearity.is_nonlinear:
+        return linear, linearity
+    quiet = without_quiet_constants(observations)
+    return quiet, _linearity(quiet)
+
+
 def _linearity(observations: Observations) -> Linearity | None:
     """Compare blows of several levels; None where no place has two."""
-    counts = [len(observations.at(dof)) for dof in observations.input_dofs]
+    counts = [len(blows) for blows in same_places(observations)]
     return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
 
 

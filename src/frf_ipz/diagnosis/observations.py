@@ -56,6 +56,10 @@ class Blow:
         SI units of the sensors' quantities, as recorded: a sensor of negative sign shows minus the model's motion.
     rested : bool
         The structure was at rest at the first sample.
+    follows : bool
+        Another blow came before it in the same recording: what that has left may still move the structure.
+    constant_std : (n_sensors,) array, optional
+        What constant parts of the responses may be left, one standard deviation, SI; none where it is left out.
     """
 
     name: str
@@ -66,6 +70,8 @@ class Blow:
     force: FloatArray
     responses: FloatArray
     rested: bool = True
+    follows: bool = False
+    constant_std: FloatArray | None = None
 
     def __post_init__(self) -> None:
         require_shape(f"the force of {self.name}", self.force, (None,))

@@ -65,4 +65,5 @@ def _blow(blow: recorded.Blow, test: Test) -> Blow:
         force=blow.force,
         responses=blow.responses[rows],
         rested=blow.rested,
+        follows=blow.follows,
     )

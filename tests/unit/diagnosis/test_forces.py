@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, isolate_pulse
+from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, isolate_pulse
 from frf_ipz.diagnosis.observations import Blow, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -60,3 +60,15 @@ def test_a_blow_that_noise_hides_is_kept_where_it_is_largest(level):
     force = level * a_force(3)
     top = int(np.argmax(np.abs(force)))
     assert isolate_pulse(blow(force)).blow.force[top] == force[top]
+
+
+@pytest.mark.parametrize(("start", "rings"), [(4, True), (RINGING + TAPER + 5, False)])
+def test_a_record_that_begins_within_the_ringing_of_its_filter_lacks_some(start, rings):
+    force = a_force(5, start)
+    force[max(start - 4, 0) : start] += PEAK_N / 50 * np.array([-1.0, 1.0, -1.0, 1.0])
+    one = blow(force)
+    sizes = cut_off(isolate_pulse(one), np.full((1, SAMPLES), 0.25))
+    if rings:
+        np.testing.assert_allclose(sizes, [PEAK_N / 50, 0.25], rtol=0.2)
+    else:
+        assert not sizes.any()

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured import levels as measured_levels
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.identification.fit import fit_modes
@@ -69,16 +68,6 @@ def test_single_blows_give_the_true_modes(linear):
     for mode, rows in modes.groupby("mode"):
         np.testing.assert_allclose(rows["frequency_hz"], true.frequency_hz[mode], rtol=QUOTIENT)
         np.testing.assert_allclose(rows["damping_ratio"], true.damping_ratio[mode], rtol=DAMPING)
-
-
-def test_deviations_of_single_blows_do_not_depend_on_the_unit():
-    """Of one resonance with noise, as accelerance and as faint as compliances in m/N are."""
-    pole = 2 * np.pi * 50 * (-0.01 + 1j)
-    s = 6.0 + 2j * np.pi * np.linspace(48.0, 52.0, 30)
-    values = (1 / (s - pole) + 0.01) * (1 + 1e-3 * np.random.default_rng(0).standard_normal(30))
-    found, faint = (measured_levels._pole_near(s, unit * values, 1.001 * pole) for unit in (1.0, 1e-9))
-    np.testing.assert_allclose(faint, found, rtol=1e-6)
-    assert found[1] > 1e-5 * found[0]
 
 
 def test_frequencies_that_follow_the_level_are_followed(softening):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Gate
+from frf_ipz.diagnosis.measured.forces import cut_off
+from frf_ipz.diagnosis.measured.from_blows import Survey
 from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 RECIPROCAL = 4.0  # the same of FRFs the other way round, over noise and tolerances
 COHERENT = 0.5  # noise power over signal power, at the median of the points
+RINGS = 1e-4  # of a blow's peak: less ringing at the start of a record changes nothing
+BEFORE = 100  # samples before a blow that hold all ringing
 EXCHANGED = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
 
 
@@ -51,9 +55,9 @@ def warn(source: Source, gates: tuple[Gate, ...]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        What failed, and which FRFs were too faint to tell anything.
+        What failed, which records began too late, and which FRFs were too faint to tell anything.
     """
-    failed = tuple(gate.statement for gate in gates if not gate.passed)
+    failed = (*(gate.statement for gate in gates if not gate.passed), *_late(source))
     faint = faint_frfs(source.training)
     if not faint:
         return failed
@@ -63,6 +67,25 @@ def warn(source: Source, gates: tuple[Gate, ...]) -> tuple[str, ...]:
         f"{subject} {', '.join(map(str, faint))} {verb} below {100 * FAINT:.0f} % of the largest of the same blow: so "
         f"faint that {they} nothing, for a sensor a little out of line makes as much. What is missing may hide there; "
         "put the sensor elsewhere.",
+    )
+
+
+def _late(source: Source) -> tuple[str, ...]:
+    """Say which records begin within the ringing that the converter's filter makes before a blow."""
+    if source.kind != "hammer" or not isinstance(source.survey, Survey):
+        return ()
+    blows = [blow for group in source.survey.groups for blow in group]
+    pulses = [pulse for group in source.survey.pulses for pulse in group]
+    late = [
+        blow.name
+        for blow, pulse in zip(blows, pulses, strict=True)
+        if cut_off(pulse, blow.responses)[0] > RINGS * blow.level
+    ]
+    if not late:
+        return ()
+    return (
+        f"{', '.join(late)}: the recording begins within the ringing that the converter's filter makes before a blow, "
+        f"and lacks part of it: FRFs are less certain by that. Let it start {BEFORE} samples before the blow.",
     )
 
 

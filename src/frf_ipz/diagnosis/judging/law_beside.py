@@ -13,7 +13,7 @@ import numpy as np
 from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
 from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
-from frf_ipz.diagnosis.measured.restored import restore
+from frf_ipz.diagnosis.measured.cleaned.restored import restore
 from frf_ipz.diagnosis.nonlinear.simulate import without_law
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.search import fit_nothing, search

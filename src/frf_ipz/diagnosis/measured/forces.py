@@ -16,6 +16,8 @@ ABOVE_NOISE = 6.0  # standard deviations
 STRETCHES = 16  # of what is quiet: a second touch, which falls into few of them, is no noise
 RINGING = 25  # samples before and after the pulse that are kept whole: a converter's filter rings
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
+CUT_OFF = 8  # samples of ringing that a record may lack before its first one, each as large as those that it has
+FIRST = 3  # samples of a record that show how large
 QUIET = 200  # samples after the pulse that are left out when the force's noise is read
 
 
@@ -58,6 +60,27 @@ def isolate_pulse(blow: Blow) -> Pulse:
     window = np.cos(np.pi / 2 * np.clip(outside / TAPER, 0, 1)) ** 2
     kept = np.flatnonzero(window > 0.5)
     return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+
+
+def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
+    """Tell how much ringing of the converter's filter a record lacks because it begins too shortly before the blow.
+
+    Parameters
+    ----------
+    pulse : Pulse
+        The blow.
+    responses : (n_sensors, n_samples) array
+        Its responses.
+
+    Returns
+    -------
+    (1 + n_sensors,) array
+        Size of a sample of the force and of each response; 0 where the record begins before.
+    """
+    if pulse.start > 0:
+        return np.zeros(1 + len(responses))
+    first = np.vstack([pulse.blow.force, responses])[:, :FIRST]
+    return np.asarray(np.sqrt(np.mean(first**2, axis=1)))
 
 
 def _noise_of(quiet: FloatArray) -> float:

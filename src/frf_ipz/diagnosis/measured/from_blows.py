@@ -9,7 +9,15 @@ from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
-from frf_ipz.diagnosis.measured.forces import Pulse, force_noise, isolate_pulse, window_energies, window_energy
+from frf_ipz.diagnosis.measured.forces import (
+    CUT_OFF,
+    Pulse,
+    cut_off,
+    force_noise,
+    isolate_pulse,
+    window_energies,
+    window_energy,
+)
 from frf_ipz.diagnosis.measured.lines import Lines, lines_of_band, same_places
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer import Measured
@@ -238,7 +246,9 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
             )
             values.append(points.values[:, column] * too_small)
             sizes.append(size[:, column])
-            covariances.append(crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group)))
+            noise = crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group))
+            errors = np.column_stack([_constants(points, group, column), _cut_off(found, place, points, column)])
+            covariances.append(noise + errors @ errors.conj().T)
             input_of.append(place)
     return Measured(
         s=s,
@@ -249,6 +259,28 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
         common=tuple(common),
         input_of=np.array(input_of),
     )
+
+
+def _constants(points: Lines, group: tuple[Blow, ...], column: int) -> ComplexArray:
+    """Error of an FRF, (n_points,), by one standard deviation of what may be left of a channel's constant."""
+    durations = np.array([blow.duration_s for blow in group])
+    units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
+    stds = np.array([0.0 if blow.constant_std is None else blow.constant_std[column] for blow in group])
+    return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
+
+
+def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexArray:
+    """Errors of an FRF, as independent columns, by the ringing that records lack at their beginning."""
+    pulses, group = found.pulses[place], found.groups[place]
+    sizes = np.array([cut_off(pulse, blow.responses) for pulse, blow in zip(pulses, group, strict=True)])
+    if not sizes.any():
+        return np.zeros((len(points.s), 0), np.complex128)
+    step = group[0].step_s
+    units = np.exp(np.outer(points.s, step * np.arange(1, CUT_OFF + 1))) * step
+    of_force, of_response = (
+        (points.force.conj() @ size / points.power)[:, None] * units for size in (sizes[:, 0], sizes[:, 1 + column])
+    )
+    return np.hstack([of_response, points.values[:, [column]] * of_force])
 
 
 def _bias(found: Survey, place: int, points: Lines) -> FloatArray:

@@ -1,7 +1,7 @@
 """FRFs and modes of weak and of strong blows: what a structure that is not linear changes with the level.
 
 Each FRF is estimated anew from the weaker and from the stronger half of the blows at a place. Around each mode, the FRF
-of every single blow gives a frequency and a damping ratio: over a few lines it is a quotient (c0 + c1 s) / (s - p).
+of every single blow gives a frequency and a damping ratio (`pole_near`).
 Records of a shaker are cut into pieces as long as those of the FRFs.
 """
 
@@ -16,9 +16,9 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
+from frf_ipz.diagnosis.measured.local_pole import LocalPole, pole_near
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import pieces_without_transients
-from frf_ipz.numerics.even_columns import even, solve_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,9 +30,7 @@ LEAST_RATIO = 1.5  # of the strongest to the weakest blow at a place: below, the
 LEAST_BLOWS = 2
 WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 LEAST_LINES = 8
-ROUNDS = 4  # of weights
 STANDS_OUT = 0.5  # of an FRF at its peak: a mode that has less of it is not seen by itself
-UNSURE = 0.01  # relative standard deviation of a frequency: of a blow that drowns in noise nothing is said
 COLUMNS = (
     "mode",
     "frf",
@@ -193,9 +191,9 @@ def _modes(
         if sensor is None or len(near) < LEAST_LINES:
             continue
         for blow, lines in zip(group, spectra, strict=True):
-            found = _pole_near(s[near], _h1(lines)[near, sensor], complex(pole))
+            found = pole_near(s[near], _h1(lines)[near, sensor], complex(pole))
             if found is not None:
-                rows.append((mode, str(labels[sensor]), blow.name, blow.level, *found))
+                rows.append((mode, str(labels[sensor]), blow.name, blow.level, *_as_numbers(found)))
     return rows
 
 
@@ -214,23 +212,7 @@ def _clearest(labels: Sequence[FrfLabel], fit: ModalFit, mode: int) -> int | Non
     return max(seen)[1] if seen else None
 
 
-def _pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> tuple[float, float, float, float] | None:
-    """Fit a local quotient; frequency, damping ratio and their deviations, each beside its own."""
-    pole = start
-    middle, scale = s.mean(), np.ptp(s.imag)
-    away = (s - middle) / scale
-    deviation = 0.0
-    for _ in range(ROUNDS):
-        weight = 1 / np.abs(s - pole)
-        columns = np.asarray(np.column_stack([values, np.ones_like(s), away]) * weight[:, None], np.complex128)
-        found = solve_columns(columns, np.asarray(s * values * weight, np.complex128))
-        left = s * values * weight - columns @ found
-        variance = float(np.vdot(left, left).real) / (len(s) - columns.shape[1])
-        scaled, sizes = even(columns)
-        covariance = np.linalg.pinv(scaled.conj().T @ scaled)[0, 0].real * variance
-        pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2) / sizes[0])
-    size = abs(pole)
-    is_near = np.abs(pole.imag - middle.imag) < scale / 2
-    if not np.isfinite(size) or not is_near or pole.real >= 0 or deviation > UNSURE * size:
-        return None
-    return size / (2 * np.pi), deviation / (2 * np.pi), -pole.real / size, deviation / size
+def _as_numbers(found: LocalPole) -> tuple[float, float, float, float]:
+    """Frequency, Hz, and damping ratio, each before its standard deviation."""
+    size = abs(found.pole)
+    return size / (2 * np.pi), found.std_rad_s / (2 * np.pi), -found.pole.real / size, found.std_rad_s / size

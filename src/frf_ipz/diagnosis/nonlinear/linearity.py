@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.measured.forces import CUT_OFF, cut_off, isolate_pulse
+from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 from frf_ipz.numerics.even_columns import solve_columns
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations
-    from frf_ipz.dofs import Dof
 
 WIDTH = 24  # lines that are looked at together
 POLES, ZEROS, TRANSIENT = 2, 2, 2  # degrees of the local polynomials
@@ -78,7 +79,7 @@ def assess_linearity(observations: Observations) -> Linearity:
         The verdict and where in the band it comes from.
     """
     noise = read_noise(observations)
-    parts = [_at_place(observations, dof, noise) for dof in observations.input_dofs]
+    parts = [_at_place(observations, blows, noise) for blows in same_places(observations)]
     frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
     return Linearity(
         score=float(misfit.max(initial=0.0)),
@@ -88,14 +89,13 @@ def assess_linearity(observations: Observations) -> Linearity:
     )
 
 
-def _at_place(observations: Observations, dof: Dof, noise: ChannelNoise) -> tuple[FloatArray, FloatArray]:
+def _at_place(
+    observations: Observations, blows: tuple[Blow, ...], noise: ChannelNoise
+) -> tuple[FloatArray, FloatArray]:
     """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
-    blows = observations.at(dof)
-    chains = {tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) for blow in blows}
     n, step = min(blow.n_samples for blow in blows), blows[0].step_s
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
-    can_compare = len(blows) >= LEAST_RECORDS and len(chains) == 1
-    looked_at = observations.looks_at(frequency, REACH / (n * step)) & can_compare
+    looked_at = observations.looks_at(frequency, REACH / (n * step)) & (len(blows) >= LEAST_RECORDS)
     used, n_groups = _groups(np.flatnonzero(looked_at))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
@@ -104,16 +104,23 @@ def _at_place(observations: Observations, dof: Dof, noise: ChannelNoise) -> tupl
     sigma = DECAYS / (n * step) if noise.is_hammer else 0.0
     lines = [_lines(blow, noise, n, sigma)[:, used] for blow in blows]
     length = (1 - np.exp(-2 * DECAYS)) / (2 * sigma) if sigma else n * step
-    of_force = noise.force_energy(frequency[used], n * step)
+    lacking = np.array([_lacking(blow) if noise.is_hammer else np.zeros(1 + len(blow.responses)) for blow in blows])
+    of_force = noise.force_energy(frequency[used], n * step) + lacking[:, :1]
     for row, sensor in enumerate(blows[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
-        energies = np.array([of_force, noise.response_energy(column, frequency[used], length)])
+        of_response = noise.response_energy(column, frequency[used], length) + lacking[:, [1 + row]]
+        energies = np.array([of_force, of_response])
         for group in range(n_groups):
             here = slice(group * WIDTH, (group + 1) * WIDTH)
             force, motion = (np.array([line[i, here] for line in lines]) for i in (0, 1 + row))
             left = _apart if noise.is_hammer else _left
-            misfit[group, column] = left(force, motion, energies[:, here])
+            misfit[group, column] = left(force, motion, energies[..., here])
     return middle, misfit
+
+
+def _lacking(blow: Blow) -> FloatArray:
+    """Energy, of the force and of each response, of the ringing that a record lacks at its beginning."""
+    return CUT_OFF * (blow.step_s * cut_off(isolate_pulse(blow), blow.responses)) ** 2
 
 
 def _groups(used: IntArray) -> tuple[IntArray, int]:

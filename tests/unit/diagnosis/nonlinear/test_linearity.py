@@ -27,6 +27,20 @@ def test_blows_on_a_nonlinear_chain_do_not(strike, law):
     assert assess_linearity(strike(law)).is_nonlinear
 
 
+@pytest.mark.parametrize("law", [None, lambda w, _: 2e10 * w**3], ids=["linear", "cubic"])
+def test_blows_are_compared_where_sensors_rove(strike, law):
+    """Each layout of sensors has blows of several levels of its own."""
+    observations = strike(law)
+    layouts = [
+        replace(blow, name=f"{blow.name} {row}", sensors=blow.sensors[row : row + 1], responses=blow.responses[[row]])
+        for row in range(2)
+        for blow in observations.blows
+    ]
+    found = assess_linearity(replace(observations, blows=tuple(layouts)))
+    assert found.score > 0
+    assert found.is_nonlinear == (law is not None)
+
+
 def test_a_channel_whose_noise_is_below_its_steps_is_not_taken_for_nonlinear(strike):
     """What has decayed below half a step is not recorded at all: as if there were no noise."""
     observations = strike()

@@ -1,0 +1,223 @@
+"""What recordings of blows hold besides the response to the blow: constants of channels, and motion left from before.
+
+Near the axis a constant c looks like c / s, which is largest at the bottom of the band, and the few samples before a
+blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure. Neither
+grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is left free, and what no
+FRF explains gives both, for all blows at once. What the blows do not tell, since they are of one level, stays in the
+recordings; how uncertain the constants are goes on with the blows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.ndimage import uniform_filter1d
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.measured.contour import find_resonances
+from frf_ipz.diagnosis.measured.forces import isolate_pulse
+from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_places
+from frf_ipz.diagnosis.measured.local_pole import pole_near
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+DECAYS = 8.0  # sigma times the shortest record
+LARGEST = 0.05  # of a channel's highest value: a larger constant has been taken off already
+WANDERS = 3.0  # times the noise: how far a constant wanders from blow to blow
+LEFT = 3.0  # times the motion just before a blow: what each mode may have of it
+MISSED = 0.003  # of a response: what sampling and the places of blows leave
+AROUND = 11  # lines over which what no FRF explains is averaged
+ROUNDS = 3  # of weights: at first leftovers count as noise
+WIDTH = 3.0  # half-widths of a resonance on each side of it that tell its pole
+AKIN = 0.1  # of a sample's variance: noise that the samples before a blow have in common
+LEAST_BEFORE = 4  # samples before a blow that tell what is left
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Group:
+    """Blows at one place, and what may be left in each: a constant and, after another blow, decaying modes."""
+
+    blows: tuple[Blow, ...]
+    lines: Lines
+    poles: ComplexArray
+
+    @property
+    def n_samples(self) -> int:
+        """Samples that are transformed."""
+        return min(blow.n_samples for blow in self.blows)
+
+    def rates(self, blow: Blow) -> ComplexArray:
+        """Exponents of the leftovers of a blow, rad/s: 0 is the constant."""
+        return np.concatenate([np.zeros(1), self.poles if blow.follows else np.zeros(0)])
+
+    def shapes(self, blow: Blow) -> ComplexArray:
+        """Transform unit leftovers, (n_lines / FINER, 1 or 1 + 2 n_poles): the constant, cosines, sines."""
+        step, s, n = blow.step_s, self.lines.s[::FINER, None], self.n_samples
+
+        def transformed(rate: ComplexArray) -> ComplexArray:
+            turn = np.exp((rate - s) * step)
+            return np.asarray(step * (1 - turn**n) / (1 - turn))
+
+        rates = self.rates(blow)
+        up, down = transformed(rates), transformed(rates.conj())
+        return np.hstack([(up + down) / 2, (up[:, 1:] - down[:, 1:]) / 2j])
+
+    def unit_signals(self, blow: Blow) -> FloatArray:
+        """Give unit leftovers in time, (1 or 1 + 2 n_poles, n_samples)."""
+        turning = np.exp(np.outer(self.rates(blow), blow.step_s * np.arange(blow.n_samples)))
+        return np.concatenate([turning.real, turning[1:].imag])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Told:
+    """What blows at one place tell of the leftovers in one channel, blow after blow, each with its constant first."""
+
+    counts: tuple[int, ...]
+    prior: FloatArray  # covariance, without what the constants of a channel have in common
+    curvature: FloatArray
+    slope: FloatArray
+
+    @property
+    def constants(self) -> IntArray:
+        """Where the constants stand."""
+        return np.cumsum((0, *self.counts[:-1]))
+
+
+def without_leftovers(observations: Observations) -> Observations:
+    """Take off what no linear system answers to a blow with: constants, and motion left from a blow before.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows, or records from rest; others are given back as they are.
+
+    Returns
+    -------
+    Observations
+        The same without leftovers, and with what constants are still uncertain by.
+    """
+    if not observations.blows or not all(blow.rested for blow in observations.blows):
+        return observations
+    decay = DECAYS / min(blow.duration_s for blow in observations.blows)
+    groups = [_group(blows, observations, decay) for blows in same_places(observations)]
+    found: dict[tuple[str, str], tuple[FloatArray, float]] = {}
+    for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.blows[0].sensors):
+        rows = [
+            (group, row)
+            for group in groups
+            for row, sensor in enumerate(group.blows[0].sensors)
+            if sensor.channel == channel
+        ]
+        found |= {(name, channel): left for name, left in _leftovers(rows).items()}
+    return replace(observations, blows=tuple(_without(blow, found) for blow in observations.blows))
+
+
+def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) -> _Group:
+    isolated = tuple(isolate_pulse(blow).blow for blow in blows) if observations.kind == "hammer" else blows
+    lines = lines_of_band(isolated, observations.band_hz, decay)
+    follow = any(blow.follows for blow in blows)
+    return _Group(blows=blows, lines=lines, poles=_poles(lines, decay) if follow else np.zeros(0, complex))
+
+
+def _without(blow: Blow, found: dict[tuple[str, str], tuple[FloatArray, float]]) -> Blow:
+    left, stds = zip(*(found[blow.name, sensor.channel] for sensor in blow.sensors), strict=True)
+    return replace(blow, responses=blow.responses - np.array(left), constant_std=np.array(stds))
+
+
+def _poles(lines: Lines, decay: float) -> ComplexArray:
+    """Poles of the structure, (n_poles,), as far as they stand out."""
+    size = np.abs(lines.values) ** 2
+    level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
+    peaks = find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
+    found = []
+    for omega, own in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
+        near = np.flatnonzero(np.abs(lines.s.imag - omega) <= WIDTH * (decay + own))
+        sensor = int(np.argmax(size[near].sum(0) / size.sum(0)))
+        pole = pole_near(lines.s[near], lines.values[near, sensor], complex(-own, omega))
+        found += [] if pole is None else [pole.pole]
+    return np.array(found, complex)
+
+
+def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
+    """Give the leftovers of all blows in one channel, as signals, and the standard deviations of the constants."""
+    largest = max(float(np.abs(blow.responses[row]).max()) for group, row in rows for blow in group.blows)
+    sizes = [[np.zeros(len(group.rates(blow)) * 2 - 1) for blow in group.blows] for group, _ in rows]
+    stds = np.zeros(0)
+    for _ in range(ROUNDS):
+        told = [_told(group, row, own) for (group, row), own in zip(rows, sizes, strict=True)]
+        before = np.cumsum([0, *(len(one.slope) for one in told)])
+        constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
+        prior = block_diag(*(one.prior for one in told))
+        prior[np.ix_(constants, constants)] += (LARGEST * largest) ** 2
+        curvature = block_diag(*(one.curvature for one in told))
+        covariance = np.linalg.solve(np.eye(len(prior)) + prior @ curvature, prior)
+        found = covariance @ np.concatenate([one.slope for one in told])
+        sizes = [
+            np.split(part, one.constants[1:]) for part, one in zip(np.split(found, before[1:-1]), told, strict=True)
+        ]
+        stds = np.sqrt(np.maximum(np.diag(covariance)[constants], 0.0))
+    blows = [(group, blow) for group, _ in rows for blow in group.blows]
+    return {
+        blow.name: (size @ group.unit_signals(blow), float(std))
+        for (group, blow), size, std in zip(blows, chain.from_iterable(sizes), stds, strict=True)
+    }
+
+
+def _told(group: _Group, row: int, sizes: list[FloatArray]) -> _Told:
+    shapes = [group.shapes(blow) for blow in group.blows]
+    response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
+    left = response - np.stack([shape @ size for shape, size in zip(shapes, sizes, strict=True)], 1)
+    energy = _unshared(force, left)
+    noise = float(np.sqrt(np.median(energy) * 2 * group.lines.s.real[0] / group.blows[0].step_s))
+    weight = 1 / (energy[:, None] + (MISSED * np.abs(left)) ** 2)
+    shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
+    across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
+    along = np.sum(shared.conj() * response, 1)
+    own = [(shape.conj() * part[:, None]).T for shape, part in zip(shapes, weight.T, strict=True)]
+    quiet = [_before(group, blow, row, noise) for blow in group.blows]
+    straight = [(one @ shape).real + more for one, shape, (more, _) in zip(own, shapes, quiet, strict=True)]
+    slopes = [(one @ values).real + more for one, values, (_, more) in zip(own, response.T, quiet, strict=True)]
+    told = _Told(
+        counts=tuple(shape.shape[1] for shape in shapes),
+        prior=np.diag(
+            np.concatenate([_motion(blow, row, len(size)) ** 2 for blow, size in zip(group.blows, sizes, strict=True)])
+        ),
+        curvature=block_diag(*straight) - (across.conj().T @ across).real,
+        slope=np.concatenate(slopes) - (across.conj().T @ along).real,
+    )
+    told.prior[np.ix_(told.constants, told.constants)] = (WANDERS * noise) ** 2 * _unlike_levels(group.blows)
+    return told
+
+
+def _before(group: _Group, blow: Blow, row: int, noise: float) -> tuple[FloatArray, FloatArray]:
+    """Give the curvature and slope that the samples before the blow add."""
+    n = isolate_pulse(blow).start
+    shapes = group.unit_signals(blow)[:, :n]
+    variance = noise**2 * (1 + AKIN * n)
+    return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ blow.responses[row, :n] / variance)
+
+
+def _motion(blow: Blow, row: int, count: int) -> FloatArray:
+    """Give the standard deviations of a blow's leftovers but the constant: the motion before it."""
+    before = blow.responses[row, : max(isolate_pulse(blow).start, LEAST_BEFORE)]
+    return np.concatenate([np.zeros(1), np.full(count - 1, LEFT * np.sqrt(2) * before.std())])
+
+
+def _unlike_levels(blows: tuple[Blow, ...]) -> FloatArray:
+    """Project on what differs from the levels of blows: what is like them may as well be their response."""
+    levels = np.array([blow.level for blow in blows])
+    return np.asarray(np.eye(len(blows)) - np.outer(levels, levels) / np.sum(levels**2))
+
+
+def _unshared(force: ComplexArray, response: ComplexArray) -> FloatArray:
+    """Energy, (n_lines,), that one FRF does not explain, averaged over neighbouring lines."""
+    power = np.sum(np.abs(force) ** 2, 1)
+    values = np.sum(response * force.conj(), 1) / power
+    left = np.sum(np.abs(response - values[:, None] * force) ** 2, 1) / max(force.shape[1] - 1, 1)
+    floor = np.finfo(float).tiny + 1e-12 * float(np.mean(np.abs(response) ** 2))
+    return np.asarray(uniform_filter1d(left, AROUND, mode="nearest") + floor)

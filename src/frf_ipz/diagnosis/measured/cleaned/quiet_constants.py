@@ -1,0 +1,67 @@
+"""Constant parts of channels, read from the late part of records: whatever the structure is, it comes to rest there.
+
+Where blows disagree with any linear system, nothing that they share tells a constant; but velocities and accelerations
+of what vibrates and comes to rest have no mean. A structure that drifts in soft cords shows by that the mean of the
+second half of a record is not that of the whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.forces import isolate_pulse
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+SHORTEST = 256  # samples after a blow that tell a mean
+SURE = 3.0  # times the difference between the means of the whole record and of its second half
+
+
+def without_quiet_constants(observations: Observations) -> Observations:
+    """Take off what velocities and accelerations show where nothing moves.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows, or records from rest; others are given back as they are.
+
+    Returns
+    -------
+    Observations
+        The same without constants.
+    """
+    if not observations.blows or not all(blow.rested for blow in observations.blows):
+        return observations
+    is_hammer = observations.kind == "hammer"
+    return replace(observations, blows=tuple(_without(blow, is_hammer=is_hammer) for blow in observations.blows))
+
+
+def _without(blow: Blow, *, is_hammer: bool) -> Blow:
+    start = isolate_pulse(blow).start if is_hammer else 0
+    if blow.n_samples - start < SHORTEST:
+        return blow
+    middle = (start + blow.n_samples) // 2
+    constants = np.array(
+        [
+            _mean(response, start, middle) if sensor.quantity.power else 0.0
+            for sensor, response in zip(blow.sensors, blow.responses, strict=True)
+        ]
+    )
+    return replace(blow, responses=blow.responses - constants[:, None])
+
+
+def _mean(response: FloatArray, start: int, middle: int) -> float:
+    """Mean of the late part; 0 where that of the whole is another one, so that something still moves."""
+    whole, late = (float(_smooth(len(response) - first) @ response[first:]) for first in (start, middle))
+    return late if abs(late) > SURE * abs(whole - late) else 0.0
+
+
+def _smooth(n: int) -> FloatArray:
+    """Weights that sum to 1 and take out all that turns several times."""
+    weights = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 4
+    return np.asarray(weights / weights.sum())

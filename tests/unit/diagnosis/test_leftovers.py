@@ -1,0 +1,129 @@
+"""Constants of channels and motion left from before: what is in recordings besides the response to a blow."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.diagnosis.measured.cleaned.leftovers import LARGEST, without_leftovers
+from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
+from frf_ipz.diagnosis.measured.from_blows import measure, survey
+from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
+from frf_ipz.quantities import FrfQuantity
+
+PARTS = np.array([0.02, -0.007])  # of the largest response: constants of the two channels
+LEFT = 0.05  # of the largest response: motion before a blow
+
+
+def cubic(w, _):
+    return 2e10 * w**3
+
+
+def largest(observations):
+    """(n_sensors, 1) array."""
+    return np.max([np.abs(blow.responses).max(1) for blow in observations.blows], 0)[:, None]
+
+
+def shifted(observations, constants):
+    return replace(
+        observations,
+        blows=tuple(replace(blow, responses=blow.responses + constants) for blow in observations.blows),
+    )
+
+
+def taken_off(before, after):
+    """(n_blows, n_sensors, n_samples) array."""
+    return np.array([a.responses - b.responses for a, b in zip(before.blows, after.blows, strict=True)])
+
+
+def test_constants_of_a_linear_system_are_told_by_blows_of_several_levels(strike):
+    constants = PARTS[:, None] * largest(strike())
+    spoilt = shifted(strike(), constants)
+    assert assess_linearity(spoilt).is_nonlinear
+    restored = without_leftovers(spoilt)
+    assert not assess_linearity(restored).is_nonlinear
+    off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
+    stds = np.array([blow.constant_std for blow in restored.blows])
+    assert np.all(np.abs(off) < 4 * stds + 1e-4 * largest(strike())[:, 0])
+    assert np.all(stds < 1e-3 * largest(strike())[:, 0])
+
+
+def test_where_there_are_no_constants_little_changes(strike):
+    off = taken_off(strike(), without_leftovers(strike()))
+    assert np.all(np.abs(off) < 2e-4 * largest(strike()))
+
+
+def test_blows_of_one_level_tell_no_constant(strike):
+    """It may as well be their response: it stays, and makes FRFs uncertain at the bottom of the band."""
+    one, rng = strike().blows[0], np.random.default_rng(2)
+    noise = 1e-5 * largest(strike())
+    late = 76  # samples: the blow comes with the fifth after that
+    blows = [
+        replace(
+            one,
+            name=f"blow {n}",
+            force=one.force[late:],
+            responses=(one.responses + noise * rng.standard_normal(one.responses.shape))[:, late:],
+        )
+        for n in range(3)
+    ]
+    alike = replace(strike(), blows=tuple(blows))
+    constants = PARTS[:, None] * largest(alike)
+    restored = without_leftovers(shifted(alike, constants))
+    stds = np.array([blow.constant_std for blow in restored.blows])
+    assert np.all(stds > 0.05 * LARGEST * largest(alike)[:, 0])
+    s = np.array([2.0 + 2j * np.pi * 4.5, 2.0 + 2j * np.pi * 70.0])
+    plain = measure(survey(alike), s)
+    with_stds = measure(survey(replace(alike, blows=restored.blows)), s)
+    grown = np.array(
+        [
+            np.abs(np.diag(one)) / np.abs(np.diag(other))
+            for one, other in zip(with_stds.covariance, plain.covariance, strict=True)
+        ]
+    )
+    assert np.all(grown[:, 0] > 10)
+    assert np.all(grown[:, 0] > grown[:, 1])
+
+
+def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
+    values, shapes = np.linalg.eigh(chain.K)
+    omega, damped = np.sqrt(values), np.sqrt(values * (1 - 1e-4))
+    time = strike().blows[0].step_s * np.arange(strike().blows[0].n_samples)
+    rng = np.random.default_rng(3)
+    blows, added = [strike().blows[0]], [0.0]
+    for blow in strike().blows[1:]:
+        phase = rng.uniform(0, 2 * np.pi, len(omega))
+        decaying = np.exp(-0.01 * np.outer(omega, time)) * np.cos(np.outer(damped, time) + phase[:, None])
+        moving = shapes[[1, 3]] @ (rng.standard_normal(len(omega))[:, None] * decaying)
+        moving *= LEFT * largest(strike()) / np.abs(moving).max()
+        blows.append(replace(blow, responses=blow.responses + moving, follows=True))
+        added.append(moving)
+    spoilt = replace(strike(), blows=tuple(blows))
+    assert assess_linearity(spoilt).is_nonlinear
+    restored = without_leftovers(spoilt)
+    assert not assess_linearity(restored).is_nonlinear
+    off = taken_off(spoilt, restored)
+    for found, moving in zip(off[1:], added[1:], strict=True):
+        assert np.linalg.norm(found - moving) < 0.1 * np.linalg.norm(moving)
+
+
+def test_constants_of_a_nonlinear_structure_are_read_where_it_has_come_to_rest(strike):
+    constants = PARTS[:, None] * largest(strike(cubic))
+    spoilt = shifted(strike(cubic), constants)
+    off = taken_off(spoilt, without_quiet_constants(spoilt))[:, :, 0]
+    np.testing.assert_allclose(off, np.tile(constants[:, 0], (len(off), 1)), rtol=0.02)
+
+
+def test_a_displacement_may_have_a_mean(strike):
+    blow = strike().blows[0]
+    sensors = tuple(replace(sensor, quantity=FrfQuantity.RECEPTANCE) for sensor in blow.sensors)
+    shown = replace(strike(), blows=(replace(blow, sensors=sensors, responses=blow.responses + 1.0),))
+    assert not taken_off(shown, without_quiet_constants(shown)).any()
+
+
+@pytest.mark.parametrize("is_rested", [True, False])
+def test_what_does_not_start_at_rest_is_left_alone(strike, is_rested):
+    observations = shifted(strike(), largest(strike()) * PARTS[:, None])
+    other = replace(observations, blows=tuple(replace(blow, rested=is_rested) for blow in observations.blows))
+    assert (without_leftovers(other) is other) == (not is_rested)
+    assert (without_quiet_constants(other) is other) == (not is_rested)

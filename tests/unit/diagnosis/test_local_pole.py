@@ -1,0 +1,25 @@
+"""The pole of a single resonance."""
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.local_pole import pole_near
+
+POLE = 2 * np.pi * 50 * (-0.01 + 1j)
+S = 6.0 + 2j * np.pi * np.linspace(48.0, 52.0, 30)
+
+
+def resonance(noise):
+    return (1 / (S - POLE) + 0.01) * (1 + noise * np.random.default_rng(0).standard_normal(len(S)))
+
+
+def test_deviations_do_not_depend_on_the_unit():
+    """Of one resonance with noise, as accelerance and as faint as compliances in m/N are."""
+    found, faint = (pole_near(S, unit * resonance(1e-3), 1.001 * POLE) for unit in (1.0, 1e-9))
+    np.testing.assert_allclose([faint.pole, faint.std_rad_s], [found.pole, found.std_rad_s], rtol=1e-6)
+    assert found.std_rad_s > 1e-5 * abs(found.pole)
+    assert abs(found.pole - POLE) < 4 * found.std_rad_s
+
+
+def test_noise_alone_has_no_pole():
+    rng = np.random.default_rng(1)
+    assert pole_near(S, rng.standard_normal(len(S)) + 1j * rng.standard_normal(len(S)), POLE) is None
