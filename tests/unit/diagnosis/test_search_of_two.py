@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.judging.another_kind import another_kind
 from frf_ipz.diagnosis.judging.decision import decide
 from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search import pairs
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.far.sketches import Start
@@ -44,6 +45,7 @@ WEAK_N_M = 45.0  # so little that the mass alone leaves nothing to explain
 ROUNDING = 1e-9  # of the largest entry
 ATTACHED = shipped_effects()["attached_resonator"]
 LITTLE_KG = 2e-4
+LATE_S = 2e-5
 SMALL_GAIN = 0.96  # tolerances of gains are half a per cent
 GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
 
@@ -56,6 +58,20 @@ def nominal(tmp_path_factory):
 @pytest.fixture(scope="module")
 def thick(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("thick"), thickness_m=THICK_M)
+
+
+def test_a_delay_beside_a_soft_element_is_promised(nominal):
+    """Static shapes of the element are in its fit: what a delay changes is not hidden behind what they change."""
+    soft = bench_of(nominal, measured(nominal), ("local_stiffness",))
+    effect = soft.effects["local_stiffness"]
+    place = next(place for place in effect.places(soft.specimen) if place.location == {"elements": [3, 3]})
+    true = with_change(nominal, effect.build(soft.specimen, place)(np.array([0.3])))
+    frfs = measured(true, factors=lambda hz: np.stack([np.exp(-2j * np.pi * hz * LATE_S), np.ones_like(hz)], 1))
+    bench = bench_of(nominal, frfs, ("local_stiffness", "time_delay"))
+    base = bench.fit((Cause(effect=effect, place=place, n_places=16),), np.array([0.3]))
+    promised = close_search(bench, base)[0]
+    assert promised.cause.effect.name == "time_delay"
+    assert promised.values[0] == pytest.approx(LATE_S, rel=SEEN)
 
 
 @pytest.mark.parametrize("order", [1, -1])

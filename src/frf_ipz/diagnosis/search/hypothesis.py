@@ -174,7 +174,8 @@ def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *
     causes : tuple of Cause
         Empty for the nominal model.
     exact : bool
-        Add the static shapes that the causes need; without them a wide search is faster.
+        Add the static shapes that the last cause needs; without them a wide search is faster. Those of the causes
+        before it are added always: what one more cause changes is compared with a fit of theirs.
 
     Returns
     -------
@@ -185,12 +186,12 @@ def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *
     builders = build_together(specimen, [(cause.effect, cause.place) for cause in causes])
     basis, moved = specimen.basis, NOTHING
     typicals = [
-        typical_change(specimen, cause.effect, cause.place, build)
+        (cause is not causes[-1], typical_change(specimen, cause.effect, cause.place, build))
         for cause, build in zip(causes, builders, strict=True)
     ]
-    for typical in sorted(typicals, key=lambda change: change.model is None):  # an exchanged model comes first
+    for is_known, typical in sorted(typicals, key=lambda one: one[1].model is None):  # an exchanged model comes first
         moved = moved + Change(moved=typical.moved)
-        if exact or typical.released or typical.model is not None:
+        if exact or is_known or typical.released or typical.model is not None:
             basis = enrich(basis, typical)
     return Hypothesis(
         causes=causes,
