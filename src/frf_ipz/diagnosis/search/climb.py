@@ -126,7 +126,7 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
         beside = cause.effect.neighbours(bench.specimen, cause.place)
         better = _best_of(bench, base, fit, beside, fits)
         if better is fit:
-            _settle(bench, fit, beside, fits)
+            _settle(bench, base, fit, beside, fits)
             better = _best_of(bench, base, fit, beside, fits)
         if better is fit and fit.is_nearly_right:
             better = _best_of(bench, base, fit, _promising_around(bench, fit), fits)
@@ -135,12 +135,19 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
         fit = better
 
 
-def _settle(bench: Bench, fit: Fit, places: Sequence[Place], fits: Fits) -> None:
-    """Go on with fits beside the best place that were given up on their way: small steps may lead far down."""
-    cause = fit.hypothesis.causes[-1]
-    for key in (replace(cause, place=place).key for place in places):
-        if not fits[key].converged and fits[key].cost < UNSETTLED * fit.cost + BEHIND:
-            fits[key] = bench.go_on(fits[key])
+def _settle(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> None:
+    """Go on with fits beside the best place that were given up on their way: small steps may lead far down.
+
+    Where they do not, the best place's values and scatter may be the better start.
+    """
+    for cause in (replace(fit.hypothesis.causes[-1], place=place) for place in places):
+        known = fits[cause.key]
+        if known.converged or known.cost >= UNSETTLED * fit.cost + BEHIND:
+            continue
+        went_on = fits[cause.key] = bench.go_on(known)
+        if went_on.cost > fit.cost:
+            anew = fit_from_neighbour(bench, base, cause, fit, bar_of(fits.values()))
+            fits[cause.key] = max(went_on, anew, key=lambda one: one.log_evidence)
 
 
 def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
