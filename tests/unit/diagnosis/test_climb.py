@@ -7,6 +7,7 @@ import pytest
 
 from diagnosed import beam, bench_of, measured
 from frf_ipz.diagnosis.search import climb, pairs
+from frf_ipz.diagnosis.search import search as searching
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
@@ -73,6 +74,46 @@ def test_a_fit_beside_the_best_that_was_given_up_is_gone_on_with(nominal, times,
     climb._climb(bench, base, near, fits)
     assert fits[true.hypothesis.causes[-1].key].converged == is_settled
     assert (likeliest(fits.values()).hypothesis.causes[-1].place.location == {"nodes": [12]}) == is_settled
+
+
+def test_a_fit_beside_the_best_that_cannot_go_on_begins_anew_from_there(nominal, monkeypatch):
+    bench = bench_with(nominal, ("local_damper",), [("local_damper", 12)], [20.0])
+    near = bench.go_on(bench.fit((cause_at(bench, "local_damper", 11),), np.array([20.0])))
+    true = bench.fit((cause_at(bench, "local_damper", 12),), np.array([20.0]))
+    stuck = replace(true, converged=False, misfit=2 * near.cost, log_evidence=near.log_evidence - 100)
+    monkeypatch.setattr(type(bench), "go_on", lambda _bench, fit: fit)
+    fits = {fit.hypothesis.causes[-1].key: fit for fit in (near, stuck)}
+    climb._climb(bench, fit_nothing(bench), near, fits)
+    assert likeliest(fits.values()).hypothesis.causes[-1].place.location == {"nodes": [12]}
+    assert likeliest(fits.values()).cost == pytest.approx(true.cost, rel=SEEN)
+
+
+def test_where_settling_moves_the_first_cause_others_are_searched_beside_it_again(nominal, monkeypatch):
+    """Beside a mass one node off, another effect may have explained more than the true one."""
+    names = ("added_mass", "grounded_spring", "coupling_spring")
+    bench = bench_with(nominal, names, [("added_mass", 12), ("grounded_spring", 7)], [0.03, 250.0])
+    first = bench.fit((cause_at(bench, "added_mass", 11),), np.array([0.03]))
+    pair = bench.fit((*first.hypothesis.causes, cause_at(bench, "coupling_spring", 3, 8)), np.array([0.03, 250.0]))
+    true = bench.fit(
+        (cause_at(bench, "added_mass", 12), cause_at(bench, "grounded_spring", 7)), np.array([0.03, 250.0])
+    )
+
+    def beside(_bench, base, _least):
+        assert base.hypothesis.causes[0].place.location == {"nodes": [12]}
+        return Ranking(base=base, fits=(true,), n_tried=1)
+
+    monkeypatch.setattr(pairs, "search_beside", beside)
+    monkeypatch.setattr(climb, "_add_imitators", lambda *_: None)
+    assert pairs._settled(bench, Ranking(base=first, fits=(pair,), n_tried=1)).best is true
+
+
+def test_where_all_are_far_off_what_stands_out_beside_fitted_scatter_is_tried(nominal, monkeypatch):
+    bench = bench_with(nominal, ("attached_resonator", "added_mass"), [("attached_resonator", 12)], [4e-3, 120.0, 0.01])
+    monkeypatch.setattr(searching, "_fitted", lambda *_: {})
+    monkeypatch.setattr(searching, "climb_all", lambda *_: None)
+    best = search(bench, fit_nothing(bench)).best
+    assert best.hypothesis.causes[-1].effect.name == "attached_resonator"
+    assert best.values[1] == pytest.approx(120.0, rel=SEEN)
 
 
 def test_a_spring_whose_other_end_hardly_moves_is_tried_as_a_support(nominal):

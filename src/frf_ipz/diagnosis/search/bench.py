@@ -68,6 +68,12 @@ class Bench:
         """Fit causes with large errors, from values of their parameters."""
         return polish(self.suppose(causes), self.early, values, iterations=6, tolerance=1.0)
 
+    def fit_early_beside(self, base: Fit, cause: Cause, values: FloatArray) -> Fit:
+        """Fit one more cause with large errors, from values of its parameters and from the scatter of a fit."""
+        hypothesis = self.suppose((*base.hypothesis.causes, cause))
+        start = np.concatenate([base.values, values])
+        return polish(hypothesis, self.early, start, unknown=base.unknown, iterations=6, tolerance=1.0)
+
     def fit_from(self, fit: Fit, *, bar: float = np.inf) -> Fit:
         """Fit exactly, from a fit with large errors; given up where the cost does not come below a bar."""
         freely = replace(self.data, is_bounded=False)  # costs no more than with bounds

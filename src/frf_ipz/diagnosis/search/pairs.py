@@ -98,11 +98,18 @@ def _is_near(pair: Fit, best: Fit) -> bool:
 
 
 def _settled(bench: Bench, pairs: Ranking) -> Ranking:
-    """Step both causes of the best pair to better places: the first was placed when it was alone."""
+    """Step both causes of the best pair to better places: the first was placed when it was alone.
+
+    Where the first one moves, others are searched beside it again.
+    """
     best = _climbed(bench, _climbed(bench, pairs.best))
     if best.log_evidence < pairs.best.log_evidence + GAIN:
         return pairs
-    return _around(bench, best, pairs.n_tried)
+    settled = _around(bench, best, pairs.n_tried)
+    base = settled.base
+    if base.hypothesis.causes[0].key == pairs.base.hypothesis.causes[0].key or not base.is_nearly_right:
+        return settled
+    return _likeliest([settled, search_beside(bench, base, PROMISED * (best.log_evidence - base.log_evidence))])
 
 
 def _simpler(bench: Bench, pairs: Ranking) -> Ranking:

@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.search.climb import (
 from frf_ipz.diagnosis.search.close import close_search
 from frf_ipz.diagnosis.search.far.sketches import Start
 from frf_ipz.diagnosis.search.far.starts import bring_closer, refine_far, spread
-from frf_ipz.diagnosis.search.far.wide import wide_search
+from frf_ipz.diagnosis.search.far.wide import search_among_scatter, wide_search
 from frf_ipz.diagnosis.search.fit import Fit
 
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
@@ -36,6 +36,7 @@ FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypo
 CLIMBED_VAINLY = 2  # effects whose neighbours are looked at, where no further cause explains much
 VAIN = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
 SETTLED = 2  # fits that go on until they converge
+AMONG_SCATTER, AMONG_SCATTER_EXACTLY = 12, 3  # effects that stand out beside fitted scatter, and are fitted
 EARLY_AROUND = 16  # places further around that are fitted with large errors
 
 
@@ -119,6 +120,8 @@ def search(bench: Bench, base: Fit) -> Ranking:
         n_tried += len(starts)
         refined = refine_far(bench, base, starts)
         fits = _fitted(bench, base, refined)
+        if all(fit.is_hopeless for fit in fits.values()):
+            _add_among_scatter(bench, base, fits)
     if not base.is_hopeless:
         n_tried += _add_close(bench, base, fits)
     if fits and (n_effects := _how_many_climb(base, fits)):
@@ -169,7 +172,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
     fits: Fits = {}
     found = close_search(bench, base)
     for start in _most_promising(found, PROMISED_PART * least):
-        keep(fits, _fit_close(bench, base, start, bar_of((base, *fits.values()))))
+        _keep_close(bench, base, start, fits)
     if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
         climb_all(bench, base, fits, _how_many_climb(base, fits))
     return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=len(found))
@@ -182,11 +185,7 @@ def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
     if not starts and base.is_nearly_right:
         starts = _most_promising(found, -np.inf)[:1]  # how little the best one explains is told
     for start in starts:
-        bar = bar_of((base, *fits.values()))
-        fit = _fit_close(bench, base, start, bar)
-        keep(fits, fit)
-        if fit.cost - base.cost - start.cost > max(BROKEN, -BROKEN_PART * start.cost):
-            keep(fits, bench.fit(fit.hypothesis.causes, np.concatenate([base.values, start.values]), bar=bar))
+        _keep_close(bench, base, start, fits)
     return len(found)
 
 
@@ -201,9 +200,14 @@ def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
     return [start for start in starts[:CLOSE_FITTED] if -start.cost > max(least, -starts[0].cost - HOPELESS)]
 
 
-def _fit_close(bench: Bench, base: Fit, start: Start, bar: float) -> Fit:
+def _keep_close(bench: Bench, base: Fit, start: Start, fits: Fits) -> None:
+    """Fit a small effect from where the base is; anew, where that gains much less than one linear step promised."""
     hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-    return bench.fit_beside(hypothesis, np.concatenate([base.values, start.values]), base, bar=bar)
+    values, bar = np.concatenate([base.values, start.values]), bar_of((base, *fits.values()))
+    fit = bench.fit_beside(hypothesis, values, base, bar=bar)
+    keep(fits, fit)
+    if fit.cost - base.cost - start.cost > max(BROKEN, -BROKEN_PART * start.cost):
+        keep(fits, bench.fit(hypothesis.causes, values, bar=bar))
 
 
 def keep(fits: Fits, fit: Fit) -> None:
@@ -238,6 +242,14 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     if not early[0].is_hopeless:
         _fit_imitators(bench, early, fits)
     return fits
+
+
+def _add_among_scatter(bench: Bench, base: Fit, fits: Fits) -> None:
+    """Fit what stands out beside the scatter that was fitted without it."""
+    starts = sorted(spread(search_among_scatter(bench, base), CLOSE_EACH), key=lambda start: start.cost)
+    early = [bench.fit_early_beside(base, start.cause, start.values) for start in starts[:AMONG_SCATTER]]
+    for fit in sorted(early, key=lambda fit: fit.cost)[:AMONG_SCATTER_EXACTLY]:
+        keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
 
 
 def how_many(early: Sequence[Fit], usual: int) -> int:

@@ -6,6 +6,7 @@ Everything is smooth there, and misfits count by their logarithm.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Fit
 
 WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
+SCATTER_ERROR = 0.1  # the same where scatter was fitted
 LOOKED_AROUND = 16  # places of each effect: where not all places are looked at, those beside the best are
 
 
@@ -46,6 +48,27 @@ def wide_search(bench: Bench, base: Fit) -> list[Start]:
         The best values of each cause, by rising cost.
     """
     return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
+
+
+def search_among_scatter(bench: Bench, base: Fit) -> list[Start]:
+    """Look for large effects half-way to the axis, beside the scatter that was fitted without them.
+
+    Scatter takes up what shifts natural frequencies; what it cannot, stands out.
+
+    Parameters
+    ----------
+    bench : Bench
+        Data and effects.
+    base : Fit
+        What is supposed already.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, by rising cost.
+    """
+    specimen = replace(bench.specimen, contour=bench.middle.s)
+    return _search(bench, specimen, bench.middle, base, base.unknown, SCATTER_ERROR)
 
 
 def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
