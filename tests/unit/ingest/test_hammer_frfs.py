@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.observed import observe
 from frf_ipz.dofs import parse_dof
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.survey.scan import CELL
 from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
 
@@ -109,6 +111,20 @@ def test_several_blows_in_a_file_are_found_by_their_pulses(tmp_path):
     assert result.blows.peak_force_N.to_numpy() == pytest.approx([100, 8, 70, 120, 90], rel=1e-3)
     assert list(result.frfs.averages) == [5, 5]
     assert errors(result, structure).max() < 2e-3  # what is left of the blow before
+
+
+def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_the_others(tmp_path):
+    step_s = 1 / 2048
+    heights = np.zeros(3 * 4096)
+    for start in (40, 4240, 8440):
+        heights += pulse(len(heights), step_s, at_s=start * step_s)
+    write_csv(tmp_path / "hits" / "all.csv", blow(Structure(), force=heights), step_s)
+    test = read_test(write_test(tmp_path, HIT))
+    result = estimate_frfs(test, IngestOptions())
+    first, *others = result.blows.trigger_s
+    assert first < 40 * step_s
+    assert min(others) > 0.9 * CELL * step_s
+    assert [one.follows for one in observe(test, IngestOptions(), result.frfs).blows] == [False, True, True]
 
 
 def test_a_short_blow_is_filled_up_with_zeros(tmp_path):
