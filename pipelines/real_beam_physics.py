@@ -10,8 +10,8 @@ What `CASES` states of a test is not searched for: how wrong section, material a
 knows, and how far resonances drift from file to file, as a variance of the FRFs.
 
 What to expect of the steel beam, in some four minutes: its channels are late together by 0.96 ms (164 000 nats).
-Then, one after the other, four small resonators: at 176 Hz (39 000 nats), 99 Hz (4 000), 177 Hz (5 600) and 444 Hz (6
-900). They are where the measured resonances come in pairs, 93 and 106, 173 and 184, 437 and 451 Hz, of which the
+Then, one after the other, four small resonators: at 176 Hz (39 000 nats), 99 Hz (4 000), 177 Hz (5 600) and 444 Hz
+(6 900). They are where the measured resonances come in pairs, 93 and 106, 173 and 184, 437 and 451 Hz, of which the
 plain beam has one each: its model lacks the bent legs and the wires that it hangs in, and the catalogue has no word
 for them but resonator. A sensor a few millimetres off comes last (700 nats). The misfit falls from 10.2 to 3.5 times
 the expected one, and all resonances are some 20 % lower than the model's and its tolerances say: unexplained. The
