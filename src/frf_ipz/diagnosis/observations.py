@@ -124,6 +124,11 @@ class Observations:
         """Struck DOFs, each once."""
         return tuple(dict.fromkeys(blow.input_dof for blow in self.blows))
 
+    @property
+    def are_from_rest(self) -> bool:
+        """There are blows or records, and the structure was at rest at the beginning of each."""
+        return bool(self.blows) and all(blow.rested for blow in self.blows)
+
     def looks_at(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
         """Say which frequencies are in the band, and not in or next to a stretch that is left out.
 

@@ -79,7 +79,7 @@ def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
     """
     if pulse.start > 0:
         return np.zeros(1 + len(responses))
-    first = np.vstack([pulse.blow.force, responses])[:, :FIRST]
+    first = np.vstack([pulse.blow.force[:FIRST], responses[:, :FIRST]])
     return np.asarray(np.sqrt(np.mean(first**2, axis=1)))
 
 

@@ -16,7 +16,7 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
-from frf_ipz.diagnosis.measured.local_pole import LocalPole, pole_near
+from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import pieces_without_transients
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 LEAST_RATIO = 1.5  # of the strongest to the weakest blow at a place: below, there is one level only
 LEAST_BLOWS = 2
-WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 LEAST_LINES = 8
 STANDS_OUT = 0.5  # of an FRF at its peak: a mode that has less of it is not seen by itself
 COLUMNS = (
@@ -186,8 +185,7 @@ def _modes(
     rows: list[tuple[object, ...]] = []
     for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
         sensor = _clearest(labels, fit, mode)
-        half = (s[0].real - pole.real) * WIDTH  # rad/s, of what the window makes of it
-        near = np.flatnonzero(np.abs(s.imag - pole.imag) <= half)
+        near = lines_near(s, complex(pole))
         if sensor is None or len(near) < LEAST_LINES:
             continue
         for blow, lines in zip(group, spectra, strict=True):

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray
+from frf_ipz.arrays import ComplexArray, IntArray
 from frf_ipz.numerics.even_columns import even, solve_columns
 
+WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 ROUNDS = 4  # of weights
 UNSURE = 0.01  # relative standard deviation of a frequency: of what drowns in noise nothing is said
 
@@ -30,6 +31,24 @@ class LocalPole:
 
     pole: complex
     std_rad_s: float
+
+
+def lines_near(s: ComplexArray, pole: complex) -> IntArray:
+    """Choose the lines that tell a pole.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        Lines of one window, rad/s: it widens the resonance by their real part.
+    pole : complex
+        About where it is, rad/s.
+
+    Returns
+    -------
+    (n,) int array
+        Those around the resonance.
+    """
+    return np.flatnonzero(np.abs(s.imag - pole.imag) <= WIDTH * (s[0].real - pole.real))
 
 
 def pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> LocalPole | None:

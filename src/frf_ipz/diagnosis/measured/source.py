@@ -71,7 +71,7 @@ def divide(observations: Observations) -> Source:
     InputError
         If there is nothing to look at, or nothing of it is left.
     """
-    if not observations.blows or not all(blow.rested for blow in observations.blows):
+    if not observations.are_from_rest:
         return _of_frfs(observations)
     kept = _kept_blows(observations)
     names = {blow.name for blow in kept}

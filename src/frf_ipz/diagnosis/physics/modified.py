@@ -72,11 +72,16 @@ def modify(basis: Basis, change: Change) -> Modified:
     is_coupled = False
     if change.modal_ratio is None and basis.damping.any():
         viscous = vectors.T @ basis.damping @ vectors
-        own, omega = np.diag(viscous).copy(), np.sqrt(np.abs(squares))
+        own, omega = np.diag(viscous), np.sqrt(np.abs(squares))
         stated[n_rigid:] += own[n_rigid:] / (2 * omega[n_rigid:])
-        is_coupled = bool(np.abs(viscous - np.diag(own)).max() > UNCOUPLED * own.max())
+        is_coupled = bool(np.abs(coupling(viscous)).max() > UNCOUPLED * own.max())
     stated[:n_rigid] = SUSPENSION_RATIO
     return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled)
+
+
+def coupling(viscous: FloatArray) -> FloatArray:
+    """Take the damping of each mode by itself out of a damping matrix in modal coordinates, (q, q)."""
+    return viscous - np.diag(np.diag(viscous))
 
 
 def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.physics.layout import motion_row
+from frf_ipz.diagnosis.physics.modified import coupling
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
 from frf_ipz.numerics.pencils import eigh_of_two
@@ -172,7 +173,7 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
     turned[:, :m] = modified.vectors[:, :m] @ rotation
     ratio = modified.stated_ratio.copy()
     ratio[:m] *= 1 + unknowns.damping
-    viscous = _coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
+    viscous = coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
     return Modes(
         omega=omega,
         squares=scattered,
@@ -186,10 +187,6 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
         vectors=turned,
         viscous=viscous,
     )
-
-
-def _coupling(viscous: FloatArray) -> FloatArray:
-    return viscous - np.diag(np.diag(viscous))
 
 
 def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:

@@ -64,15 +64,9 @@ class Bench:
         """Fit causes, from values of their parameters; given up where the cost does not come below a bar."""
         return self.fit_from(self.fit_early(causes, values), bar=bar)
 
-    def fit_early(self, causes: tuple[Cause, ...], values: FloatArray) -> Fit:
-        """Fit causes with large errors, from values of their parameters."""
-        return polish(self.suppose(causes), self.early, values, iterations=6, tolerance=1.0)
-
-    def fit_early_beside(self, base: Fit, cause: Cause, values: FloatArray) -> Fit:
-        """Fit one more cause with large errors, from values of its parameters and from the scatter of a fit."""
-        hypothesis = self.suppose((*base.hypothesis.causes, cause))
-        start = np.concatenate([base.values, values])
-        return polish(hypothesis, self.early, start, unknown=base.unknown, iterations=6, tolerance=1.0)
+    def fit_early(self, causes: tuple[Cause, ...], values: FloatArray, unknown: FloatArray | None = None) -> Fit:
+        """Fit causes with large errors, from values of their parameters, and from some scatter if it is known."""
+        return polish(self.suppose(causes), self.early, values, unknown=unknown, iterations=6, tolerance=1.0)
 
     def fit_from(self, fit: Fit, *, bar: float = np.inf) -> Fit:
         """Fit exactly, from a fit with large errors; given up where the cost does not come below a bar."""

@@ -246,8 +246,12 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
 
 def _add_among_scatter(bench: Bench, base: Fit, fits: Fits) -> None:
     """Fit what stands out beside the scatter that was fitted without it."""
+    known = base.hypothesis.causes
     starts = sorted(spread(search_among_scatter(bench, base), CLOSE_EACH), key=lambda start: start.cost)
-    early = [bench.fit_early_beside(base, start.cause, start.values) for start in starts[:AMONG_SCATTER]]
+    early = [
+        bench.fit_early((*known, start.cause), np.concatenate([base.values, start.values]), base.unknown)
+        for start in starts[:AMONG_SCATTER]
+    ]
     for fit in sorted(early, key=lambda fit: fit.cost)[:AMONG_SCATTER_EXACTLY]:
         keep(fits, bench.fit_from(fit, bar=bar_of(fits.values())))
 

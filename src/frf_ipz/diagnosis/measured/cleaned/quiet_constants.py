@@ -35,7 +35,7 @@ def without_quiet_constants(observations: Observations) -> Observations:
     Observations
         The same without constants.
     """
-    if not observations.blows or not all(blow.rested for blow in observations.blows):
+    if not observations.are_from_rest:
         return observations
     is_hammer = observations.kind == "hammer"
     return replace(observations, blows=tuple(_without(blow, is_hammer=is_hammer) for blow in observations.blows))
