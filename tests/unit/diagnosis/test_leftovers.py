@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.cleaned.leftovers import LARGEST, without_leftovers
+from frf_ipz.diagnosis.measured.cleaned.leftovers import LARGEST, _whole, without_leftovers
 from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
+from frf_ipz.diagnosis.measured.forces import RINGING
 from frf_ipz.diagnosis.measured.from_blows import measure, survey
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.quantities import FrfQuantity
 
 PARTS = np.array([0.02, -0.007])  # of the largest response: constants of the two channels
+N_SAMPLES = 8000  # of a shaker's record
 LEFT = 0.05  # of the largest response: motion before a blow
 
 
@@ -119,6 +122,49 @@ def test_a_displacement_may_have_a_mean(strike):
     sensors = tuple(replace(sensor, quantity=FrfQuantity.RECEPTANCE) for sensor in blow.sensors)
     shown = replace(strike(), blows=(replace(blow, sensors=sensors, responses=blow.responses + 1.0),))
     assert not taken_off(shown, without_quiet_constants(shown)).any()
+
+
+@pytest.fixture
+def shaken(strike, chain):
+    """Three records of a shaker that starts at rest, at node 1, with noise."""
+    zeros, unit = np.zeros((4, 4)), np.eye(4)
+    system = StateSpace(
+        np.block([[zeros, unit], [-chain.K, -chain.C]]), np.vstack([zeros, unit])[:, :1],
+        np.hstack([-chain.K, -chain.C])[[0, 2]], unit[[0, 2], :1],
+    )  # fmt: skip
+    one, rng = strike().blows[0], np.random.default_rng(5)
+    records = []
+    for number in range(3):
+        force = np.concatenate([[0.0], rng.standard_normal(N_SAMPLES - 1)])
+        responses = lsim(system, force, one.step_s * np.arange(N_SAMPLES))[1].T
+        responses += 1e-3 * responses.std() * rng.standard_normal(responses.shape)
+        records.append(replace(one, name=f"record {number}", force=force, responses=responses))
+    return replace(strike(), kind="random", blows=tuple(records))
+
+
+@pytest.mark.parametrize("lead", [0, 200])
+def test_records_of_a_shaker_tell_constants_though_the_structure_moves_all_the_time(shaken, lead):
+    rests = ((0, 0), (lead, 0))
+    shaken = replace(
+        shaken,
+        blows=tuple(
+            replace(blow, force=np.pad(blow.force, (lead, 0)), responses=np.pad(blow.responses, rests))
+            for blow in shaken.blows
+        ),
+    )
+    assert all(_whole(blow).start == pytest.approx(max(lead - RINGING, 0), abs=5) for blow in shaken.blows)
+    constants = PARTS[:, None] * largest(shaken)
+    spoilt = shifted(shaken, constants)
+    restored = without_leftovers(spoilt)
+    off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
+    stds = np.array([blow.constant_std for blow in restored.blows])
+    assert np.all(np.abs(off) < 4 * stds)
+    assert np.all(stds < 1e-3 * largest(shaken)[:, 0])
+
+
+def test_one_record_of_a_shaker_tells_no_constant(shaken):
+    alone = replace(shaken, blows=shaken.blows[:1])
+    assert without_leftovers(alone) is alone
 
 
 @pytest.mark.parametrize("is_rested", [True, False])

@@ -19,9 +19,9 @@ from scipy.ndimage import uniform_filter1d
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.contour import find_resonances
-from frf_ipz.diagnosis.measured.forces import isolate_pulse
+from frf_ipz.diagnosis.measured.forces import RINGING, Pulse, isolate_pulse
 from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_places
-from frf_ipz.diagnosis.measured.local_pole import pole_near
+from frf_ipz.diagnosis.measured.local_pole import lines_near, pole_near
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations
@@ -33,8 +33,9 @@ LEFT = 3.0  # times the motion just before a blow: what each mode may have of it
 MISSED = 0.003  # of a response: what sampling and the places of blows leave
 AROUND = 11  # lines over which what no FRF explains is averaged
 ROUNDS = 3  # of weights: at first leftovers count as noise
-WIDTH = 3.0  # half-widths of a resonance on each side of it that tell its pole
 AKIN = 0.1  # of a sample's variance: noise that the samples before a blow have in common
+LEAST_RECORDS = 2  # of a shaker at a place: one alone tells no constant
+SHAKEN = 0.02  # of a shaker's largest force: with more it has started
 LEAST_BEFORE = 4  # samples before a blow that tell what is left
 
 
@@ -43,6 +44,7 @@ class _Group:
     """Blows at one place, and what may be left in each: a constant and, after another blow, decaying modes."""
 
     blows: tuple[Blow, ...]
+    starts: tuple[int, ...]  # samples before each blow, or before the shaker starts
     lines: Lines
     poles: ComplexArray
 
@@ -101,10 +103,13 @@ def without_leftovers(observations: Observations) -> Observations:
     Observations
         The same without leftovers, and with what constants are still uncertain by.
     """
-    if not observations.blows or not all(blow.rested for blow in observations.blows):
+    if not observations.are_from_rest:
+        return observations
+    places = same_places(observations)
+    if observations.kind != "hammer" and min(len(records) for records in places) < LEAST_RECORDS:
         return observations
     decay = DECAYS / min(blow.duration_s for blow in observations.blows)
-    groups = [_group(blows, observations, decay) for blows in same_places(observations)]
+    groups = [_group(blows, observations, decay) for blows in places]
     found: dict[tuple[str, str], tuple[FloatArray, float]] = {}
     for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.blows[0].sensors):
         rows = [
@@ -118,10 +123,22 @@ def without_leftovers(observations: Observations) -> Observations:
 
 
 def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) -> _Group:
-    isolated = tuple(isolate_pulse(blow).blow for blow in blows) if observations.kind == "hammer" else blows
-    lines = lines_of_band(isolated, observations.band_hz, decay)
+    is_hammer = observations.kind == "hammer"
+    pulses = [isolate_pulse(blow) if is_hammer else _whole(blow) for blow in blows]
+    lines = lines_of_band(tuple(pulse.blow for pulse in pulses), observations.band_hz, decay)
     follow = any(blow.follows for blow in blows)
-    return _Group(blows=blows, lines=lines, poles=_poles(lines, decay) if follow else np.zeros(0, complex))
+    return _Group(
+        blows=blows,
+        starts=tuple(pulse.start for pulse in pulses),
+        lines=lines,
+        poles=_poles(lines, decay) if follow else np.zeros(0, complex),
+    )
+
+
+def _whole(blow: Blow) -> Pulse:
+    """Give a shaker's record, which begins where its force does: the structure moves from there on."""
+    size = np.abs(blow.force)
+    return Pulse(blow=blow, start=max(int(np.argmax(size > SHAKEN * size.max())) - RINGING, 0), stop=blow.n_samples)
 
 
 def _without(blow: Blow, found: dict[tuple[str, str], tuple[FloatArray, float]]) -> Blow:
@@ -136,9 +153,10 @@ def _poles(lines: Lines, decay: float) -> ComplexArray:
     peaks = find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
     found = []
     for omega, own in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
-        near = np.flatnonzero(np.abs(lines.s.imag - omega) <= WIDTH * (decay + own))
+        start = complex(-own, omega)
+        near = lines_near(lines.s, start)
         sensor = int(np.argmax(size[near].sum(0) / size.sum(0)))
-        pole = pole_near(lines.s[near], lines.values[near, sensor], complex(-own, omega))
+        pole = pole_near(lines.s[near], lines.values[near, sensor], start)
         found += [] if pole is None else [pole.pole]
     return np.array(found, complex)
 
@@ -179,13 +197,19 @@ def _told(group: _Group, row: int, sizes: list[FloatArray]) -> _Told:
     across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
     along = np.sum(shared.conj() * response, 1)
     own = [(shape.conj() * part[:, None]).T for shape, part in zip(shapes, weight.T, strict=True)]
-    quiet = [_before(group, blow, row, noise) for blow in group.blows]
+    before = [blow.responses[row, :start] for blow, start in zip(group.blows, group.starts, strict=True)]
+    quiet = [_quiet(group, blow, samples, noise) for blow, samples in zip(group.blows, before, strict=True)]
     straight = [(one @ shape).real + more for one, shape, (more, _) in zip(own, shapes, quiet, strict=True)]
     slopes = [(one @ values).real + more for one, values, (_, more) in zip(own, response.T, quiet, strict=True)]
     told = _Told(
         counts=tuple(shape.shape[1] for shape in shapes),
         prior=np.diag(
-            np.concatenate([_motion(blow, row, len(size)) ** 2 for blow, size in zip(group.blows, sizes, strict=True)])
+            np.concatenate(
+                [
+                    _motion(blow.responses[row, : max(start, LEAST_BEFORE)], len(size)) ** 2
+                    for blow, start, size in zip(group.blows, group.starts, sizes, strict=True)
+                ]
+            )
         ),
         curvature=block_diag(*straight) - (across.conj().T @ across).real,
         slope=np.concatenate(slopes) - (across.conj().T @ along).real,
@@ -194,17 +218,16 @@ def _told(group: _Group, row: int, sizes: list[FloatArray]) -> _Told:
     return told
 
 
-def _before(group: _Group, blow: Blow, row: int, noise: float) -> tuple[FloatArray, FloatArray]:
+def _quiet(group: _Group, blow: Blow, before: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
     """Give the curvature and slope that the samples before the blow add."""
-    n = isolate_pulse(blow).start
+    n = len(before)
     shapes = group.unit_signals(blow)[:, :n]
     variance = noise**2 * (1 + AKIN * n)
-    return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ blow.responses[row, :n] / variance)
+    return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ before / variance)
 
 
-def _motion(blow: Blow, row: int, count: int) -> FloatArray:
+def _motion(before: FloatArray, count: int) -> FloatArray:
     """Give the standard deviations of a blow's leftovers but the constant: the motion before it."""
-    before = blow.responses[row, : max(isolate_pulse(blow).start, LEAST_BEFORE)]
     return np.concatenate([np.zeros(1), np.full(count - 1, LEFT * np.sqrt(2) * before.std())])
 
 
