@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
 from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
 from frf_ipz.diagnosis.measured.cleaned.restored import restore
+from frf_ipz.diagnosis.nonlinear.recorded.dispersion import without_dispersion
 from frf_ipz.diagnosis.nonlinear.simulate import without_law
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.search import fit_nothing, search
@@ -141,7 +142,7 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
     if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
-        without = without_law(observations, laws.freedom, laws.fit)
+        without = without_law(without_dispersion(observations, laws.dispersion_rad), laws.freedom, laws.fit)
     sizes = [
         [np.abs(blow.responses).max(initial=0.0) for blow in both]
         for both in zip(without.blows, observations.blows, strict=True)

@@ -10,7 +10,7 @@ linear can (`beyond_linear`). If none explains it, the place is looked for at wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
@@ -22,17 +22,16 @@ import numpy as np
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, Track, find_candidates
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE, anywhere, whereabouts
-from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
+from frf_ipz.diagnosis.nonlinear.fitting.tracks import FINE, ROUGH, WEAK, Recordings
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
-from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
+from frf_ipz.diagnosis.nonlinear.recorded.dispersion import latest_s
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, starts_at_rest, transform
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -40,11 +39,11 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Misfit
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
-    from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.progress import Progress
@@ -52,13 +51,7 @@ if TYPE_CHECKING:
 
 LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong blows disagree"
-SHORT, LONG = 80.0, 320.0  # periods of the top of the band: lengths of the stretches that are fitted
-FIRST = 40.0  # of those from which a rough start leads to a strong law
-LONGER = 640.0  # of records from rest of a shaker, which takes time to shake up a structure
-WEAK, TWICE = 1.0, 2.0  # mean square that a linear model leaves below which stretches are longer, and how much
-LONGER_BY = 1.2  # times as long, where records are long enough
-ROUGH, FINE = 0.01, 0.005  # of the response: what the model may miss on short and long stretches
-USUAL, FINEST = 0.5, 0.001  # mean square that data leave whose variance is right; with less, the model misses less
+FIRST = 40.0  # periods of the top of the band: length of stretches from which a rough start leads to a strong law
 LEAST_TO_HOLD = 3  # blows at a place: one of them is held out
 MOST_MISFIT = 1.5  # mean square over the expected one, of a law that explains the recordings
 CLOSE = 0.01  # or so much of the response: a place that is held makes modes of its own, which may be off as well
@@ -78,6 +71,7 @@ EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to expl
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
 MOSTLY = 0.05  # or so much of the linear model's: what the forces lack is then their law, not their place
 NEARLY_ALL = 0.05  # of what the linear model leaves of first moments: a law that leaves no more explains them
+UNDISPERSED = 0.9  # of the cost: what a law may leave where a dispersion of the converters is to be believed
 LATER = 2.0**0.5, 2.0  # times as long as short stretches: first moments by which a law may be told better
 
 
@@ -107,6 +101,8 @@ class LawSearch:
         Unknowns of the linear model that it was fitted with; `simulate` needs them.
     place : mapping
         Where a force sits whose law is not known, as in `diagnosis.json`; empty where that was not asked or not found.
+    dispersion_rad : float
+        What was taken back of the converters' dispersion before the law was fitted, see `without_dispersion`; rad.
     is_early : bool
         The law explains first moments only: what it misses later grows from small errors of the model.
     """
@@ -122,6 +118,7 @@ class LawSearch:
     fit: LawFit | None = None
     freedom: Freedom | None = None
     place: Mapping[str, object] = field(default_factory=dict)
+    dispersion_rad: float = 0.0
     is_early: bool = False
 
     @property
@@ -185,57 +182,72 @@ def search_laws(
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
     plant, noise = make_plant(model, observations), read_noise(observations)
-
-    def track_of(periods: float, floor: float, *, loudest: bool) -> Track:
-        window = Window(duration_s=periods / observations.band_hz[1], floor=floor, loudest=loudest)
-        stretches = transform(training, plant, noise, window)
-        freedom = make_freedom(plant, stretches, observations.band_hz[1], options)
-        return Track(stretches=stretches, linear=fit_linear(stretches, freedom), where=anywhere(plant))
-
-    from_rest = observations.kind != "hammer" and all(starts_at_rest(blow) for blow in observations.blows)
-    short, long = _tracks(track_of, from_rest=from_rest)
-    where = whereabouts(long.stretches, long.linear)
-    short, long = replace(short, where=where), replace(long, where=where)
-    first = (lambda: replace(track_of(FIRST, ROUGH, loudest=False), where=where)) if short.missed > WEAK else None
-    fits = find_candidates(short, long, laws, first=first)
-    bend_of = cache(partial(_bend, long))
-    found = _judge(long, linearity, plant, fits, bend_of)
-    later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
-    firsts = (replace(track_of(s * observations.band_hz[1], FINE, loudest=False), where=where) for s in later)
-    if found.fit is not None and found.verdict == UNEXPLAINED and _explains_first(chain([short], firsts), found.fit):
-        grown = "It explains their first moments; what it misses later grows from small errors of the model."
-        found = replace(found, verdict=EXPLAINED, is_early=True, statement=f"{found.findings[0].statement} {grown}")
+    recordings = Recordings(training=training, held_out=held_out, plant=plant, noise=noise, options=options)
+    look = _look(recordings, linearity, laws)
+    if look.found.fit is not None and (look.found.verdict == UNEXPLAINED or not is_explained(look.found.fit)):
+        progress(0.4, "looking whether converters turned the phase")
+        look = _without_dispersion(look, linearity, laws)
+    found = look.found
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
-        found = _with_place(found, plant, _anywhere(short, long, fits, bend_of))
+        found = _with_place(found, plant, _anywhere(look))
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
-    before, after = prove(long, _held_out(held_out, plant, noise, long), found.fit)
-    return replace(found, freedom=long.linear.freedom, before=before, after=after)
+    before, after = prove(look.long, look.recordings.held_out_as(look.long), found.fit)
+    return replace(found, freedom=look.long.linear.freedom, before=before, after=after)
 
 
-def _tracks(track_of: Callable[..., Track], *, from_rest: bool) -> tuple[Track, Track]:
-    """Cut short and long stretches; both are longer where a linear model leaves little."""
-    periods = LONGER if from_rest else LONG
-    long = track_of(periods, FINE, loudest=False)
-    is_linear = long.missed < USUAL  # as far as its first parts say
-    if is_linear and from_rest:
-        periods = LONG  # how a louder stretch starts is not known, and the longer it is, the more that matters
-        long = track_of(periods, FINE, loudest=True)
-    floor, is_weak = FINE, long.missed < WEAK
-    if long.missed < USUAL:
-        floor = max(FINE * float(np.sqrt(long.missed / USUAL)), FINEST)
-        long = track_of(periods, floor, loudest=is_linear)
-    if is_weak:
-        longer = track_of(TWICE * periods, floor, loudest=is_linear)
-        if longer.stretches.n_samples > LONGER_BY * long.stretches.n_samples:
-            return long, longer
-    return track_of(SHORT, ROUGH, loudest=is_linear), long
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Look:
+    """What laws say of recordings: the stretches, all fits, and what was found."""
+
+    recordings: Recordings
+    short: Track
+    long: Track
+    fits: list[LawFit]
+    bend_of: Callable[[LawFit], float]
+    found: LawSearch
 
 
-def _anywhere(short: Track, long: Track, fits: list[LawFit], bend_of: Callable[[LawFit], float]) -> AnyForce:
+def _look(recordings: Recordings, linearity: Linearity, laws: Sequence[Law]) -> _Look:
+    """Try every law at every place, and judge the best."""
+    short, long = recordings.tracks()
+
+    def track_of(duration_s: float, floor: float) -> Track:
+        return replace(recordings.track(duration_s, floor, loudest=False), where=long.where)
+
+    first = partial(track_of, FIRST / recordings.training.band_hz[1], ROUGH) if short.missed > WEAK else None
+    fits, bend_of = find_candidates(short, long, laws, first=first), cache(partial(_bend, long))
+    found = replace(_judge(long, linearity, recordings.plant, fits, bend_of), dispersion_rad=recordings.dispersion_rad)
+    later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
+    firsts = (track_of(duration, FINE) for duration in later)
+    if found.fit is not None and found.verdict == UNEXPLAINED and _explains_first(chain([short], firsts), found.fit):
+        grown = "It explains their first moments; what it misses later grows from small errors of the model."
+        found = replace(found, verdict=EXPLAINED, is_early=True, statement=f"{found.findings[0].statement} {grown}")
+    return _Look(recordings=recordings, short=short, long=long, fits=fits, bend_of=bend_of, found=found)
+
+
+def _without_dispersion(look: _Look, linearity: Linearity, laws: Sequence[Law]) -> _Look:
+    """Look again without the dispersion of the converters, where a law explains more without it."""
+    fit = look.found.fit
+    dispersion = 0.0 if fit is None else look.recordings.best_dispersion(look.long, fit)
+    if fit is None or not dispersion:
+        return look
+    again = _look(look.recordings.without(dispersion), linearity, laws)
+    better = again.found.fit
+    if better is None or better.cost > UNDISPERSED * fit.cost:
+        return look
+    if 0.5 * (fit.cost - better.cost) / max(1.0, better.cost / better.n_rows) < FOUND_NATS:
+        return look
+    late = latest_s(dispersion, look.recordings.training.band_hz[1], look.long.stretches.step_s)
+    said = f"The converters delay the top of the band by {late:.2g} s more than low frequencies, which was taken back."
+    return replace(again, found=replace(again.found, statement=f"{again.found.statement} {said}"))
+
+
+def _anywhere(look: _Look) -> AnyForce:
     """Find the place of an unknown law: where any force explains most, or where one does besides a law."""
+    short, long, fits, bend_of = look.short, look.long, look.fits, look.bend_of
     near = [fit for fit in fits if fit.cost < NEAR * fits[0].cost and fit.place in long.where.equal][:MOST_NEAR]
     small = [fit for fit in near if bend_of(fit) < SMALL * fit.cost]
     bent = [AnyForce.on(long, fit.place, fit.cost - bend_of(fit)) for fit in small]
@@ -263,13 +275,6 @@ def _with_place(found: LawSearch, plant: Plant, best: AnyForce) -> LawSearch:
         f"A force of another kind at {place.words} would: {np.sqrt(left):.2g} times the expected misfit is then left."
     )
     return replace(found, place=dict(place.location), statement=f"{found.statement} {where}")
-
-
-def _held_out(held_out: Observations, plant: Plant, noise: ChannelNoise, track: Track) -> Stretches | None:
-    """Transform what is held out as what was fitted; nothing where no place has blows to spare."""
-    if not held_out.blows:
-        return None
-    return transform(held_out, plant, noise, Window(duration_s=track.stretches.duration_s, floor=FINE))
 
 
 def _divide(observations: Observations) -> tuple[Observations, Observations]:

@@ -9,20 +9,21 @@ from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.fitting import anywhere, candidates
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
+from frf_ipz.diagnosis.nonlinear.fitting.tracks import FINE, Recordings
 
 EVERY = tuple(range(10))
 
 
-def cutter(missed, most=float("inf")):
+def recordings(missed, most=float("inf"), *, kind="hammer"):
     """Tracks that say how long they were asked to be; a linear model leaves so much."""
 
-    def cut(periods, floor, *, loudest):
-        n_samples = min(periods, most)
+    def cut(duration_s, floor, *, loudest):
+        n_samples = min(round(duration_s), most)
         return SimpleNamespace(
             missed=missed, floor=floor, loudest=loudest, stretches=SimpleNamespace(n_samples=n_samples)
         )
 
-    return cut
+    return SimpleNamespace(track=cut, training=SimpleNamespace(band_hz=(0.1, 1.0), kind=kind, blows=()))
 
 
 def lengths(found):
@@ -34,15 +35,15 @@ def lengths(found):
     [(30.0, 1e9, [80, 320]), (0.8, 1e9, [320, 640]), (0.8, 330, [80, 320])],
 )
 def test_stretches_are_longer_where_a_linear_model_leaves_little(missed, most, expected):
-    assert lengths(search._tracks(cutter(missed, most), from_rest=False)) == expected
+    assert lengths(Recordings._tracks(recordings(missed, most))) == expected
 
 
 def test_a_record_that_starts_linear_is_looked_at_where_it_is_loudest():
-    short, long = search._tracks(cutter(0.3), from_rest=True)
+    short, long = Recordings._tracks(recordings(0.3, kind="random"))
     assert short.loudest
     assert long.loudest
     assert lengths((short, long)) == [320, 640]
-    assert long.floor < search.FINE
+    assert long.floor < FINE
 
 
 def a_fit(cost, *, settled):
@@ -75,6 +76,10 @@ def test_a_small_bend_is_too_much_only_where_noise_may_hide_a_larger_one(drop, l
     assert search._is_bent(track, fit, drop, least=least) == bent
 
 
+def a_look(fits, bend_of):
+    return SimpleNamespace(short=None, long=a_track(), fits=fits, bend_of=bend_of)
+
+
 def a_force(place, cost, *, n_rows=100, missed=50.0):
     return search.AnyForce(place=place, cost=cost, left=cost / n_rows, missed=missed)
 
@@ -91,7 +96,7 @@ def where(equal):
 def test_only_a_small_force_besides_a_law_is_believed_without_being_fitted(monkeypatch, drop, place):
     """A law at place 7 leaves 1000; any force, fitted, leaves 2000 at place 3."""
     monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, 2000.0), a_force(5, 2000.0)))
-    assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: drop).place == place
+    assert search._anywhere(a_look([a_law_at(7, 1000.0)], lambda _: drop)).place == place
 
 
 @pytest.mark.parametrize(
@@ -102,7 +107,7 @@ def test_first_moments_place_a_law_where_later_ones_are_not_reached(monkeypatch,
     """Long stretches say place 3, the first moments place 5: they are believed where they leave nothing there alone."""
     monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, left), a_force(5, first)))
     monkeypatch.setattr(search, "fit_anything", lambda _, one, __: a_force(one, early))
-    assert search._anywhere(None, a_track(), [a_law_at(7, 1000.0)], lambda _: 950.0).place == place
+    assert search._anywhere(a_look([a_law_at(7, 1000.0)], lambda _: 950.0)).place == place
 
 
 def test_places_of_the_best_laws_are_asked_for_whatever_the_first_moments_say(monkeypatch):

@@ -132,9 +132,13 @@ def find_candidates(
     return _best_of_each(fits + _finished(long, _others(again[:FINALISTS], fits[:1])))
 
 
+def is_explained(fit: LawFit) -> bool:
+    """Tell whether a fit leaves no more than can be expected."""
+    return fit.cost < fit.n_rows
+
+
 def _explain(fits: Sequence[LawFit]) -> bool:
-    """Tell whether the first fit leaves no more than can be expected."""
-    return bool(fits) and fits[0].cost < fits[0].n_rows
+    return bool(fits) and is_explained(fits[0])
 
 
 def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:

@@ -75,6 +75,8 @@ class Stretches:
         The structure moves at the start.
     first_sample : (n_blows,) int array
         Of the recordings, at the start.
+    window : Window
+        How they were cut.
     """
 
     s: ComplexArray
@@ -91,6 +93,7 @@ class Stretches:
     blow_of: IntArray
     moving: BoolArray
     first_sample: IntArray
+    window: Window
 
     @property
     def n_blows(self) -> int:
@@ -179,8 +182,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
     forced = np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)
     noisy = known + forced[:, None] * size
-    variance = noisy + floor**2 * size
-    variance[~present] = np.inf
+    variance = np.where(present[..., None], noisy + floor**2 * size, np.inf)
     return Stretches(
         s=s,
         used=np.flatnonzero(observations.looks_at(frequency, sigma / (2 * np.pi)))[::THIN],
@@ -196,6 +198,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         blow_of=np.array([cut.number for cut in cuts]),
         moving=np.array([cut.is_moving for cut in cuts]),
         first_sample=np.array([cut.start for cut in cuts]),
+        window=window,
     )
 
 

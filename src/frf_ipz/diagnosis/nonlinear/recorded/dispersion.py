@@ -1,0 +1,72 @@
+"""Converters that delay high frequencies more than low ones, which a nonlinear law does not forgive.
+
+A filter against aliasing that answers without delay ("low latency", of minimum phase) turns the phase of what lies
+close to its cut-off. All channels share it, so that no FRF shows it; but the force of a law follows from the motion as
+it was, not as it was recorded. For a gain that falls steeply at omega_c, the relation of gain and phase by Bode (1945)
+gives the phase -a ln((omega_c + omega) / (omega_c - omega)): a delay, which does no harm, and what remains, which is
+taken back here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.observations import Blow, Observations
+
+CUT_OFF = 0.46  # of the sampling rate: usual for converters
+HELD = 0.97  # of the cut-off: above, nothing was recorded, and the phase stays
+ROOM = 2048  # samples behind the record, for what is moved to before its start
+
+
+def without_dispersion(observations: Observations, dispersion_rad: float) -> Observations:
+    """Give recordings the phase of a filter whose delay is the same at all frequencies.
+
+    Parameters
+    ----------
+    observations : Observations
+        Blows or records.
+    dispersion_rad : float
+        a, rad: the fall of the filter's gain in nepers over pi; 3.7 for 100 dB, 0 changes nothing.
+
+    Returns
+    -------
+    Observations
+        With the same FRFs.
+    """
+    if not dispersion_rad:
+        return observations
+    return replace(observations, blows=tuple(_undispersed(blow, dispersion_rad) for blow in observations.blows))
+
+
+def latest_s(dispersion_rad: float, frequency_hz: float, step_s: float) -> float:
+    """Delay at a frequency beyond that at low frequencies, s.
+
+    Parameters
+    ----------
+    dispersion_rad : float
+        As in `without_dispersion`.
+    frequency_hz : float
+        Hz.
+    step_s : float
+        Of the recordings, s.
+
+    Returns
+    -------
+    float
+        s.
+    """
+    part = min(frequency_hz * step_s / CUT_OFF, HELD)
+    return dispersion_rad * step_s / (np.pi * CUT_OFF) * part**2 / (1 - part**2)
+
+
+def _undispersed(blow: Blow, dispersion_rad: float) -> Blow:
+    n = blow.n_samples + ROOM
+    part = np.minimum(np.fft.rfftfreq(n) / CUT_OFF, HELD)
+    turn = np.exp(2j * dispersion_rad * (np.arctanh(part) - part))
+    signals = np.vstack([blow.force, blow.responses])
+    turned = np.fft.irfft(np.fft.rfft(signals, n, axis=1) * turn, n, axis=1)[:, : blow.n_samples]
+    return replace(blow, force=turned[0], responses=turned[1:])

@@ -1,0 +1,102 @@
+"""Converters whose filter has minimum phase, made with SciPy's own design of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from frf_ipz.diagnosis.nonlinear.recorded.dispersion import CUT_OFF, latest_s, without_dispersion
+from frf_ipz.diagnosis.nonlinear.search import search_laws
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+CUBIC_N_M3 = 2e10
+EVERY = 2  # samples of the fine recordings, one of the converter
+FALL_DB = 100.0  # from 0.42 to 0.5 of the converter's rate
+TYPICAL = FALL_DB / 20 * np.log(10) / np.pi  # rad
+
+
+def taps(*, is_fast):
+    count, beta = signal.kaiserord(FALL_DB, 2 * 0.08 / EVERY)
+    found = signal.firwin(2 * (count // 2) + 1, 0.92 / EVERY, window=("kaiser", beta))
+    return signal.minimum_phase(found, half=False) if is_fast else found
+
+
+def recorded(observations, *, is_fast):
+    """Recordings of half the rate, behind a filter of minimum phase or of one delay, which is taken back."""
+    chosen = taps(is_fast=is_fast)
+    late = 0 if is_fast else len(chosen) // 2
+
+    def filtered(values):
+        whole = np.apply_along_axis(np.convolve, -1, values, chosen)
+        return whole[..., late : late + values.shape[-1] : EVERY]
+
+    blows = tuple(
+        replace(blow, step_s=EVERY * blow.step_s, force=filtered(blow.force), responses=filtered(blow.responses))
+        for blow in observations.blows
+    )
+    return replace(observations, blows=blows)
+
+
+@pytest.fixture(scope="module")
+def struck(strike):
+    return strike(lambda w, _: CUBIC_N_M3 * w**3, (0, 0, 1, 0))
+
+
+def test_a_law_behind_fast_converters_is_found_with_its_numbers(chain, struck):
+    found = search_laws(chain.model, recorded(struck, is_fast=True), DiagnoseOptions())
+    assert found.verdict == "explained"
+    assert abs(found.dispersion_rad - TYPICAL) < 0.5
+    assert "converters" in found.statement
+    first = found.findings[0]
+    assert (first.effect, dict(first.location)) == ("cubic_stiffness", {"nodes": [3]})
+    assert abs(first.parameters["cubic_N_m3"].value / CUBIC_N_M3 - 1) < 0.02
+    assert found.after.held_out < 0.1 * found.before.held_out
+
+
+def test_converters_of_one_delay_are_left_as_they_are(chain, struck):
+    found = search_laws(chain.model, recorded(struck, is_fast=False), DiagnoseOptions())
+    assert found.verdict == "explained"
+    assert found.dispersion_rad == 0.0
+
+
+@pytest.mark.slow
+def test_a_law_that_no_phase_explains_is_as_unknown_as_before(chain, strike):
+    square = strike(lambda w, _: 3e7 * w * abs(w), (0, 0, 1, 0))
+    found = search_laws(chain.model, recorded(square, is_fast=True), DiagnoseOptions())
+    assert found.verdict == "unexplained"
+
+
+def test_what_is_taken_back_is_what_such_a_filter_does_beyond_a_delay(struck):
+    blow = struck.blows[0]
+    impulse = np.zeros(blow.n_samples)
+    impulse[600] = 1.0
+    shown = np.convolve(impulse, taps(is_fast=True))[: blow.n_samples : EVERY]
+    test = replace(struck, blows=(replace(blow, force=shown, responses=np.tile(shown, (2, 1)), step_s=1.0),))
+    back = without_dispersion(test, TYPICAL).blows[0].force
+    lines = np.fft.rfft(back)
+    frequency = np.fft.rfftfreq(len(back))
+    inside = (frequency > 0.01) & (frequency < 0.36)
+    phase = np.unwrap(np.angle(lines))[inside]
+    bent = phase - np.polyval(np.polyfit(frequency[inside], phase, 1), frequency[inside])
+    assert np.abs(bent).max() < np.radians(8)
+    raw = np.unwrap(np.angle(np.fft.rfft(shown)))[inside]
+    was = raw - np.polyval(np.polyfit(frequency[inside], raw, 1), frequency[inside])
+    assert np.abs(was).max() > np.radians(30)
+
+
+def test_all_channels_are_turned_alike(struck):
+    turned = without_dispersion(struck, TYPICAL)
+    for new, old in zip(turned.blows, struck.blows, strict=True):
+        lines = [np.fft.rfft(np.vstack([blow.force, blow.responses]), 4 * blow.n_samples) for blow in (new, old)]
+        inside = slice(200, 1200)
+        ratios = [each[1:, inside] / each[0, inside] for each in lines]
+        assert np.median(np.abs(ratios[0] / ratios[1] - 1)) < 0.005  # where a record ends they are not quite the same
+    assert without_dispersion(struck, 0.0) is struck
+
+
+def test_the_delay_said_is_the_slope_of_the_phase():
+    part = np.array([0.3, 0.3 + 1e-6]) / CUT_OFF
+    phase = 2 * TYPICAL * (np.arctanh(part) - part)
+    slope = np.diff(phase)[0] / (2 * np.pi * 1e-6 / 1e-3)
+    assert latest_s(TYPICAL, 300.0, 1e-3) == pytest.approx(slope, rel=1e-3)
