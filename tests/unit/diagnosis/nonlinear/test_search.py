@@ -180,7 +180,9 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     verdict, left = alone
     after = SimpleNamespace(training_noise=left)
     at_rest = SimpleNamespace(moving=())
-    laws = SimpleNamespace(strain=strain, verdict=verdict, after=after, fit="fit", freedom=at_rest, is_early=early[0])
+    laws = SimpleNamespace(
+        strain=strain, verdict=verdict, after=after, fit="fit", freedom=at_rest, is_early=early[0], dispersion_rad=0.0
+    )
     eased = SimpleNamespace(verdict="explained", strain=again, is_early=early[1])
     bench = SimpleNamespace(kind="hammer")
     found = law_beside.search_beside_law(lambda _: bench, laws, "model", seen, lambda *_: eased)

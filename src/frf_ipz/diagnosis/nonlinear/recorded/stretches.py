@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
 THIN = 2  # lines are closer than the window resolves: every second one is independent enough
 EDGE = 40  # samples beside a stretch that moves: they are faded out
-FINER = 6  # times as many samples, where a stretch starts with a jump
+FINER = 8  # times as many samples, where a stretch starts with a jump
 BEFORE = 4  # samples before the pulse
 FIRST_SAMPLES, FIRST_PART = 8, 1e-3  # of a record: what is looked at to see whether it starts at rest
 AT_REST = 0.05  # of a signal's size
