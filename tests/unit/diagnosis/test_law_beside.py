@@ -204,7 +204,9 @@ def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkey
     observations = Observations(kind="hammer", blows=(blow,), band_hz=(10.0, 500.0))
     gone = replace(observations, blows=(replace(blow, responses=np.full((1, SAMPLES), left)),))
     monkeypatch.setattr(law_beside, "without_law", lambda *_: gone)
-    law = SimpleNamespace(verdict="explained", strain=99.0, fit=object(), freedom=SimpleNamespace(moving=()))
+    law = SimpleNamespace(
+        verdict="explained", strain=99.0, fit=object(), freedom=SimpleNamespace(moving=()), dispersion_rad=0.0
+    )
     assert search_beside_law(pytest.fail, law, nominal, observations, pytest.fail) is None
 
 
