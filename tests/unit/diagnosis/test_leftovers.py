@@ -11,6 +11,7 @@ from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_con
 from frf_ipz.diagnosis.measured.forces import RINGING
 from frf_ipz.diagnosis.measured.from_blows import measure, survey
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
+from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
 
 PARTS = np.array([0.02, -0.007])  # of the largest response: constants of the two channels
@@ -173,3 +174,18 @@ def test_what_does_not_start_at_rest_is_left_alone(strike, is_rested):
     other = replace(observations, blows=tuple(replace(blow, rested=is_rested) for blow in observations.blows))
     assert (without_leftovers(other) is other) == (not is_rested)
     assert (without_quiet_constants(other) is other) == (not is_rested)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("everywhere", [False, True])
+def test_a_channel_that_shows_nothing_does_no_harm(strike, everywhere):
+    """Converters store zeros for what is smaller than their steps."""
+    seen = strike()
+    here = tuple(replace(blow, responses=blow.responses * np.array([[1.0], [0.0]])) for blow in seen.blows)
+    elsewhere = parse_dof("3:+x")
+    there = tuple(replace(blow, name=f"{blow.name} there", input_dof=elsewhere) for blow in seen.blows)
+    together = replace(seen, blows=here if everywhere else here + there)
+    off = taken_off(together, without_leftovers(together))
+    assert np.all(np.abs(off[: len(here), 1]) < 1e-6 * largest(seen)[1])
+    plain = taken_off(seen, without_leftovers(seen))
+    assert off[: len(here), 0] == pytest.approx(plain[:, 0], abs=1e-3 * float(np.abs(seen.blows[0].responses).max()))

@@ -129,9 +129,11 @@ def _stands_out(data: Data) -> BoolArray:
 
 
 def _relative(wrong: ComplexArray, measured: ComplexArray) -> float:
-    """Norm over norm; each FRF counts by its own size, for sensors of several kinds have several units."""
-    scale = np.maximum(np.sqrt(np.mean(np.abs(measured) ** 2, 0)), np.finfo(float).tiny)
-    return float(np.linalg.norm(wrong / scale) / np.linalg.norm(measured / scale))
+    """Norm over norm; each FRF that shows anything counts by its own size, for sensors have several units."""
+    scale = np.sqrt(np.mean(np.abs(measured) ** 2, 0))
+    shown = scale > 0
+    wrong, measured = (part[:, shown] / scale[shown] for part in (wrong, measured))
+    return float(np.linalg.norm(wrong) / np.linalg.norm(measured))
 
 
 def disagreement(bench: Bench, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:

@@ -165,8 +165,9 @@ def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
 
 def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
     """Find the lines that carry signal, for a user who has said nothing."""
-    ratio = np.abs(frfs.values) ** 2 / noise
-    strong = usable & (np.median(np.where(np.isfinite(ratio), ratio, 0.0), axis=1) > SIGNAL**2)
+    told = np.isfinite(noise) & (noise > 0)
+    ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=told)
+    strong = usable & (np.median(ratio, axis=1) > SIGNAL**2)
     if not strong.any():
         raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")
     share = np.cumsum(strong) / strong.sum()

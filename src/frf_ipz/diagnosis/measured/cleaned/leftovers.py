@@ -37,6 +37,7 @@ AKIN = 0.1  # of a sample's variance: noise that the samples before a blow have 
 LEAST_RECORDS = 2  # of a shaker at a place: one alone tells no constant
 SHAKEN = 0.02  # of a shaker's largest force: with more it has started
 LEAST_BEFORE = 4  # samples before a blow that tell what is left
+FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolve, where blows at a place show nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,10 +165,11 @@ def _poles(lines: Lines, decay: float) -> ComplexArray:
 def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
     """Give the leftovers of all blows in one channel, as signals, and the standard deviations of the constants."""
     largest = max(float(np.abs(blow.responses[row]).max()) for group, row in rows for blow in group.blows)
+    faintest = FAINTEST * (largest or 1.0)  # of a channel that shows nothing at all, nothing is taken off
     sizes = [[np.zeros(len(group.rates(blow)) * 2 - 1) for blow in group.blows] for group, _ in rows]
     stds = np.zeros(0)
     for _ in range(ROUNDS):
-        told = [_told(group, row, own) for (group, row), own in zip(rows, sizes, strict=True)]
+        told = [_told(group, row, own, faintest) for (group, row), own in zip(rows, sizes, strict=True)]
         before = np.cumsum([0, *(len(one.slope) for one in told)])
         constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
         prior = block_diag(*(one.prior for one in told))
@@ -186,12 +188,13 @@ def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, fl
     }
 
 
-def _told(group: _Group, row: int, sizes: list[FloatArray]) -> _Told:
+def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> _Told:
     shapes = [group.shapes(blow) for blow in group.blows]
     response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
     left = response - np.stack([shape @ size for shape, size in zip(shapes, sizes, strict=True)], 1)
-    energy = _unshared(force, left)
-    noise = float(np.sqrt(np.median(energy) * 2 * group.lines.s.real[0] / group.blows[0].step_s))
+    per_square = 2 * group.lines.s.real[0] / group.blows[0].step_s
+    energy = _unshared(force, left) + faintest**2 / per_square
+    noise = float(np.sqrt(np.median(energy) * per_square))
     weight = 1 / (energy[:, None] + (MISSED * np.abs(left)) ** 2)
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
     across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
