@@ -59,7 +59,8 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
     Parameters
     ----------
     observations : Observations
-        Blows or records that start at rest.
+        Blows or records that start at rest, without the dispersion of their converters (`without_dispersion`) if the
+        law was fitted without it.
     freedom : Freedom
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
@@ -94,7 +95,7 @@ def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Ob
     Parameters
     ----------
     observations : Observations
-        Blows or records that start at rest.
+        As for `simulate`.
     freedom : Freedom
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
