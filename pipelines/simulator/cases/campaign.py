@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,7 @@ def draw_drives(rng: np.random.Generator, set_up: SetUp, *, double_hit: bool = F
     return tuple(drives)
 
 
-def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
+def make_grid(world: World, *, refine: float = 1.0, n_blows: int = 1) -> LaplaceGrid:
     """Choose the sampling of the forces and the lines of the transforms.
 
     Parameters
@@ -102,6 +103,8 @@ def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
         Nonlinear laws need small steps.
     refine : float
         Divides the step further.
+    n_blows : int
+        In a file.
 
     Returns
     -------
@@ -113,13 +116,23 @@ def make_grid(world: World, *, refine: float = 1.0) -> LaplaceGrid:
     steps = 8
     if any(effect.law for effect in world.effects):
         steps = max(8, -int(-STEPS_PER_PERIOD * set_up.band_hz[1] // set_up.rate_hz))
-    return LaplaceGrid(n_samples=set_up.n_samples + before, rate_hz=set_up.rate_hz, oversampling=round(refine * steps))
+    n_samples = n_blows * set_up.n_samples + before
+    return LaplaceGrid(n_samples=n_samples, rate_hz=set_up.rate_hz, oversampling=round(refine * steps))
 
 
-def force_of(drive: Drive, set_up: SetUp, grid: LaplaceGrid) -> FloatArray:
-    """(n_fine,) true force of one blow or record, N."""
+def files_of(drives: tuple[Drive, ...], set_up: SetUp) -> list[tuple[Drive, ...]]:
+    """Group blows by the file that they are recorded in, in order."""
+    if not set_up.in_one_file:
+        return [(drive,) for drive in drives]
+    return [tuple(group) for _, group in groupby(drives, key=lambda drive: drive.struck)]
+
+
+def force_of(drives: tuple[Drive, ...], set_up: SetUp, grid: LaplaceGrid) -> FloatArray:
+    """(n_fine,) true force of one file, N: a record, or blows with the length of a record between them."""
+    drive, pause = drives[0], set_up.n_samples / set_up.rate_hz
     if drive.blow is not None:
-        return drive.blow.force(grid.fine_time_s)
+        late = [grid.fine_time_s - i * pause for i in range(len(drives))]
+        return np.sum([one.blow.force(time) for one, time in zip(drives, late, strict=True) if one.blow], axis=0)
     low, high = (factor * edge for factor, edge in zip(SHAKER_BAND, set_up.band_hz, strict=True))
     band = (low, min(high, set_up.filter.passband * set_up.rate_hz))
     time = grid.fine_time_s
@@ -157,16 +170,14 @@ def swing(world: World, drives: tuple[Drive, ...], motion: Pair, *, drifting: bo
     gains = 1 / (s[:, None] ** 2 + s[:, None] * (2 * ratio * omega) + omega**2)
     largest = np.zeros(2)
     for drive in drives:
-        force = grid.spectrum(force_of(drive, world.set_up, grid))
+        force = grid.spectrum(force_of((drive,), world.set_up, grid))
         w = (gains @ (there * at_blows[drive.struck])) * force
         signals = grid.signal(np.stack([w, s * w]))
         largest = np.maximum(largest, np.abs(signals).max(axis=1))
     return float(largest[0]), float(largest[1])
 
 
-def true_records(
-    world: World, drives: tuple[Drive, ...], *, grid: LaplaceGrid | None = None
-) -> tuple[FloatArray, FloatArray]:
+def true_records(world: World, drives: tuple[Drive, ...], *, refine: float = 1.0) -> tuple[FloatArray, FloatArray]:
     """Signals of all channels without noise.
 
     Parameters
@@ -174,36 +185,44 @@ def true_records(
     world : World
         The test.
     drives : tuple of Drive
-        Blows or records.
-    grid : LaplaceGrid, optional
-        Another one than `make_grid` chooses.
+        Blows or records: all of a file, or only the first ones.
+    refine : float
+        Divides the step of `make_grid`.
 
     Returns
     -------
     signals : (n_drives, 1 + n_sensors, n_samples) array
-        The force first; sensors in their own units.
+        The force first; sensors in their own units. Blows of one file follow each other without a gap.
     points : (n_drives, n_points, n_samples) array
         True motions of the points of interest, SI, in the sensors' quantity, through the filter only.
     """
-    grid = grid or make_grid(world)
-    laws = _law_spectra(world, drives, grid)
+    files = files_of(drives, world.set_up)
+    grid = make_grid(world, refine=refine, n_blows=max(map(len, files)))
+    laws = _law_spectra(world, files, grid)
     filtered = world.set_up.filter.gain(grid)
     units = np.array([1.0, *(sensor.unit_si for sensor in world.set_up.sensors)])
-    start = grid.n_samples - world.set_up.n_samples
     signals, points = [], []
-    for i, drive in enumerate(drives):
-        shown, there = _spectra(world, drive, grid, i / max(len(drives) - 1, 1), None if laws is None else laws[i])
-        signals.append(grid.signal((shown * filtered[:, None]).T)[:, start:] / units[:, None])
-        points.append(grid.signal((there * filtered[:, None]).T)[:, start:])
-    return _saturate(world, np.array(signals)), np.array(points)
+    for i, file in enumerate(files):
+        shown, there = _spectra(world, file, grid, i / max(len(files) - 1, 1), None if laws is None else laws[i])
+        signals.append(_blow_by_blow(grid.signal((shown * filtered[:, None]).T) / units[:, None], world, len(file)))
+        points.append(_blow_by_blow(grid.signal((there * filtered[:, None]).T), world, len(file)))
+    return _saturate(world, np.concatenate(signals)), np.concatenate(points)
+
+
+def _blow_by_blow(signals: FloatArray, world: World, n_blows: int) -> FloatArray:
+    """(n_blows, n_channels, n_samples) parts of the signals of a file, without what a running shaker did before."""
+    n = world.set_up.n_samples
+    start = signals.shape[1] % n
+    parts = signals[:, start : start + n_blows * n]
+    return parts.reshape(len(signals), n_blows, n).swapaxes(0, 1)
 
 
 def _spectra(
-    world: World, drive: Drive, grid: LaplaceGrid, when: float, law: ComplexArray | None
+    world: World, drives: tuple[Drive, ...], grid: LaplaceGrid, when: float, law: ComplexArray | None
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Spectra of the channels and of the points of interest, for one blow."""
-    s, set_up = grid.s, world.set_up
-    force = grid.spectrum(force_of(drive, set_up, grid))
+    """Spectra of the channels and of the points of interest, for one file."""
+    s, set_up, drive = grid.s, world.set_up, drives[0]
+    force = grid.spectrum(force_of(drives, set_up, grid))
     sign = set_up.struck[drive.struck][1]
     model = world.receptance
     drift = sum(effect.drift for effect in world.effects)
@@ -223,8 +242,8 @@ def _spectra(
     return shown, moved[:, n:] * s[:, None] ** orders[0]
 
 
-def _law_spectra(world: World, drives: tuple[Drive, ...], grid: LaplaceGrid) -> ComplexArray | None:
-    """(n_drives, n_lines) spectra of the restoring force of a nonlinear law."""
+def _law_spectra(world: World, files: list[tuple[Drive, ...]], grid: LaplaceGrid) -> ComplexArray | None:
+    """(n_files, n_lines) spectra of the restoring force of a nonlinear law."""
     effect = next((effect for effect in world.effects if effect.law), None)
     if effect is None or effect.law is None:
         return None
@@ -233,9 +252,9 @@ def _law_spectra(world: World, drives: tuple[Drive, ...], grid: LaplaceGrid) -> 
         struck: world.receptance(s, [world.law_row], [row])[:, 0, 0] for struck, row in enumerate(world.struck_rows)
     }
     motion, velocity = [], []
-    for drive in drives:
-        force = grid.spectrum(force_of(drive, world.set_up, grid), all_lines=True)
-        w = world.set_up.struck[drive.struck][1] * responses[drive.struck] * force
+    for file in files:
+        force = grid.spectrum(force_of(file, world.set_up, grid), all_lines=True)
+        w = world.set_up.struck[file[0].struck][1] * responses[file[0].struck] * force
         motion.append(grid.fine_signal(w))
         velocity.append(grid.fine_signal(s * w))
     place = np.eye(len(world.receptance.shapes))[world.law_row]
@@ -266,9 +285,9 @@ def draw_noise(rng: np.random.Generator, signals: FloatArray) -> tuple[Noise, ..
 
 
 def store(
-    rng: np.random.Generator, signals: FloatArray, noise: tuple[Noise, ...], bits: int
+    rng: np.random.Generator, signals: FloatArray, noise: tuple[Noise, ...], set_up: SetUp
 ) -> tuple[FloatArray, FloatArray]:
-    """Add noise and convert: one range of each channel for all blows.
+    """Add noise and the converter's constants, and convert: one range of each channel for all blows.
 
     Parameters
     ----------
@@ -278,8 +297,8 @@ def store(
         Without noise.
     noise : tuple of Noise
         Of each channel.
-    bits : int
-        Of the converter.
+    set_up : SetUp
+        The test.
 
     Returns
     -------
@@ -288,9 +307,11 @@ def store(
     full_scale : (n_channels,) array
         Its ranges.
     """
-    full_scale = np.abs(signals).max(axis=(0, 2)) * rng.uniform(1.1, 2.0, signals.shape[1])
+    peaks = np.abs(signals).max(axis=(0, 2))
+    constants = set_up.offset * peaks * rng.spawn(1)[0].uniform(-1, 1, peaks.size)
+    full_scale = peaks * rng.uniform(1.1, 2.0, signals.shape[1])
     stored = np.empty_like(signals)
     for i, j in np.ndindex(*signals.shape[:2]):
-        noisy = signals[i, j] + noise[j].draw(rng, signals.shape[2])
-        stored[i, j] = quantise(noisy, float(full_scale[j]), bits)
+        noisy = signals[i, j] + noise[j].draw(rng, signals.shape[2]) + constants[j]
+        stored[i, j] = quantise(noisy, float(full_scale[j]), set_up.bits)
     return stored, full_scale

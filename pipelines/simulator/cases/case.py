@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.cases.campaign import Drive, draw_drives, draw_noise, store, swing, true_records
+from simulator.cases.campaign import Drive, draw_drives, draw_noise, files_of, store, swing, true_records
 from simulator.cases.detectability import Lines, change, four, level_change, make_lines, step_change
-from simulator.cases.files import write_model, write_recording, write_test
+from simulator.cases.files import file_name, write_model, write_recording, write_test
 from simulator.cases.nuisance import make_ruler
 from simulator.cases.scatter import Scatter, draw_scatter, no_scatter
 from simulator.cases.set_up import MARGIN, SetUp, draw_set_up, moving_nodes
@@ -75,12 +75,11 @@ class Case:
         write_model(folder, specimen, self.nominal, set_up.damping_ratio)
         write_test(folder, specimen, set_up)
         columns = ("force", *(sensor.column for sensor in set_up.sensors))
-        for drive, signals in zip(self.drives, self.stored, strict=True):
-            node = set_up.struck[drive.struck][0]
-            name = (
-                f"hits/p{node}_{drive.order + 1:02d}" if set_up.kind == "hammer" else f"records/r_{drive.order + 1:02d}"
-            )
-            write_recording(folder / f"{name}.csv", dict(zip(columns, signals, strict=True)), set_up.rate_hz)
+        blows = iter(self.stored)
+        for file in files_of(self.drives, set_up):
+            signals = np.concatenate([next(blows) for _ in file], axis=1)
+            path = folder / f"{file_name(file, set_up)}.csv"
+            write_recording(path, dict(zip(columns, signals, strict=True)), set_up.rate_hz)
         truth.parent.mkdir(parents=True, exist_ok=True)
         truth.write_text(json.dumps(self.truth, indent=1) + "\n", encoding="utf-8")
         if self.points:
@@ -216,7 +215,7 @@ def _finish(
         visible |= _by_level(ready, world, signals)
         if visible["level_ratio_rms"] < LEAST_RATIO or visible["level_change"] < LEAST_LEVEL_CHANGE:
             return None
-    stored, full_scale = store(rng, signals, ready.noise, ready.set_up.bits)
+    stored, full_scale = store(rng, signals, ready.noise, ready.set_up)
     truth = {"generator": GENERATOR} | head
     truth |= describe(ready.ideal, world, ready.nominal, ready.drives, ready.noise)
     if analyse and not _depends_on_blow(effects):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.cases.campaign import Drive, force_of, make_grid, true_records
+from simulator.cases.campaign import Drive, files_of, force_of, make_grid, true_records
 from simulator.cases.world import World
 from simulator.signals.channels import Noise
 
@@ -72,7 +72,7 @@ def _force_power(base: World, drives: tuple[Drive, ...]) -> FloatArray:
     start = (grid.n_samples - set_up.n_samples) * grid.oversampling
     power = np.zeros((set_up.n_samples // 2 + 1, len(set_up.struck)))
     for drive in drives:
-        force = force_of(drive, set_up, grid)[start:]
+        force = force_of((drive,), set_up, grid)[start:]
         spectrum = np.fft.rfft(force)[: power.shape[0]] / grid.oversampling
         power[:, drive.struck] += np.abs(spectrum) ** 2
     return power
@@ -163,12 +163,13 @@ def step_change(world: World, drives: tuple[Drive, ...], signals: FloatArray) ->
     """
     set_up = world.set_up
     loudest = int(np.argmax(np.abs(signals[:, 0]).max(axis=1)))
+    file = next(file for file in files_of(drives, set_up) if drives[loudest] in file)
     try:
-        coarse, _ = true_records(world, (drives[loudest],), grid=make_grid(world, refine=0.5))
+        coarse, _ = true_records(world, file, refine=0.5)
     except FloatingPointError:
         return float("inf")
     index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
-    a, b = (np.fft.rfft(one[1:], axis=-1)[:, index] for one in (coarse[0], signals[loudest]))
+    a, b = (np.fft.rfft(one[1:], axis=-1)[:, index] for one in (coarse[file.index(drives[loudest])], signals[loudest]))
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.cases.campaign import Drive
 from simulator.cases.set_up import SetUp
 from simulator.cases.specimens import Specimen
 from simulator.structures.beams import BeamDrawing, PointPart, Section
@@ -37,6 +38,14 @@ def write_recording(path: Path, columns: dict[str, FloatArray], rate_hz: float, 
     form = ",".join(["%.9g", *[f"%.{digits}g"] * len(columns)])
     lines = [",".join(["time", *columns]), *(form % tuple(row) for row in table.tolist())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def file_name(drives: tuple[Drive, ...], set_up: SetUp) -> str:
+    """Name a file of blows or a record by where and how often it was struck, without its ending."""
+    if set_up.kind != "hammer":
+        return f"records/r_{drives[0].order + 1:02d}"
+    point = f"hits/p{set_up.struck[drives[0].struck][0]}"
+    return f"{point}_all" if set_up.in_one_file else f"{point}_{drives[0].order + 1:02d}"
 
 
 def read_beam(path: Path) -> BeamDrawing:

@@ -26,6 +26,7 @@ QUANTITIES = {  # unit, SI value of the unit, power of s that makes it from a di
     "displacement": (("mm", 1e-3), ("um", 1e-6)),
 }
 ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+LONGEST_CONTACT = 1.7  # of a hammer's tip, times the upper edge of the band
 MARGIN = 0.3  # sensors and blows sit where some mode moves at least this much of its largest motion
 
 
@@ -71,8 +72,12 @@ class SetUp:
         The shaker has been running before the record starts.
     bits : int
         Of the converter.
+    offset : float
+        Largest constant of a converter's channel, over its largest signal.
     filter : AntiAlias
         Of the converter.
+    in_one_file : bool
+        The recorder runs on from blow to blow of a struck point: what one leaves is still there when the next comes.
     """
 
     kind: str
@@ -91,7 +96,9 @@ class SetUp:
     burst: float
     running: bool
     bits: int
+    offset: float
     filter: AntiAlias
+    in_one_file: bool
 
     @property
     def lines_hz(self) -> FloatArray:
@@ -175,6 +182,7 @@ def draw_set_up(
     SetUp
         The test.
     """
+    habits = rng.spawn(1)[0]  # of who tests; does not change what is drawn of the specimen
     flexible = modes.frequencies_hz[structure.n_rigid :]
     band = _band(rng, flexible, specimen.n_modes)
     kind = "random" if rng.random() < 0.25 else "hammer"
@@ -199,13 +207,21 @@ def draw_set_up(
         damping_ratio=ratio,
         peak_n=float(np.clip(specimen.mass_kg * 10 ** rng.uniform(1.5, 3.0), 3, 800)),
         spread=float(rng.uniform(5, 10)),
-        contact_s=float(rng.uniform(0.9, 1.7) / band[1]),
-        start_s=float(rng.integers(60, 130) / rate),
+        contact_s=float(rng.uniform(0.9, LONGEST_CONTACT) / band[1]),
+        start_s=_lead(habits, rate, float(rng.integers(60, 130)), band[1]),
         burst=float(rng.choice([1.0, 1.0, 0.7])),
         running=bool(rng.random() < 0.3),
         bits=int(rng.choice([16, 24, 24])),
+        offset=float(10 ** habits.uniform(-5, -3)) if habits.random() < 0.3 else 0.0,
         filter=AntiAlias(symmetric=bool(rng.random() < 0.75)),
+        in_one_file=kind == "hammer" and bool(habits.random() < 0.2),
     )
+
+
+def _lead(rng: np.random.Generator, rate_hz: float, usual: float, highest_hz: float) -> float:
+    """When the tip touches: one recorder in five begins only just before it, within the ringing of its filter."""
+    samples = rng.integers(3, 21) + 0.5 * LONGEST_CONTACT * rate_hz / highest_hz if rng.random() < 0.2 else usual
+    return float(samples / rate_hz)
 
 
 def _sensors(rng: np.random.Generator, places: list[int], *, free: bool) -> tuple[Sensor, ...]:

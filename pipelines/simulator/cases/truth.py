@@ -19,7 +19,7 @@ from simulator.structures.nominal import NominalModel
 
 FloatArray = NDArray[np.float64]
 
-GENERATOR = "frf_ipz simulator 2"
+GENERATOR = "frf_ipz simulator 3"
 
 
 def visibility(lines: Lines, ideal: World, world: World) -> dict[str, Any]:
@@ -155,6 +155,9 @@ def _test(world: World, drives: tuple[Drive, ...]) -> dict[str, Any]:
         "true_damping": [four(ratios[i]) for i in inside],
         "largest_force_N": four(largest),
         "level_spread": four(set_up.spread),
+        "lead_samples": round(set_up.start_s * set_up.rate_hz),
+        "largest_offset": four(set_up.offset),
+        "in_one_file": set_up.in_one_file,
         "double_hits": [_name(drive, set_up) for drive in drives if drive.blow and drive.blow.rebound],
     }
 

@@ -15,7 +15,7 @@ Draw = Callable[[np.random.Generator, Bench], Effect | None]
 
 
 def draw_place(rng: np.random.Generator, bench: Bench) -> tuple[Pair, dict[str, object]]:
-    """Draw a node, or a spring of a frame.
+    """Draw a node that blows move, or a spring of a frame.
 
     Parameters
     ----------
@@ -35,8 +35,11 @@ def draw_place(rng: np.random.Generator, bench: Bench) -> tuple[Pair, dict[str, 
     if isinstance(drawing, FrameDrawing) and rng.random() < 0.5:
         spring = drawing.springs[int(rng.integers(len(drawing.springs)))]
         return spring_motion(bench, spring.id), {"springs": [spring.id]}
-    node = int(rng.choice(bench.nodes))
-    return (bench.point(node), None), {"nodes": [node]}
+    place: Pair | None = None
+    while place is None or not bench.swing(place)[0]:  # members of a grid may be at rest while others move
+        node = int(rng.choice(bench.nodes))
+        place = bench.point(node), None
+    return place, {"nodes": [node]}
 
 
 def cubic_stiffness(rng: np.random.Generator, bench: Bench) -> Effect:

@@ -1,12 +1,14 @@
 """Nonlinear laws against an adaptive integrator."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from simulator.effects.nonlinear import draw_place
 from simulator.signals.hammer import Blow
 from simulator.signals.integrate import _weights, law_force
 from simulator.signals.laplace import LaplaceGrid
@@ -113,6 +115,17 @@ def test_a_law_knows_that_its_force_moves_its_place(law, force):
     law.restart(w.size)
     got = law.force(w, v, 0.05, 0.3)
     assert_allclose(got, force(w - 0.05 * got, v - 0.3 * got), rtol=1e-6, atol=1e-9)  # three steps of Newton's method
+
+
+def test_a_law_sits_where_blows_move_something():
+    bench = SimpleNamespace(
+        specimen=SimpleNamespace(drawing=None),
+        nodes=(1, 2),
+        point=int,
+        swing=lambda motion: (float(motion[0] == 2), 0.0),
+    )
+    for seed in range(10):
+        assert draw_place(np.random.default_rng(seed), bench) == ((2, None), {"nodes": [2]})
 
 
 def test_weights_of_a_step_are_integrals():
