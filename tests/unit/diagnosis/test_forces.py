@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, isolate_pulse
+from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, is_sweep, isolate_pulse
 from frf_ipz.diagnosis.observations import Blow, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -72,3 +72,13 @@ def test_a_record_that_begins_within_the_ringing_of_its_filter_lacks_some(start,
         np.testing.assert_allclose(sizes, [PEAK_N / 50, 0.25], rtol=0.2)
     else:
         assert not sizes.any()
+
+
+def test_a_sweep_comes_to_a_part_of_the_band_too_late_noise_and_bursts_do_not():
+    rng = np.random.default_rng(4)
+    n, step, band = 8000, 1e-3, (20.0, 300.0)
+    time = step * np.arange(n)
+    sweep = np.sin(2 * np.pi * (20 * time + (300 - 20) * time**2 / (2 * time[-1])))
+    burst = rng.standard_normal(n) * (time < 0.3 * time[-1])
+    for force, expected in ((sweep, True), (rng.standard_normal(n), False), (burst, False)):
+        assert is_sweep(blow(force), band, 8 / time[-1]) is expected

@@ -7,6 +7,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.blows import read_blows
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.signals.clipping import is_clipped
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import Structure, respond, write_csv, write_test
@@ -192,3 +193,39 @@ def test_overlapping_segments_are_worth_a_little_less_than_their_number():
     assert independent_segments(0) == 0.0
     assert independent_segments(1) == 1.0
     assert independent_segments(1000) == pytest.approx(1000 / (1 + 1 / 18), rel=1e-3)
+
+
+def sweep(rng, n_samples, *, band_hz=BAND_HZ, noise=1e-3):
+    """A sine of constant force through a band, from rest; it ends with the record."""
+    time = STEP_S * np.arange(n_samples)
+    low, high = band_hz
+    phase = 2 * np.pi * (low * time + (high - low) * time**2 / (2 * time[-1]))
+    force = np.sin(phase) * np.minimum(time / 0.1, 1.0)
+    signals = np.vstack([force, respond(STRUCTURE, force, STEP_S)])
+    return signals + noise * np.abs(signals).max(axis=1, keepdims=True) * rng.standard_normal(signals.shape)
+
+
+def test_what_a_sweep_does_near_its_ends_counts_little(tmp_path):
+    """There a transient cannot be told from the response: one that goes on further tells what the response is."""
+    rng = np.random.default_rng(21)
+    records = [sweep(rng, 8192), sweep(rng, 8192, band_hz=(10.0, 330.0)), sweep(rng, 8192)]
+    result = estimate(write(tmp_path, records))
+    assert result.blows.used.all()
+    band = result.frfs.in_band(BAND_HZ)
+    later = result.frfs.frequency_hz[band] > 60.0
+    wrong = errors(result.frfs)
+    assert wrong[later].max() < 5e-3
+    largest = np.abs(STRUCTURE.accelerance(result.frfs.s[band])).max(axis=0)
+    stated = np.sqrt(result.frfs.variance[band]) / largest
+    assert np.sqrt(np.mean((wrong / stated)[later] ** 2)) < 2.0
+
+
+def test_a_sine_that_slows_and_hurries_is_not_clipped_unless_it_is():
+    rng = np.random.default_rng(22)
+    for _ in range(10):
+        force = sweep(rng, 20_000, noise=0.0)[0] * (1 + 1e-7 * rng.standard_normal(20_000))
+        swelling = force * (1 + 0.3 * np.sin(np.arange(20_000) / 3000 + rng.uniform(0, 6)))
+        assert not is_clipped(force)
+        assert not is_clipped(np.round(1e5 * force))
+        assert is_clipped(np.clip(swelling, -1.1, 1.1))
+        assert is_clipped(np.round(2048 * np.clip(swelling, -1.1, 1.1)))

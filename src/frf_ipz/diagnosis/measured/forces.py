@@ -1,10 +1,11 @@
-"""Forces of hammer blows without the noise of the times at which nothing touches."""
+"""Forces of hammer blows without the noise of the times at which nothing touches; and forces of shakers that sweep."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import periodogram
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -18,6 +19,8 @@ RINGING = 25  # samples before and after the pulse that are kept whole: a conver
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
 CUT_OFF = 8  # samples of ringing that a record may lack before its first one, each as large as those that it has
 FIRST = 3  # samples of a record that show how large
+LATE = 0.05  # of the weight of a force that is alike all the time: a sweep comes to a part of the band too late
+AROUND = 32  # lines over which a force's energy is averaged
 QUIET = 200  # samples after the pulse that are left out when the force's noise is read
 
 
@@ -81,6 +84,34 @@ def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
         return np.zeros(1 + len(responses))
     first = np.vstack([pulse.blow.force[:FIRST], responses[:, :FIRST]])
     return np.asarray(np.sqrt(np.mean(first**2, axis=1)))
+
+
+def is_sweep(blow: Blow, band_hz: tuple[float, float], decay_1_s: float) -> bool:
+    """Tell whether a force comes to a part of the band so late that a window of decay forgets it.
+
+    Parameters
+    ----------
+    blow : Blow
+        Record of a shaker.
+    band_hz : pair of float
+        Where to look.
+    decay_1_s : float
+        Of the window exp(-decay t).
+
+    Returns
+    -------
+    bool
+        False for a force that is alike all the time, and for bursts.
+    """
+    time = blow.step_s * np.arange(blow.n_samples)
+    frequency = np.fft.rfftfreq(blow.n_samples, blow.step_s)
+    used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    whole, early = (
+        uniform_filter1d(np.abs(np.fft.rfft(force)[used]) ** 2, AROUND, mode="nearest")
+        for force in (blow.force, blow.force * np.exp(-decay_1_s * time))
+    )
+    alike = (1 - np.exp(-2 * decay_1_s * blow.duration_s)) / (2 * decay_1_s * blow.duration_s)
+    return bool(np.any(early < LATE * alike * whole))
 
 
 def _noise_of(quiet: FloatArray) -> float:

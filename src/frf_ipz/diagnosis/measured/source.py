@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
-from frf_ipz.diagnosis.measured.from_blows import Survey, like, measure, survey
+from frf_ipz.diagnosis.measured.forces import is_sweep
+from frf_ipz.diagnosis.measured.from_blows import ENOUGH, Survey, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.from_running import finer_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
@@ -71,7 +72,7 @@ def divide(observations: Observations) -> Source:
     InputError
         If there is nothing to look at, or nothing of it is left.
     """
-    if not observations.are_from_rest:
+    if not observations.are_from_rest or _sweeps(observations):
         return _of_frfs(observations)
     kept = _kept_blows(observations)
     names = {blow.name for blow in kept}
@@ -93,6 +94,14 @@ def divide(observations: Observations) -> Source:
         held="blows",
         held_names=tuple(sorted(names)),
     )
+
+
+def _sweeps(observations: Observations) -> bool:
+    """Tell whether records end before the structure has answered all of a sweep."""
+    if observations.kind == "hammer" or observations.frfs is None:
+        return False
+    decay = ENOUGH / min(blow.duration_s for blow in observations.blows)
+    return any(is_sweep(blow, observations.band_hz, decay) for blow in observations.blows)
 
 
 def _kept_blows(observations: Observations) -> tuple[Blow, ...]:

@@ -10,6 +10,7 @@ EQUAL = 1e-6  # of the range: values that differ by less were the same reading
 FEWEST_STEPS = 30  # digital steps: a signal of fewer has equal extreme values by nature
 CORNER = 4.0  # digital steps: a smooth top falls off less than this beside two equal samples
 SYMMETRIC = 1e-3  # of the height: a pulse without noise that is sampled symmetrically has equal samples in pairs
+NEAR, MORE = 0.03, 3.0  # of the height: samples near the top; and times as many at the top as smooth tops have
 STEEP = 0.01  # of the height: what the signal falls beside a plateau that was cut
 
 
@@ -35,10 +36,11 @@ def is_clipped(signal: FloatArray) -> bool:
     step = digital_step(signal)
     if height < FEWEST_STEPS * step:
         return False
-    if not step and abs(float(signal.max() + signal.min())) < EQUAL * height:
-        return True  # both ends of the range were met
     centre = float(np.median(signal))
-    return any(_is_cut(side, step, height) for side in (signal - centre, centre - signal))
+    sides = signal - centre, centre - signal
+    if not step and abs(float(signal.max() + signal.min())) < EQUAL * height and any(map(_has_corners, sides)):
+        return True  # both ends of the range were met
+    return any(_is_cut(side, step, height) for side in sides)
 
 
 def digital_step(signal: FloatArray) -> float:
@@ -91,21 +93,38 @@ def share_a_rail(peaks: FloatArray, widths: FloatArray) -> np.ndarray:
     return np.asarray(same & differ)
 
 
+def _has_corners(upward: FloatArray) -> bool:
+    """Tell whether more samples stand at the top of a fine signal than smooth tops have.
+
+    Smooth tops fall off with the square of time: of the samples near them, a part that is a square root is at the top.
+    A sweep has hundreds of tops of one height.
+    """
+    plateaus, top = _plateaus(upward, reach=2), float(upward.max())
+    count = sum(plateau.length for plateau in plateaus)
+    near = int((upward > (1 - NEAR) * top).sum()) - count
+    return count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * top))
+
+
+def _plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
+    top = float(upward.max())
+    at_top = upward >= top - EQUAL * float(np.ptp(upward))
+    edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
+    return [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
+
+
 def _is_cut(upward: FloatArray, step: float, height: float) -> bool:
     top = float(upward.max())
     if top < 0.25 * height:  # the far side of a pulse that goes one way: its noise
         return False
-    at_top = upward >= top - EQUAL * height
-    edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
-    reach = 1 if step else 2  # the sample beside a plateau may lie just past the corner: fine signals show the next
-    plateaus = [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
+    # the sample beside a plateau may lie just past the corner: fine signals show the next
+    plateaus = _plateaus(upward, reach=1 if step else 2)
     floor = max(STEEP * top, CORNER * step)
     steep = [plateau for plateau in plateaus if plateau.drop > floor]
     longest = max((plateau.length for plateau in steep), default=0)
     if step:
-        return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, at_top, top)
+        return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, plateaus, top)
     lopsided = any(plateau.length == 2 and plateau.lopsided > SYMMETRIC * top for plateau in steep)
-    return longest >= 3 or lopsided or len(plateaus) >= 2
+    return longest >= 3 or lopsided or (len(plateaus) >= 2 and _has_corners(upward))
 
 
 class _Plateau:
@@ -119,8 +138,8 @@ class _Plateau:
         self.lopsided = max(beside) - min(beside) if beside else 0.0
 
 
-def _is_piled_up(upward: FloatArray, at_top: np.ndarray, top: float) -> bool:
+def _is_piled_up(upward: FloatArray, plateaus: list[_Plateau], top: float) -> bool:
     """Tell whether far more samples stand at the top than just below it."""
-    count = int(at_top.sum())
-    near = int(((upward > 0.97 * top) & ~at_top).sum())
+    count = sum(plateau.length for plateau in plateaus)
+    near = int((upward > (1 - NEAR) * top).sum()) - count
     return count >= 3 and count > 2 * near

@@ -6,6 +6,9 @@ M; a random force is rough from line to line, M is smooth, and so the two are to
 is: it may be narrower than the lines lie apart. ``T = M / D`` is taken off; all that is known of G stays in the
 spectra.
 
+A sweep is smooth from line to line at what it does near its beginning and its end: N F looks like M there, and telling
+them apart multiplies the noise. Such lines count for less.
+
 [McKelvey2012]: T. McKelvey, G. Guerin, Non-parametric frequency response estimation using a local rational model, IFAC
 Proceedings Volumes 45(16) (2012) 49-54 (doi:10.3182/20120711-3-BE-2027.00299), the method.
 """
@@ -25,6 +28,7 @@ SIDE = 8  # lines to each side that a fit sees
 DEGREE = 2  # of the three polynomials
 BLOCK = 1024  # lines at a time
 RIDGE = 1e-12  # of the trace: where there is no force, nothing can be told
+ROUGH = 0.3  # of what F tells of G without M, what it tells with M: random forces have more on every line
 
 _X = np.arange(-SIDE, SIDE + 1) / SIDE
 _POWERS = _X[:, None] ** np.arange(DEGREE + 1)
@@ -52,7 +56,7 @@ def without_transients(
     Returns
     -------
     force : (n_lines,) complex array
-        Its transform, ``sum f(t) exp(-s t)``.
+        Its transform, ``sum f(t) exp(-s t)``; times less than 1 where its line counts for less.
     responses : (n_outputs, n_lines) complex array
         Those of the responses less what goes on at both ends: the FRF times that of the force.
     """
@@ -63,7 +67,9 @@ def without_transients(
     if n < 2 * len(_X):
         return F[wanted], X[:, wanted]
     blocks = [wanted[at : at + BLOCK] for at in range(0, len(wanted), BLOCK)]
-    return F[wanted], X[:, wanted] - np.concatenate([_transients(F, X, block) for block in blocks], axis=1)
+    counts = np.concatenate([_counts(F, block) for block in blocks])
+    moved = X[:, wanted] - np.concatenate([_transients(F, X, block) for block in blocks], axis=1)
+    return F[wanted] * counts, moved * counts
 
 
 def pieces_without_transients(
@@ -106,6 +112,20 @@ def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> ComplexArr
     denominator = np.concatenate([np.ones((n, 1)), -_nearest(rows[:, 1:], rows[:, :1])[:, 0]], axis=1)
     smooth = near @ _MIDDLE - (numerators @ (near_force @ _MIDDLE)[:, :, None]).reshape(n, n_outputs, terms)
     return np.asarray((smooth @ denominator[:, :, None])[:, :, 0].T)
+
+
+def _counts(F: ComplexArray, lines: IntArray) -> FloatArray:
+    """(n,) root of how much lines count: of what F tells of G in its middle, what is left beside M, over `ROUGH`."""
+    near = F[(lines[:, None] + np.arange(-SIDE, SIDE + 1)) % len(F)]
+    apart = (near @ _ROUGH).reshape(len(lines), DEGREE + 1, len(_X))
+    told, alone = _information(apart), _information(near[:, None] * _POWERS.T)
+    return np.sqrt(np.clip(told / (ROUGH * np.maximum(alone, np.finfo(float).tiny)), np.finfo(float).eps, 1.0))
+
+
+def _information(rows: ComplexArray) -> FloatArray:
+    """(n,) square of the part of the first row, (n, p, width), that the others do not reach."""
+    first, others = rows[:, :1], rows[:, 1:]
+    return np.asarray(np.sum(np.abs(first - _nearest(others, first) @ others) ** 2, axis=(1, 2)))
 
 
 def _nearest(rows: ComplexArray, wanted: ComplexArray) -> ComplexArray:
