@@ -15,8 +15,9 @@ from frf_ipz.diagnosis.observations import Blow
 LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
 ABOVE_NOISE = 6.0  # standard deviations
 STRETCHES = 16  # of what is quiet: a second touch, which falls into few of them, is no noise
-RINGING = 25  # samples before and after the pulse that are kept whole: a converter's filter rings
-TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out
+RINGING, LEAST_RINGING = 25, 5  # samples before and after the pulse that are kept whole: a converter's filter rings
+TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out; fewer where less is kept
+HEARD, ALIKE = 2.0, 4  # standard deviations of noise: what rings less is lost in it; samples that show how far it rings
 CUT_OFF = 8  # samples of ringing that a record may lack before its first one, each as large as those that it has
 FIRST = 3  # samples of a record that show how large
 LATE = 0.05  # of the weight of a force that is alike all the time: a sweep comes to a part of the band too late
@@ -44,6 +45,9 @@ class Pulse:
 def isolate_pulse(blow: Blow) -> Pulse:
     """Take away what the force shows while nothing touches.
 
+    Noise that is kept beside the pulse of a weak blow is a part of its impulse, drift above all: the ringing of the
+    converter's filter is kept as far as it can be heard.
+
     Parameters
     ----------
     blow : Blow
@@ -58,11 +62,23 @@ def isolate_pulse(blow: Blow) -> Pulse:
     top = int(np.argmax(size))
     noise = _noise_of(np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]]))
     above = np.flatnonzero(size >= min(max(ABOVE_NOISE * noise, LEAST_PART * size[top]), size[top]))
+    first, last = int(above[0]), int(above[-1])
+    ringing = max(_rings(size[:first][::-1], noise), _rings(size[last + 1 :], noise))
     sample = np.arange(blow.n_samples)
-    outside = np.maximum(int(above[0]) - RINGING - sample, sample - int(above[-1]) - RINGING)
-    window = np.cos(np.pi / 2 * np.clip(outside / TAPER, 0, 1)) ** 2
+    outside = np.maximum(first - ringing - sample, sample - last - ringing)
+    taper = round(TAPER * ringing / RINGING)
+    window = np.cos(np.pi / 2 * np.clip(outside / taper, 0, 1)) ** 2
     kept = np.flatnonzero(window > 0.5)
     return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+
+
+def _rings(beside: FloatArray, noise: float) -> int:
+    """Count samples beside a pulse in which its filter rings above the noise."""
+    near = beside[:RINGING]
+    whole = near[: len(near) // ALIKE * ALIKE].reshape(-1, ALIKE)
+    heard = np.flatnonzero(np.sqrt(np.mean(whole**2, axis=1)) > HEARD * noise)
+    quiet = np.setdiff1d(np.arange(len(whole) + 1), heard)  # the first stretch that is lost ends it
+    return int(np.clip(RINGING if quiet[0] == len(whole) else quiet[0] * ALIKE, LEAST_RINGING, RINGING))
 
 
 def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
