@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, is_sweep, isolate_pulse
 from frf_ipz.diagnosis.observations import Blow, Sensor
@@ -72,6 +73,34 @@ def test_a_record_that_begins_within_the_ringing_of_its_filter_lacks_some(start,
         np.testing.assert_allclose(sizes, [PEAK_N / 50, 0.25], rtol=0.2)
     else:
         assert not sizes.any()
+
+
+def drifting(rng):
+    lines = np.fft.rfft(rng.standard_normal(SAMPLES))
+    noise = np.fft.irfft(lines / np.sqrt(np.maximum(np.arange(lines.size), 1)), SAMPLES)
+    return NOISE_N * (0.74 * noise / noise.std() + 0.67 * rng.standard_normal(SAMPLES))
+
+
+def test_drift_is_no_part_of_the_impulse_of_a_weak_blow():
+    rng = np.random.default_rng(6)
+    wrong = []
+    for _ in range(40):
+        weak = np.zeros(SAMPLES)
+        weak[200 : 200 + PULSE] = 0.3 * PEAK_N * np.sin(np.pi * (np.arange(PULSE) + 0.5) / PULSE)
+        wrong.append(isolate_pulse(blow(weak + drifting(rng))).blow.force.sum() / weak.sum() - 1)
+    assert np.sqrt(np.mean(np.square(wrong))) < 0.03
+
+
+def test_ringing_is_kept_as_far_as_it_is_heard():
+    clean = a_force(0, 300) - a_force(0)
+    taps = signal.firwin(161, 0.9, window=("kaiser", 10.0))
+    rung = np.convolve(clean, taps, mode="same")
+    rng = np.random.default_rng(7)
+    quiet, loud = (isolate_pulse(blow(rung + std * rng.standard_normal(SAMPLES))) for std in (1e-5, 1.0))
+    assert quiet.start <= 300 - RINGING
+    assert quiet.stop >= 300 + PULSE + RINGING
+    assert loud.stop - loud.start < PULSE + 2 * (RINGING - 10)
+    assert abs(loud.blow.force.sum() / clean.sum() - 1) < 0.05
 
 
 def test_a_sweep_comes_to_a_part_of_the_band_too_late_noise_and_bursts_do_not():
