@@ -102,7 +102,7 @@ def _has_corners(upward: FloatArray) -> bool:
     plateaus, top = _plateaus(upward, reach=2), float(upward.max())
     count = sum(plateau.length for plateau in plateaus)
     near = int((upward > (1 - NEAR) * top).sum()) - count
-    return count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * top))
+    return bool(count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * top)))
 
 
 def _plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
