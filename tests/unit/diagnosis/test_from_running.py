@@ -111,3 +111,16 @@ def test_a_diagnosis_sees_running_records_off_the_axis_as_they_are(seen):
 def test_a_running_test_is_judged_as_one(seen):
     assert divide(seen).kind == "running"
     assert divide(replace(seen, kind="frf")).kind == "frf"
+
+
+def test_sweeps_from_rest_are_read_as_running_records_and_random_ones_are_not(seen):
+    n = 3001
+    time = STEP_S * np.arange(n)
+    sweep = np.sin(2 * np.pi * (5 * time + (300 - 5) * time**2 / (2 * time[-1]))) * np.minimum(time / 0.1, 1.0)
+    noise = np.random.default_rng(6).standard_normal(n) * np.minimum(time / 0.1, 1.0)
+    for force, kind in ((sweep, "running"), (noise, "random")):
+        blows = tuple(
+            replace(blow, force=size * force, responses=respond(LIGHT, size * force, STEP_S), rested=True)
+            for size, blow in zip((1.0, 0.5, 0.3), seen.blows, strict=True)
+        )
+        assert divide(replace(seen, blows=blows)).kind == kind

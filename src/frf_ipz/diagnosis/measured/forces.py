@@ -76,9 +76,8 @@ def _rings(beside: FloatArray, noise: float) -> int:
     """Count samples beside a pulse in which its filter rings above the noise."""
     near = beside[:RINGING]
     whole = near[: len(near) // ALIKE * ALIKE].reshape(-1, ALIKE)
-    heard = np.flatnonzero(np.sqrt(np.mean(whole**2, axis=1)) > HEARD * noise)
-    quiet = np.setdiff1d(np.arange(len(whole) + 1), heard)  # the first stretch that is lost ends it
-    return int(np.clip(RINGING if quiet[0] == len(whole) else quiet[0] * ALIKE, LEAST_RINGING, RINGING))
+    lost = np.flatnonzero(np.sqrt(np.mean(whole**2, axis=1)) <= HEARD * noise)
+    return int(np.clip(lost[0] * ALIKE, LEAST_RINGING, RINGING)) if len(lost) else RINGING
 
 
 def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:

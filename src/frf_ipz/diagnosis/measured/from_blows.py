@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,7 +77,7 @@ def survey(observations: Observations) -> Survey:
     """
     is_hammer = observations.kind == "hammer"
     groups, pulses = _prepared(observations)
-    decay = ENOUGH / min(blow.duration_s for group in groups for blow in group)
+    decay = forgetting_1_s(blow for group in groups for blow in group)
     line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
     if is_hammer:
@@ -93,6 +94,11 @@ def survey(observations: Observations) -> Survey:
         resonances=resonances,
         least_decay_1_s=_least_decay(decay, resonances) if is_hammer else decay,
     )
+
+
+def forgetting_1_s(blows: Iterable[Blow]) -> float:
+    """Give the sigma that makes the end of the shortest record vanish, 1/s."""
+    return ENOUGH / min(blow.duration_s for blow in blows)
 
 
 def like(found: Survey, observations: Observations) -> Survey:

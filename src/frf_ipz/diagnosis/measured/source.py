@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.forces import is_sweep
-from frf_ipz.diagnosis.measured.from_blows import ENOUGH, Survey, like, measure, survey
+from frf_ipz.diagnosis.measured.from_blows import Survey, forgetting_1_s, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.from_running import finer_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
@@ -37,7 +37,8 @@ class Source:
     survey : Survey or FrfSurvey
         Noise and resonances of what is fitted.
     kind : str
-        What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
+        What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones or sweeps,
+        or ``frf``.
     held : str
         What was kept for the check: ``blows`` or ``lines``.
     held_names : tuple of str
@@ -100,7 +101,7 @@ def _sweeps(observations: Observations) -> bool:
     """Tell whether records end before the structure has answered all of a sweep."""
     if observations.kind == "hammer" or observations.frfs is None:
         return False
-    decay = ENOUGH / min(blow.duration_s for blow in observations.blows)
+    decay = forgetting_1_s(observations.blows)
     return any(is_sweep(blow, observations.band_hz, decay) for blow in observations.blows)
 
 

@@ -37,10 +37,12 @@ def is_clipped(signal: FloatArray) -> bool:
     if height < FEWEST_STEPS * step:
         return False
     centre = float(np.median(signal))
-    sides = signal - centre, centre - signal
-    if not step and abs(float(signal.max() + signal.min())) < EQUAL * height and any(map(_has_corners, sides)):
-        return True  # both ends of the range were met
-    return any(_is_cut(side, step, height) for side in sides)
+    # the sample beside a plateau may lie just past the corner: fine signals show the next
+    sides = [(side, _plateaus(side, reach=1 if step else 2)) for side in (signal - centre, centre - signal)]
+    meets_both = not step and abs(float(signal.max() + signal.min())) < EQUAL * height  # ends of the range
+    if meets_both and any(_has_corners(*side) for side in sides):
+        return True
+    return any(_is_cut(*side, step, height) for side in sides)
 
 
 def digital_step(signal: FloatArray) -> float:
@@ -93,18 +95,6 @@ def share_a_rail(peaks: FloatArray, widths: FloatArray) -> np.ndarray:
     return np.asarray(same & differ)
 
 
-def _has_corners(upward: FloatArray) -> bool:
-    """Tell whether more samples stand at the top of a fine signal than smooth tops have.
-
-    Smooth tops fall off with the square of time: of the samples near them, a part that is a square root is at the top.
-    A sweep has hundreds of tops of one height.
-    """
-    plateaus, top = _plateaus(upward, reach=2), float(upward.max())
-    count = sum(plateau.length for plateau in plateaus)
-    near = int((upward > (1 - NEAR) * top).sum()) - count
-    return bool(count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * top)))
-
-
 def _plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
     top = float(upward.max())
     at_top = upward >= top - EQUAL * float(np.ptp(upward))
@@ -112,19 +102,17 @@ def _plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
     return [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
 
 
-def _is_cut(upward: FloatArray, step: float, height: float) -> bool:
+def _is_cut(upward: FloatArray, plateaus: list[_Plateau], step: float, height: float) -> bool:
     top = float(upward.max())
     if top < 0.25 * height:  # the far side of a pulse that goes one way: its noise
         return False
-    # the sample beside a plateau may lie just past the corner: fine signals show the next
-    plateaus = _plateaus(upward, reach=1 if step else 2)
     floor = max(STEEP * top, CORNER * step)
     steep = [plateau for plateau in plateaus if plateau.drop > floor]
     longest = max((plateau.length for plateau in steep), default=0)
     if step:
-        return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, plateaus, top)
+        return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, plateaus)
     lopsided = any(plateau.length == 2 and plateau.lopsided > SYMMETRIC * top for plateau in steep)
-    return longest >= 3 or lopsided or (len(plateaus) >= 2 and _has_corners(upward))
+    return longest >= 3 or lopsided or (len(plateaus) >= 2 and _has_corners(upward, plateaus))
 
 
 class _Plateau:
@@ -138,8 +126,23 @@ class _Plateau:
         self.lopsided = max(beside) - min(beside) if beside else 0.0
 
 
-def _is_piled_up(upward: FloatArray, plateaus: list[_Plateau], top: float) -> bool:
+def _has_corners(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
+    """Tell whether more samples stand at the top of a fine signal than smooth tops have.
+
+    Smooth tops fall off with the square of time: of the samples near them, a part that is a square root is at the top.
+    A sweep has hundreds of tops of one height.
+    """
+    count, near = _at_and_near_top(upward, plateaus)
+    return bool(count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * upward.max())))
+
+
+def _is_piled_up(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
     """Tell whether far more samples stand at the top than just below it."""
-    count = sum(plateau.length for plateau in plateaus)
-    near = int((upward > (1 - NEAR) * top).sum()) - count
+    count, near = _at_and_near_top(upward, plateaus)
     return count >= 3 and count > 2 * near
+
+
+def _at_and_near_top(upward: FloatArray, plateaus: list[_Plateau]) -> tuple[int, int]:
+    """Count samples at the top, and just below it."""
+    count = sum(plateau.length for plateau in plateaus)
+    return count, int((upward > (1 - NEAR) * upward.max()).sum()) - count

@@ -67,9 +67,9 @@ def without_transients(
     if n < 2 * len(_X):
         return F[wanted], X[:, wanted]
     blocks = [wanted[at : at + BLOCK] for at in range(0, len(wanted), BLOCK)]
-    counts = np.concatenate([_counts(F, block) for block in blocks])
-    moved = X[:, wanted] - np.concatenate([_transients(F, X, block) for block in blocks], axis=1)
-    return F[wanted] * counts, moved * counts
+    parts = [_transients(F, X, block) for block in blocks]
+    transients, counts = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    return F[wanted] * counts, (X[:, wanted] - transients) * counts
 
 
 def pieces_without_transients(
@@ -98,8 +98,8 @@ def pieces_without_transients(
         yield without_transients(force[piece], responses[:, piece], lines, between=between)
 
 
-def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> ComplexArray:
-    """T at some lines, (n_outputs, n): the polynomials M are taken off everything first, N and D are fitted then."""
+def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> tuple[ComplexArray, FloatArray]:
+    """T at some lines, (n_outputs, n), and how much they count: M is taken off everything first, then N and D fitted."""
     n_outputs, n, width, terms = len(X), len(lines), len(_X), DEGREE + 1
     seen = (lines[:, None] + np.arange(-SIDE, SIDE + 1)) % len(F)  # lines below 0 Hz are those from the other end
     near_force, near = F[seen], np.moveaxis(X[:, seen], 0, 1)
@@ -111,14 +111,12 @@ def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> ComplexArr
     rows = np.moveaxis(left / np.sqrt(size)[:, :, None, None], 1, 2).reshape(n, terms, n_outputs * width)
     denominator = np.concatenate([np.ones((n, 1)), -_nearest(rows[:, 1:], rows[:, :1])[:, 0]], axis=1)
     smooth = near @ _MIDDLE - (numerators @ (near_force @ _MIDDLE)[:, :, None]).reshape(n, n_outputs, terms)
-    return np.asarray((smooth @ denominator[:, :, None])[:, :, 0].T)
+    return np.asarray((smooth @ denominator[:, :, None])[:, :, 0].T), _counts(near_force, forced)
 
 
-def _counts(F: ComplexArray, lines: IntArray) -> FloatArray:
+def _counts(near_force: ComplexArray, forced: ComplexArray) -> FloatArray:
     """(n,) root of how much lines count: of what F tells of G in its middle, what is left beside M, over `ROUGH`."""
-    near = F[(lines[:, None] + np.arange(-SIDE, SIDE + 1)) % len(F)]
-    apart = (near @ _ROUGH).reshape(len(lines), DEGREE + 1, len(_X))
-    told, alone = _information(apart), _information(near[:, None] * _POWERS.T)
+    told, alone = _information(forced), _information(near_force[:, None] * _POWERS.T)
     return np.sqrt(np.clip(told / (ROUGH * np.maximum(alone, np.finfo(float).tiny)), np.finfo(float).eps, 1.0))
 
 
