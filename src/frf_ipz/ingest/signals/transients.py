@@ -99,7 +99,7 @@ def pieces_without_transients(
 
 
 def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> tuple[ComplexArray, FloatArray]:
-    """T at some lines, (n_outputs, n), and how much they count: M is taken off everything first, then N and D fitted."""
+    """T at some lines, (n_outputs, n), and how much they count; M is taken off first, then N and D are fitted."""
     n_outputs, n, width, terms = len(X), len(lines), len(_X), DEGREE + 1
     seen = (lines[:, None] + np.arange(-SIDE, SIDE + 1)) % len(F)  # lines below 0 Hz are those from the other end
     near_force, near = F[seen], np.moveaxis(X[:, seen], 0, 1)
