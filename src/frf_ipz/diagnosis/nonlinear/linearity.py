@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations
 
 WIDTH = 24  # lines that are looked at together
-POLES, ZEROS, TRANSIENT = 2, 2, 2  # degrees of the local polynomials
+DEGREES = (0, 2), (2, 2), (3, 3)  # of the local polynomials: of the poles; of the zeros and of transients
 ROUNDS = 4  # of weights
 DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e-4
 BEFORE = 2  # samples before the pulse
@@ -156,16 +156,16 @@ def _left(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> fl
 
     Where no resonance is near, poles follow the noise; any quotient that explains is a proof of linearity.
     """
-    return min(_left_by(poles, force, motion, energies) for poles in (0, POLES))
+    return min(_left_by(degrees, force, motion, energies) for degrees in DEGREES)
 
 
-def _left_by(poles: int, force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+def _left_by(degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
     """Misfit of the best of all rounds over its expectation; they may swing where a pole comes onto a line."""
-    n_blows, n_lines = motion.shape
-    powers = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(max(POLES, ZEROS, TRANSIENT) + 1)
-    below, above, ends = powers[:, 1 : poles + 1], powers[:, : ZEROS + 1], powers[:, : TRANSIENT + 1]
+    (n_blows, n_lines), (poles, zeros) = motion.shape, degrees
+    above = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(zeros + 1)
+    below = above[:, 1 : poles + 1]
     common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_blows * n_lines, -1)
-    columns = np.hstack([common, np.kron(np.eye(n_blows), ends)])
+    columns = np.hstack([common, np.kron(np.eye(n_blows), above)])
     denominator, frf = np.ones(n_lines, complex), np.zeros(n_lines, complex)
     least = np.inf
     for _ in range(ROUNDS):
@@ -173,7 +173,7 @@ def _left_by(poles: int, force: ComplexArray, motion: ComplexArray, energies: Fl
         weighted = np.asarray(columns * weight[:, None], np.complex128)
         found = solve_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
         denominator = 1 + below @ found[:poles]
-        frf = (above @ found[poles : poles + ZEROS + 1]) / denominator
+        frf = (above @ found[poles : poles + zeros + 1]) / denominator
         left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator
         least = min(least, float(np.sum(np.abs(left) ** 2 / _variance(motion, frf, energies))))
     return float(least / (motion.size - columns.shape[1]))

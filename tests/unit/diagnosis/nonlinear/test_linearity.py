@@ -87,6 +87,15 @@ def test_a_resonance_of_a_stiff_machine_agrees_as_one_of_a_soft_machine_does(com
     assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, noise)])) < 1.0
 
 
+def test_three_close_resonances_agree():
+    """Of a machine whose motion is far above the noise: nothing of it may be left."""
+    rng = np.random.default_rng(3)
+    force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
+    modes = ((1.0, -0.75), (0.8, -0.1), (0.7, 0.3))
+    motion = force * sum(part / (1j * (ACROSS - place) + 0.05) for part, place in modes) + drawn(rng, 3, 1)
+    assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, 1e-6)])) < 1.0
+
+
 def decayed(blow):
     """(n_samples,) window that makes a response die out within its record."""
     return np.exp(-4.0 * blow.step_s * np.arange(blow.n_samples))
