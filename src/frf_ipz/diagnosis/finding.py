@@ -81,7 +81,8 @@ def doubt_of_place(places: Sequence[Mapping[str, object]]) -> str:
         return ""
     kinds: dict[str, list[tuple[object, ...]]] = {}
     for place in places:
-        for kind, value in list(place.items())[:1]:
+        told = [item for item in place.items() if any(other.get(item[0]) != item[1] for other in places)]
+        for kind, value in told[:1]:
             kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list | tuple) else (value,))
     words = " or ".join(f"{kind} {_in_words(kind, found)}" for kind, found in kinds.items())
     return f" The test tells its place no closer than {words}."

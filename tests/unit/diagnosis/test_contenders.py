@@ -64,6 +64,16 @@ def test_what_explains_as_well_on_the_far_side_is_found(symmetric):
     assert found[MIRRORED] == pytest.approx(found[TRUE], abs=0.1)
 
 
+@pytest.mark.parametrize(("true", "mirrored"), [(12, 14), (14, 12)])
+def test_what_explains_as_well_nearly_beside_it_is_found(nominal, true, mirrored):
+    """Two nodes off, where of two places only the better one is looked at."""
+    bench = bench_of(nominal, measured(with_point_masses(nominal, {true: ADDED_KG}), MIDDLE), ("added_mass",))
+    fits = by_key(only(bench, true))
+    fit_far(bench, only(bench, true), fits)
+    found = evidence(fits.values())
+    assert found[mirrored] == pytest.approx(found[true], abs=0.1)
+
+
 def test_places_around_what_is_better_far_off_are_fitted_too(nominal):
     """Of a search that went astray, seen from where left and right are told apart."""
     true = with_point_masses(nominal, {TRUE: ADDED_KG})

@@ -18,6 +18,7 @@ ADDED_KG = 2e-3
         ([{"nodes": [7]}, {"nodes": [5]}, {"nodes": [6]}, {"nodes": [12]}], "nodes 5 to 7, 12"),
         ([{"nodes": [44, 64]}, {"nodes": [45, 63]}], "nodes 44 and 64, 45 and 63"),
         ([{"elements": [36, 43]}, {"elements": [39, 39]}], "elements 36 to 43, 39"),
+        ([{"channels": ["a"], "nodes": [15]}, {"channels": ["a"], "nodes": [13]}], "nodes 13, 15"),
         ([{"end": "right"}, {"nodes": [3]}, {"nodes": [2]}], "end right or nodes 2 to 3"),
     ],
 )

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.search import Ranking
 
 FAR = 8  # places anywhere, not beside each other, by what a wide search says of them
+EQUAL, MOST_EQUAL = 1.1, 4  # times the best cost there: places that no wide search tells from the best, if beside it too
 
 
 def fit_far(bench: Bench, ranking: Ranking, fits: Fits) -> int:
@@ -45,7 +46,8 @@ def fit_far(bench: Bench, ranking: Ranking, fits: Fits) -> int:
     best = ranking.best
     effect = best.hypothesis.causes[-1].effect
     starts = wide_search(replace(bench, effects={effect.name: effect}), ranking.base)
-    for start in spread(starts, FAR):
+    equal = [start for start in starts[:MOST_EQUAL] if start.cost < EQUAL * starts[0].cost]
+    for start in (*equal, *spread(starts, FAR)):
         if start.cause.key not in fits:
             bar = bar_of(fits.values())
             fits[start.cause.key] = fit_from_neighbour(bench, ranking.base, start.cause, best, bar)
