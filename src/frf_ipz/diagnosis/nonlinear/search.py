@@ -24,6 +24,7 @@ from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE
+from frf_ipz.diagnosis.nonlinear.fitting.reweighted import tell_apart
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
 from frf_ipz.diagnosis.nonlinear.fitting.tracks import FINE, ROUGH, WEAK, Recordings
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -320,12 +321,18 @@ def _judge(
 def _ranked(track: Track, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]:
     """Order fits by their evidence, which is given too: half the drop of the cost.
 
-    Where that is little, how blows disagree counts besides, which the model's errors do not hide.
+    Where that is little, how blows disagree counts besides, which the model's errors do not hide. What explains alike
+    is compared once more, see `tell_apart`.
     """
     drops = np.array([0.5 * (track.linear.cost - fit.cost) for fit in fits])
     if drops[0] < WEAK_NATS and not track.stretches.moving.any():
         drops += [agreement_with(track.stretches, track.linear.freedom, fit).gain for fit in fits]
-    order = np.argsort(-drops)
+    scale = max(1.0, fits[0].cost / fits[0].n_rows)
+    near, behind = tell_apart(track, fits)
+    fits = near + fits[len(near) :]
+    if behind.any():
+        drops[: len(near)] = drops[: len(near)].max() - scale * behind
+    order = np.argsort(-drops, kind="stable")
     return [fits[i] for i in order], drops[order]
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
-TURNS = 3  # the unknowns change how a place reaches the sensors
+TURNS, SETTLED = 8, 0.01  # the unknowns change how a place reaches the sensors; relative drop that is worth a turn
 TIE = 15.0  # of the cost: less tells no place from another
 POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
 LEAST_SENSORS = 2
@@ -113,6 +113,8 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
         force = -_along(reach, misfit - np.tensordot(step, columns, 1))
         cost = float(left @ left + unknowns @ unknowns)
         found.append(FreeForce(place=place, cost=cost, force=force, unknowns=unknowns))
+        if len(found) > 1 and cost > (1 - SETTLED) * found[-2].cost:
+            break
     return min(found, key=lambda one: one.cost)
 
 

@@ -94,9 +94,7 @@ class LinearFit:
     @property
     def as_stated(self) -> FloatArray:
         """(n_unknowns,) unknowns of the model as it is stated, and how stretches start in the best linear one."""
-        unknowns = self.unknowns.copy()
-        unknowns[: self.freedom.n_lasting] = 0.0
-        return unknowns
+        return self.freedom.as_stated(self.unknowns)
 
 
 def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:

@@ -28,6 +28,7 @@ UNEVEN = 2.0  # times the stiffness tolerance: what uneven stiffness does to sha
 DIFFERENCE = 1e-5  # of a frequency or damping ratio: step of a derivative
 NEAREST = 4  # nodes that tell the slope of a shape
 START_SPREAD = 30.0  # times the size of a mode's response: a start that is not known at all
+RIGID_SPREAD = 3.0  # the same of a rigid-body mode, at whose frequency nothing drives it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -250,6 +251,17 @@ class Freedom:
                 columns[:, number, :, blow, row] = free * self.starts[number][:, None] * weight[blow, row]
         return list(columns.reshape(-1, self.starts.shape[1], *weight.shape)) if len(self.moving) else []
 
+    def as_stated(self, unknowns: FloatArray) -> FloatArray:
+        """Keep of unknowns how stretches start, but for rigid-body modes.
+
+        Hardly anything but a law shows how these start; what a linear model says of it is what it lacks elsewhere.
+        """
+        parts = self._split(unknowns)
+        parts[:5] = [np.zeros_like(part) for part in parts[:5]]
+        rigid = self.modes < self.plant.n_rigid
+        parts[5:] = [np.where(rigid, 0.0, part.reshape(self.starts.shape)).ravel() for part in parts[5:]]
+        return np.concatenate(parts)
+
     def without_starts(self, unknowns: FloatArray) -> tuple[Freedom, FloatArray]:
         """Leave out how stretches start, for others that start at rest."""
         none = replace(self, starts=self.starts[:0], moving=self.moving[:0])
@@ -313,7 +325,7 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
     if len(moving):
         response = np.abs(plant.at_inputs.shapes[stretches.input_of[moving]][:, modes]).max(1, keepdims=True)
         impulse = np.sqrt(np.mean(np.abs(stretches.force[:, stretches.used]) ** 2, 1))[moving]
-        starts = START_SPREAD * response * impulse[:, None] * np.ones(len(modes))
+        starts = np.where(rigid, RIGID_SPREAD, START_SPREAD) * response * impulse[:, None]
     return Freedom(
         plant=plant,
         modes=modes,

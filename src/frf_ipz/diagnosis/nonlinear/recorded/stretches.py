@@ -37,6 +37,7 @@ EARLY = 0.08  # of a stretch: where its largest motion lies, after which it coun
 ABOUT = 0.04  # of a stretch: over which the largest motion is taken
 FADED = 0.1  # of a record, both ends together
 QUIETER = 0.8  # of the largest motion of a record: with less in its first part, a louder stretch is looked at besides
+QUIET = 0.05  # of the largest motion of a record: with less, it has died away
 LOW = 0.5  # of the bottom of the band: slower drift is no motion of the structure
 OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
 
@@ -247,10 +248,17 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
             if window.loudest and size[: n // 4].max() < QUIETER * size.max():
                 cuts.append(_Cut(i, blow, loudest, is_moving=True))
             continue
-        parts = [EDGE + round(room * (place + 0.5) / count) for place in range(count)]
+        alive = _alive(size, n, room)
+        parts = [EDGE + round(alive * (place + 0.5) / count) for place in range(count)]
         parts[int(np.argmin([abs(part - loudest) for part in parts]))] = loudest
         cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
+
+
+def _alive(size: FloatArray, n: int, room: int) -> int:
+    """Tell how far into a record stretches may start: not where what a shaker shook up has died away."""
+    loud = np.flatnonzero(size[EDGE:-EDGE] > QUIET * size[EDGE:-EDGE].max())
+    return min(room, max(int(loud[-1]) - n // 4, 0))
 
 
 def _sizes(observations: Observations, n: int) -> list[FloatArray]:

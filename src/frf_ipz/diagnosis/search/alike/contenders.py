@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.search import Ranking
 
 FAR = 8  # places anywhere, not beside each other, by what a wide search says of them
-EQUAL, MOST_EQUAL = 1.1, 4  # times the best cost there: places that no wide search tells from the best, if beside it too
+EQUAL, MOST_EQUAL = 1.1, 4  # times the best cost there: places as good as the best, though beside it, and how many
 
 
 def fit_far(bench: Bench, ranking: Ranking, fits: Fits) -> int:
