@@ -48,3 +48,21 @@ def test_noise_of_the_force_is_more_of_a_weak_blow(chain, strike):
     peaks = np.abs(stretches.fine_force).max(1)
     assert np.all(np.diff(part[np.argsort(peaks)]) < 0)
     assert part.max() > 10 * part.min()
+
+
+def test_a_record_is_not_looked_at_where_its_motion_has_died_away(chain, strike, random_records):
+    """A shaker that was running before the record, and stops half-way."""
+    observations, begin, stop_s = random_records(strike(), 0.5), 120, 1.7
+    plant, noise = make_plant(chain.model, observations), read_noise(observations)
+    runs = blow_times(observations.blows[0])[begin:] < begin * observations.blows[0].step_s + stop_s
+    cut = tuple(
+        replace(blow, force=blow.force[begin:] * runs, responses=np.gradient(blow.responses[:, begin:], axis=1) * runs)
+        for blow in observations.blows
+    )
+    stretches = transform(replace(observations, blows=cut), plant, noise, Window(duration_s=1.0))
+    assert stretches.moving.all()
+    assert np.max(stretches.first_sample * stretches.step_s) < stop_s
+
+
+def blow_times(blow):
+    return blow.step_s * np.arange(blow.n_samples)
