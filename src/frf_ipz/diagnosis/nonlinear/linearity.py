@@ -31,6 +31,7 @@ DEGREES = (0, 2), (2, 2), (3, 3)  # of the local polynomials: of the poles; of t
 ROUNDS = 4  # of weights
 DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e-4
 BEFORE = 2  # samples before the pulse
+END = 10  # a record's part at its end that tells how much is left for the next blow in the same recording
 UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
 LEAST_RECORDS = 2
 CUT = 1e-12  # of the largest singular value of the local polynomials
@@ -109,6 +110,7 @@ def _at_place(
     for row, sensor in enumerate(blows[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
         of_response = noise.response_energy(column, frequency[used], length) + lacking[:, [1 + row]]
+        of_response = of_response + _left_over(blows, row, frequency[used], sigma)
         energies = np.array([of_force, of_response])
         for group in range(n_groups):
             here = slice(group * WIDTH, (group + 1) * WIDTH)
@@ -121,6 +123,17 @@ def _at_place(
 def _lacking(blow: Blow) -> FloatArray:
     """Energy, of the force and of each response, of the ringing that a record lacks at its beginning."""
     return CUT_OFF * (blow.step_s * cut_off(isolate_pulse(blow), blow.responses)) ** 2
+
+
+def _left_over(blows: tuple[Blow, ...], row: int, frequency_hz: FloatArray, sigma: float) -> FloatArray:
+    """Energy of the motion that is left where the next blow of a recording falls, (n_blows, n_lines).
+
+    What is taken off of it leaves as much where a mode is not known well. Its size is read at the ends of the records.
+    """
+    ends = [blow.responses[row, -max(blow.n_samples // END, 1) :] for blow in blows]
+    largest = 2 * max(float(np.mean(end**2)) for end in ends)
+    energy = largest / (sigma**2 + (2 * np.pi * frequency_hz) ** 2)
+    return np.array([energy if blow.follows and sigma else np.zeros_like(energy) for blow in blows])
 
 
 def _groups(used: IntArray) -> tuple[IntArray, int]:

@@ -10,6 +10,7 @@ ACROSS = np.linspace(-1, 1, WIDTH)  # a group of lines
 LOUD = 0.2  # noise over the motion of the strongest record
 GROUPS = 50
 STEPS = 1e-3  # of the largest response
+SLOW_HZ = 0.4  # far below the band
 
 
 def test_blows_on_a_linear_chain_agree(strike):
@@ -39,6 +40,26 @@ def test_blows_are_compared_where_sensors_rove(strike, law):
     found = assess_linearity(replace(observations, blows=tuple(layouts)))
     assert found.score > 0
     assert found.is_nonlinear == (law is not None)
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_what_a_blow_before_has_left_is_no_nonlinearity(strike, follows):
+    """A slow motion that goes on from blow to blow, of which too little is seen to take it off."""
+    observations = strike()
+    first, *others = observations.blows
+    slow = (
+        STEPS * np.abs(first.responses).max() * np.cos(2 * np.pi * SLOW_HZ * first.step_s * np.arange(first.n_samples))
+    )
+    late = [replace(blow, responses=blow.responses + slow, follows=follows) for blow in others]
+    found = assess_linearity(replace(observations, blows=(first, *late)))
+    assert found.is_nonlinear == (not follows)
+
+
+def test_a_law_shows_beside_what_a_blow_before_has_left(strike):
+    observations = strike(lambda w, _: 2e10 * w**3)
+    first, *others = observations.blows
+    blows = (first, *(replace(blow, follows=True) for blow in others))
+    assert assess_linearity(replace(observations, blows=blows)).is_nonlinear
 
 
 def test_a_channel_whose_noise_is_below_its_steps_is_not_taken_for_nonlinear(strike):
