@@ -64,5 +64,13 @@ def test_a_record_is_not_looked_at_where_its_motion_has_died_away(chain, strike,
     assert np.max(stretches.first_sample * stretches.step_s) < stop_s
 
 
+def test_a_record_without_any_motion_is_looked_at_all_the_same(chain, strike, random_records):
+    observations = random_records(strike(), 0.5)
+    plant, noise = make_plant(chain.model, observations), read_noise(observations)
+    dead = tuple(replace(blow, responses=np.zeros_like(blow.responses)) for blow in observations.blows)
+    stretches = transform(replace(observations, blows=dead), plant, noise, Window(duration_s=1.0))
+    assert stretches.n_blows >= len(dead)
+
+
 def blow_times(blow):
     return blow.step_s * np.arange(blow.n_samples)

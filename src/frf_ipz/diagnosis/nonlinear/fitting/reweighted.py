@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
+from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,8 +61,8 @@ def _reweighted(track: Track, fit: LawFit) -> LawFit:
     stretches, freedom = track.stretches, track.linear.freedom
     for _ in range(ROUNDS):
         own = replace(stretches, variance=stretches.variance * _along_lines(stretches, _left(stretches, fit)))
-        again = replace(track, stretches=own, linear=fit_linear(own, freedom)).shoot(fit, STEPS)
-        fit = track.shoot(again, 0)
+        again = shoot(own, freedom, fit.start(), iterations=STEPS)
+        fit = shoot(stretches, freedom, again.start(), iterations=0)
     return fit
 
 

@@ -256,11 +256,8 @@ class Freedom:
 
         Hardly anything but a law shows how these start; what a linear model says of it is what it lacks elsewhere.
         """
-        parts = self._split(unknowns)
-        parts[:5] = [np.zeros_like(part) for part in parts[:5]]
-        rigid = self.modes < self.plant.n_rigid
-        parts[5:] = [np.where(rigid, 0.0, part.reshape(self.starts.shape)).ravel() for part in parts[5:]]
-        return np.concatenate(parts)
+        starts = np.tile(self.modes >= self.plant.n_rigid, 2 * len(self.moving))
+        return np.asarray(unknowns * np.concatenate([np.zeros(self.n_lasting), starts]))
 
     def without_starts(self, unknowns: FloatArray) -> tuple[Freedom, FloatArray]:
         """Leave out how stretches start, for others that start at rest."""

@@ -257,7 +257,8 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
 
 def _alive(size: FloatArray, n: int, room: int) -> int:
     """Tell how far into a record stretches may start: not where what a shaker shook up has died away."""
-    loud = np.flatnonzero(size[EDGE:-EDGE] > QUIET * size[EDGE:-EDGE].max())
+    inside = size[EDGE:-EDGE]
+    loud = np.flatnonzero(inside >= QUIET * inside.max())
     return min(room, max(int(loud[-1]) - n // 4, 0))
 
 
