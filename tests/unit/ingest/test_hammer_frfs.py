@@ -5,6 +5,7 @@ import pytest
 
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.dofs import parse_dof
+from frf_ipz.ingest.blows import read_blows
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.survey.scan import CELL
@@ -152,6 +153,24 @@ def test_offsets_are_taken_off(tmp_path):
     assert errors(result, structure).max() < EXACT
     assert "DC offset of acc_1: 5 m/s^2, taken off" in result.blows.marks[0]
     assert "DC offset of force: 2 N" in result.blows.marks[0]
+
+
+def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
+    """A slow mode that still moves looks like a constant for as long as the recording shows before the next blow."""
+    step_s, offsets = 1 / 32768, np.array([[0.0], [0.02], [-0.03]])
+    heights = np.zeros(3 * 8192)
+    for start in (400, 8592, 16784):
+        heights += pulse(len(heights), step_s, at_s=start * step_s)
+    signals = blow(RINGING, force=heights, step_s=step_s)
+    write_csv(tmp_path / "hits" / "all.csv", signals + offsets, step_s)
+    first, *others = list(read_blows(read_test(write_test(tmp_path, HIT)), IngestOptions()))
+    assert len(others) == 2
+    known = first.responses - signals[1:, : first.n_samples]
+    begins = first.n_samples
+    for one in others:
+        off = one.responses - signals[1:, begins : begins + one.n_samples]
+        np.testing.assert_allclose(off, np.broadcast_to(known[:, :1], off.shape), atol=1e-9 * np.abs(signals).max())
+        begins += one.n_samples
 
 
 def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):

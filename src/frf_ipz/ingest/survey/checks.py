@@ -29,7 +29,15 @@ OFFSET = 0.01  # of the highest value: an offset that is worth a word
 FEWEST_BEFORE = 16  # samples before the pulse that tell an offset
 
 
-def check_blow(test: Test, scan: FileScan, name: str, rows: tuple[int, int], signals: FloatArray) -> BlowFacts:
+def check_blow(
+    test: Test,
+    scan: FileScan,
+    name: str,
+    rows: tuple[int, int],
+    signals: FloatArray,
+    *,
+    offsets: tuple[float, ...] | None = None,
+) -> BlowFacts:
     """Measure one blow and find what is wrong with it.
 
     Parameters
@@ -44,6 +52,8 @@ def check_blow(test: Test, scan: FileScan, name: str, rows: tuple[int, int], sig
         Its rows in the file.
     signals : (1 + n_channels, n_samples) array
         Time, force, responses, SI.
+    offsets : tuple of float, optional
+        Constant part of each response, SI, where it is known; it is read before the blow where it is not.
 
     Returns
     -------
@@ -57,7 +67,8 @@ def check_blow(test: Test, scan: FileScan, name: str, rows: tuple[int, int], sig
         stop = max(stop, int(pulse.bumps.max()) + stop - pulse.peak)
         start = min(start, int(pulse.bumps.min()) + start - pulse.peak)
     trigger = max(min(pulse.onset, *(int(bump) for bump in pulse.bumps), len(force) - 1), 0)
-    offsets = [_offset(response[: max(start, 0)]) for response in responses]
+    if offsets is None:
+        offsets = tuple(_offset(response[: max(start, 0)]) for response in responses)
     decays = _decays(test, scan.step_s, responses - np.array(offsets)[:, None], trigger)
     worst = max(decays, key=lambda decay: decay.left)
     snr_db = _snr_db(responses - np.array(offsets)[:, None], trigger, decays)
@@ -193,7 +204,7 @@ def _offset(before: FloatArray) -> float:
     return mean if abs(mean) > SURE * spread / np.sqrt(len(before)) else 0.0
 
 
-def _restless(test: Test, responses: FloatArray, offsets: list[float], start: int) -> tuple[str, ...]:
+def _restless(test: Test, responses: FloatArray, offsets: tuple[float, ...], start: int) -> tuple[str, ...]:
     if start < FEWEST_BEFORE:
         return ()
     before = np.sqrt(np.mean((responses[:, :start] - np.array(offsets)[:, None]) ** 2, axis=1))

@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
-from frf_ipz.ingest.survey.checks import CUT_OFF, check_blow
+from frf_ipz.ingest.survey.checks import CUT_OFF, FEWEST_BEFORE, check_blow
 from frf_ipz.ingest.survey.choice import blow_name, check_names, choose, is_named
 from frf_ipz.ingest.survey.facts import Survey
 from frf_ipz.ingest.survey.scan import scan_file, split_blows
@@ -94,13 +94,17 @@ def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> 
 
 
 def _check_file(files: RecordingFiles, scan: FileScan, usual: int) -> list[BlowFacts]:
+    """Check the blows of a file: its channels are as far from zero as before the first one, at rest."""
     bounds = split_blows(scan, usual)
     stretches = files.stretches(scan.run, scan.path, bounds)
-    blows = []
+    blows: list[BlowFacts] = []
+    offsets = None
     for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
         name = blow_name(files.test, scan.path, number, len(bounds))
-        facts = replace(check_blow(files.test, scan, name, rows, signals), follows=number > 1)
-        blows.append(_without_long_lead(facts))
+        facts = check_blow(files.test, scan, name, rows, signals, offsets=offsets)
+        blows.append(_without_long_lead(replace(facts, follows=number > 1)))
+        if facts.pulse[0] >= FEWEST_BEFORE:
+            offsets = offsets or facts.offsets[1:]
     return blows
 
 
