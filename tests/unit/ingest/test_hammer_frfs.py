@@ -163,13 +163,12 @@ def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
         heights += pulse(len(heights), step_s, at_s=start * step_s)
     signals = blow(RINGING, force=heights, step_s=step_s)
     write_csv(tmp_path / "hits" / "all.csv", signals + offsets, step_s)
-    first, *others = list(read_blows(read_test(write_test(tmp_path, HIT)), IngestOptions()))
-    assert len(others) == 2
-    known = first.responses - signals[1:, : first.n_samples]
-    begins = first.n_samples
-    for one in others:
+    recorded = list(read_blows(read_test(write_test(tmp_path, HIT)), IngestOptions()))
+    assert len(recorded) == 3
+    begins = len(heights) - sum(one.n_samples for one in recorded)
+    for one in recorded:
         off = one.responses - signals[1:, begins : begins + one.n_samples]
-        np.testing.assert_allclose(off, np.broadcast_to(known[:, :1], off.shape), atol=1e-9 * np.abs(signals).max())
+        assert np.abs(off).max() < 1e-6 * np.abs(signals).max()  # the pulse has no sharp beginning
         begins += one.n_samples
 
 
