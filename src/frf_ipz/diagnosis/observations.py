@@ -56,8 +56,12 @@ class Blow:
         SI units of the sensors' quantities, as recorded: a sensor of negative sign shows minus the model's motion.
     rested : bool
         The structure was at rest at the first sample.
-    follows : bool
-        Another blow came before it in the same recording: what that has left may still move the structure.
+    recording : str
+        What it was cut from.
+    number : int
+        1 for the first blow of its recording: what that has left may still move the structure at the next.
+    start_s : float
+        Time of its first sample in its recording, s.
     constant_std : (n_sensors,) array, optional
         What constant parts of the responses may be left, one standard deviation, SI; none where it is left out.
     """
@@ -70,7 +74,9 @@ class Blow:
     force: FloatArray
     responses: FloatArray
     rested: bool = True
-    follows: bool = False
+    recording: str = ""
+    number: int = 1
+    start_s: float = 0.0
     constant_std: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -88,6 +94,11 @@ class Blow:
     def duration_s(self) -> float:
         """Length of the record, s."""
         return self.n_samples * self.step_s
+
+    @property
+    def follows(self) -> bool:
+        """Another blow came before it in the same recording."""
+        return self.number > 1
 
     @property
     def level(self) -> float:

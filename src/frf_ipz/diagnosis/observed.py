@@ -65,5 +65,7 @@ def _blow(blow: recorded.Blow, test: Test) -> Blow:
         force=blow.force,
         responses=blow.responses[rows],
         rested=blow.rested,
-        follows=blow.follows,
+        recording=blow.recording,
+        number=blow.number,
+        start_s=blow.start_s,
     )

@@ -54,8 +54,12 @@ class Blow:
         First sample of the force that is its pulse, and the one after the last; outside there is only noise.
     rested : bool
         The structure was at rest at the first sample.
-    follows : bool
-        Another blow came before it in the same recording.
+    recording : str
+        What it was cut from.
+    number : int
+        1 for the first blow of its recording.
+    start_s : float
+        Time of its first sample in its recording, s.
     marks : tuple of str
         What is wrong with it.
     used : bool
@@ -70,7 +74,9 @@ class Blow:
     trigger: int
     kept_force: tuple[int, int]
     rested: bool
-    follows: bool
+    recording: str
+    number: int
+    start_s: float
     marks: tuple[str, ...]
     used: bool
 
@@ -189,7 +195,9 @@ def _calibrated(test: Test, facts: BlowFacts, signals: FloatArray) -> Blow:
         trigger=facts.trigger,
         kept_force=facts.kept_force,
         rested=facts.rested,
-        follows=facts.follows,
+        recording=str(facts.path),
+        number=facts.number,
+        start_s=facts.start * facts.step_s,
         marks=facts.marks,
         used=facts.used,
     )

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.cleaned.leftovers import LARGEST, _whole, without_leftovers
+from frf_ipz.diagnosis.measured.cleaned.leftovers import DECAYS, LARGEST, _group, _whole, without_leftovers
 from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
 from frf_ipz.diagnosis.measured.forces import RINGING
 from frf_ipz.diagnosis.measured.from_blows import measure, survey
+from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -100,7 +101,7 @@ def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
         decaying = np.exp(-0.01 * np.outer(omega, time)) * np.cos(np.outer(damped, time) + phase[:, None])
         moving = shapes[[1, 3]] @ (rng.standard_normal(len(omega))[:, None] * decaying)
         moving *= LEFT * largest(strike()) / np.abs(moving).max()
-        blows.append(replace(blow, responses=blow.responses + moving, follows=True))
+        blows.append(replace(blow, responses=blow.responses + moving, number=9))
         added.append(moving)
     spoilt = replace(strike(), blows=tuple(blows))
     assert assess_linearity(spoilt).is_nonlinear
@@ -109,6 +110,59 @@ def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
     off = taken_off(spoilt, restored)
     for found, moving in zip(off[1:], added[1:], strict=True):
         assert np.linalg.norm(found - moving) < 0.1 * np.linalg.norm(moving)
+
+
+@pytest.fixture
+def struck_on(strike, chain):
+    """Give blows of one recording, each before the one before has rung out, and what each would be from rest."""
+    single = strike().blows
+    unit = np.eye(4)
+    system = StateSpace(
+        np.block([[np.zeros((4, 4)), unit], [-chain.K, -chain.C]]), np.vstack([np.zeros((4, 4)), unit])[:, :1],
+        np.hstack([-chain.K, -chain.C])[[1, 3]], unit[[1, 3], :1],
+    )  # fmt: skip
+
+    def run(pause, number_of):
+        step, rng = single[0].step_s, np.random.default_rng(7)
+        force = np.concatenate([blow.force[:pause] for blow in single])
+        whole = lsim(system, force, step * np.arange(len(force)))[1].T
+        noise = 1e-5 * np.abs(whole).max()
+        blows, alone = [], []
+        for number, blow in enumerate(single):
+            here = slice(number * pause, (number + 1) * pause)
+            responses = whole[:, here] + noise * rng.standard_normal((2, pause))
+            at = {"recording": "all", "number": number_of(number), "start_s": number * pause * step}
+            blows.append(replace(blow, force=blow.force[:pause], responses=responses, **at))
+            alone.append(lsim(system, blow.force[:pause], step * np.arange(pause))[1].T)
+        return replace(strike(), blows=tuple(blows)), np.array(alone)
+
+    return run
+
+
+@pytest.mark.parametrize("lacking", [0, 5])
+def test_motion_left_by_blows_before_is_taken_off_where_one_of_them_was_left_out_too(struck_on, lacking):
+    spoilt, alone = struck_on(600, lambda number: number + 1 + lacking * (number > 0))
+    left = np.array([blow.responses for blow in spoilt.blows]) - alone
+    assert np.abs(left).max() > 0.05 * np.abs(alone).max()
+    restored = np.array([blow.responses for blow in without_leftovers(spoilt).blows])
+    assert np.linalg.norm(restored - alone) < 0.02 * np.linalg.norm(left)
+
+
+def test_what_forces_before_have_left_of_each_mode_is_known_from_all_of_them(struck_on):
+    observations, _ = struck_on(600, lambda number: number + 1)
+    ordered = observations.blows
+    group = _group(same_places(observations)[0], observations, DECAYS / ordered[0].duration_s)
+    step, force = ordered[0].step_s, np.concatenate([blow.force for blow in ordered])
+    assert group.kicks(ordered[0]) is None
+    for number, blow in enumerate(ordered[1:], start=1):
+        left, error = group.kicks(blow)
+        later = step * (600 * number - np.arange(600 * number))
+        whole = step * np.exp(np.outer(group.poles, later)) @ force[: 600 * number]
+        np.testing.assert_allclose(left, whole, rtol=1e-2)  # forces are cut where nothing touches
+        assert np.all(error > 0.009 * np.abs(left))
+    without_one = replace(observations, blows=(ordered[0], *ordered[2:]))
+    group = _group(same_places(without_one)[0], without_one, DECAYS / ordered[0].duration_s)
+    assert group.kicks(ordered[2]) is None
 
 
 def test_constants_of_a_nonlinear_structure_are_read_where_it_has_come_to_rest(strike):

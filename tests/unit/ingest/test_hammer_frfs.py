@@ -125,7 +125,12 @@ def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_th
     first, *others = result.blows.trigger_s
     assert first < 40 * step_s
     assert min(others) > 0.9 * CELL * step_s
-    assert [one.follows for one in observe(test, IngestOptions(), result.frfs).blows] == [False, True, True]
+    observed = observe(test, IngestOptions(), result.frfs).blows
+    assert [one.number for one in observed] == [1, 2, 3]
+    assert [one.follows for one in observed] == [False, True, True]
+    pulses = [one.start_s + one.step_s * np.argmax(one.force) for one in observed]
+    np.testing.assert_allclose(np.diff(pulses), 4200 * step_s)
+    assert len({one.recording for one in observed}) == 1
 
 
 def test_a_short_blow_is_filled_up_with_zeros(tmp_path):

@@ -58,7 +58,9 @@ class Resonances:
     decay_1_s: FloatArray
 
 
-def find_resonances(omega_rad_s: FloatArray, level: FloatArray, decay_1_s: float) -> Resonances:
+def find_resonances(
+    omega_rad_s: FloatArray, level: FloatArray, decay_1_s: float, *, at_ends: bool = False
+) -> Resonances:
     """Find peaks and their widths.
 
     Parameters
@@ -69,6 +71,8 @@ def find_resonances(omega_rad_s: FloatArray, level: FloatArray, decay_1_s: float
         Sum of squared FRFs, each over its own typical size.
     decay_1_s : float
         sigma of the lines: it widens every peak.
+    at_ends : bool
+        Count a peak of which one half lies beyond the lines.
 
     Returns
     -------
@@ -78,17 +82,18 @@ def find_resonances(omega_rad_s: FloatArray, level: FloatArray, decay_1_s: float
     inner = np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:])) + 1
     peaks, decays = [], []
     for place in inner.tolist():
-        sides = [_half_power(omega_rad_s, level, place, step) for step in (-1, 1)]
-        if None in sides:
+        sides = np.array([_half_power(omega_rad_s, level, place, step) for step in (-1, 1)])
+        sides = sides[~np.isnan(sides)] if at_ends else sides
+        if not np.isfinite(sides).all() or not len(sides):
             continue
-        width = 0.5 * sum(abs(side - omega_rad_s[place]) for side in sides if side is not None)
+        width = float(np.mean(np.abs(sides - omega_rad_s[place])))
         peaks.append(omega_rad_s[place])
         decays.append(max(width - decay_1_s, 0.02 * width))
     return Resonances(omega_rad_s=np.array(peaks), decay_1_s=np.array(decays))
 
 
-def _half_power(omega: FloatArray, level: FloatArray, place: int, step: int) -> float | None:
-    """Where the level has fallen to a half, between lines; None where it rises again before."""
+def _half_power(omega: FloatArray, level: FloatArray, place: int, step: int) -> float:
+    """Where the level has fallen to a half, between lines; infinite where it rises again before, NaN beyond the end."""
     at = place
     while 0 < at < len(level) - 1:
         at += step
@@ -97,8 +102,8 @@ def _half_power(omega: FloatArray, level: FloatArray, place: int, step: int) -> 
             part = (level[inside] - 0.5 * level[place]) / (level[inside] - level[at])
             return float(omega[inside] + part * (omega[at] - omega[inside]))
         if level[at] > level[place]:
-            return None
-    return None
+            return np.inf
+    return np.nan
 
 
 def fine_contour(resonances: Resonances, band_hz: tuple[float, float], least_decay_1_s: float) -> ComplexArray:

@@ -50,8 +50,8 @@ class BlowFacts:
         Power of the response over its noise, median of the channels, dB; NaN where the noise is not known.
     rested : bool
         The structure was at rest at the first sample.
-    follows : bool
-        Another blow came before it in the same recording: what that has left may still move the structure.
+    number : int
+        1 for the first blow of its file: what that has left may still move the structure at the next.
     faults : tuple of str
         Why it would be left out.
     remarks : tuple of str
@@ -79,7 +79,7 @@ class BlowFacts:
     left_hz: float = 0.0
     snr_db: float = float("nan")
     rested: bool = True
-    follows: bool = False
+    number: int = 1
     faults: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     used: bool = True

@@ -102,7 +102,7 @@ def _check_file(files: RecordingFiles, scan: FileScan, usual: int) -> list[BlowF
     for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
         name = blow_name(files.test, scan.path, number, len(bounds))
         facts = check_blow(files.test, scan, name, rows, signals, offsets=offsets)
-        blows.append(_without_long_lead(replace(facts, follows=number > 1)))
+        blows.append(_without_long_lead(replace(facts, number=number)))
         if facts.pulse[0] >= FEWEST_BEFORE:
             offsets = offsets or facts.offsets[1:]
     return blows

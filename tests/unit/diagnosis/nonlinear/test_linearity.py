@@ -50,7 +50,7 @@ def test_what_a_blow_before_has_left_is_no_nonlinearity(strike, follows):
     slow = (
         STEPS * np.abs(first.responses).max() * np.cos(2 * np.pi * SLOW_HZ * first.step_s * np.arange(first.n_samples))
     )
-    late = [replace(blow, responses=blow.responses + slow, follows=follows) for blow in others]
+    late = [replace(blow, responses=blow.responses + slow, number=2 if follows else 1) for blow in others]
     found = assess_linearity(replace(observations, blows=(first, *late)))
     assert found.is_nonlinear == (not follows)
 
@@ -58,7 +58,7 @@ def test_what_a_blow_before_has_left_is_no_nonlinearity(strike, follows):
 def test_a_law_shows_beside_what_a_blow_before_has_left(strike):
     observations = strike(lambda w, _: 2e10 * w**3)
     first, *others = observations.blows
-    blows = (first, *(replace(blow, follows=True) for blow in others))
+    blows = (first, *(replace(blow, number=2) for blow in others))
     assert assess_linearity(replace(observations, blows=blows)).is_nonlinear
 
 

@@ -1,10 +1,11 @@
 """What recordings of blows hold besides the response to the blow: constants of channels, and motion left from before.
 
 Near the axis a constant c looks like c / s, which is largest at the bottom of the band, and the few samples before a
-blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure. Neither
-grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is left free, and what no
-FRF explains gives both, for all blows at once. What the blows do not tell, since they are of one level, stays in the
-recordings; how uncertain the constants are goes on with the blows.
+blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure, each mode
+with as much as the forces before have left it times one residue; what moves far below the band is as good as another
+constant. None of it grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is
+left free, and what no FRF explains gives it, for all blows at once. What the blows do not tell, since they are of one
+level, stays in the recordings; how uncertain the constants are goes on with the blows.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.contour import find_resonances
 from frf_ipz.diagnosis.measured.forces import RINGING, Pulse, isolate_pulse
 from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_places
-from frf_ipz.diagnosis.measured.local_pole import lines_near, pole_near
+from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Blow, Observations
@@ -30,6 +31,7 @@ DECAYS = 8.0  # sigma times the shortest record
 LARGEST = 0.05  # of a channel's highest value: a larger constant has been taken off already
 WANDERS = 3.0  # times the noise: how far a constant wanders from blow to blow
 LEFT = 3.0  # times the motion just before a blow: what each mode may have of it
+ASTRAY = 0.01  # of what a mode has left: blows do not fall on one place, and poles are not known
 MISSED = 0.003  # of a response: what sampling and the places of blows leave
 AROUND = 11  # lines over which what no FRF explains is averaged
 ROUNDS = 3  # of weights: at first leftovers count as noise
@@ -45,35 +47,62 @@ class _Group:
     """Blows at one place, and what may be left in each: a constant and, after another blow, decaying modes."""
 
     blows: tuple[Blow, ...]
-    starts: tuple[int, ...]  # samples before each blow, or before the shaker starts
+    pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
     lines: Lines
     poles: ComplexArray
+    pole_stds: FloatArray  # rad/s
+    residues: FloatArray  # (n_poles, n_sensors), at most
 
     @property
     def n_samples(self) -> int:
         """Samples that are transformed."""
         return min(blow.n_samples for blow in self.blows)
 
-    def rates(self, blow: Blow) -> ComplexArray:
-        """Exponents of the leftovers of a blow, rad/s: 0 is the constant."""
-        return np.concatenate([np.zeros(1), self.poles if blow.follows else np.zeros(0)])
+    def count(self, blow: Blow) -> int:
+        """Count what may be left in a blow: a constant; after another one also cosines and sines."""
+        return 1 + 2 * len(self.poles) if blow.follows else 1
 
     def shapes(self, blow: Blow) -> ComplexArray:
-        """Transform unit leftovers, (n_lines / FINER, 1 or 1 + 2 n_poles): the constant, cosines, sines."""
+        """Transform unit leftovers, (n_lines / FINER, count)."""
         step, s, n = blow.step_s, self.lines.s[::FINER, None], self.n_samples
 
-        def transformed(rate: ComplexArray) -> ComplexArray:
-            turn = np.exp((rate - s) * step)
+        def transformed(rates: ComplexArray) -> ComplexArray:
+            turn = np.exp((rates - s) * step)
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
-        rates = self.rates(blow)
-        up, down = transformed(rates), transformed(rates.conj())
-        return np.hstack([(up + down) / 2, (up[:, 1:] - down[:, 1:]) / 2j])
+        constant = transformed(np.zeros(1, complex))
+        if not blow.follows:
+            return constant
+        up, down = transformed(self.poles), transformed(self.poles.conj())
+        return np.hstack([constant, (up + down) / 2, (up - down) / 2j])
 
     def unit_signals(self, blow: Blow) -> FloatArray:
-        """Give unit leftovers in time, (1 or 1 + 2 n_poles, n_samples)."""
-        turning = np.exp(np.outer(self.rates(blow), blow.step_s * np.arange(blow.n_samples)))
-        return np.concatenate([turning.real, turning[1:].imag])
+        """Give unit leftovers in time, (count, n_samples)."""
+        constant = np.ones((1, blow.n_samples))
+        if not blow.follows:
+            return constant
+        turning = np.exp(np.outer(self.poles, blow.step_s * np.arange(blow.n_samples)))
+        return np.concatenate([constant, turning.real, turning.imag])
+
+    def kicks(self, blow: Blow) -> tuple[ComplexArray, FloatArray] | None:
+        """Give what unit residues leave at the first sample, (n_poles,), and its error; None if a force is unknown."""
+        if not blow.follows:
+            return None
+        before = [
+            (one, pulse.blow.force)
+            for one, pulse in zip(self.blows, self.pulses, strict=True)
+            if one.recording == blow.recording and one.number < blow.number
+        ]
+        if len(before) != blow.number - 1:
+            return None
+        left, by_pole = np.zeros((2, len(self.poles)), complex)
+        for one, force in before:
+            touched = np.flatnonzero(force)
+            later = blow.start_s - one.start_s - blow.step_s * touched
+            decaying = blow.step_s * np.exp(np.outer(self.poles, later))
+            left += decaying @ force[touched]
+            by_pole += decaying @ (later * force[touched])
+        return left, np.hypot(ASTRAY * np.abs(left), self.pole_stds * np.abs(by_pole))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +110,7 @@ class _Told:
     """What blows at one place tell of the leftovers in one channel, blow after blow, each with its constant first."""
 
     counts: tuple[int, ...]
-    prior: FloatArray  # covariance, without what the constants of a channel have in common
+    noise: float
     curvature: FloatArray
     slope: FloatArray
 
@@ -125,14 +154,24 @@ def without_leftovers(observations: Observations) -> Observations:
 
 def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) -> _Group:
     is_hammer = observations.kind == "hammer"
-    pulses = [isolate_pulse(blow) if is_hammer else _whole(blow) for blow in blows]
-    lines = lines_of_band(tuple(pulse.blow for pulse in pulses), observations.band_hz, decay)
-    follow = any(blow.follows for blow in blows)
+    pulses = tuple(isolate_pulse(blow) if is_hammer else _whole(blow) for blow in blows)
+    transformed = tuple(pulse.blow for pulse in pulses)
+    found: list[LocalPole] = []
+    residues = np.zeros((0, len(blows[0].sensors)))
+    if any(blow.follows for blow in blows):
+        from_rest = tuple(blow for blow in transformed if not blow.follows)
+        told = lines_of_band(from_rest or transformed, observations.band_hz, decay)
+        found = _poles(told, decay)
+        nearest = [int(np.argmin(np.abs(told.s - one.pole))) for one in found]
+        away = np.array([np.abs(told.s[line] - one.pole) for line, one in zip(nearest, found, strict=True)])
+        residues = np.abs(told.values[nearest]) * away[:, None]
     return _Group(
         blows=blows,
-        starts=tuple(pulse.start for pulse in pulses),
-        lines=lines,
-        poles=_poles(lines, decay) if follow else np.zeros(0, complex),
+        pulses=pulses,
+        lines=lines_of_band(transformed, observations.band_hz, decay),
+        poles=np.array([one.pole for one in found], complex),
+        pole_stds=np.array([one.std_rad_s for one in found]),
+        residues=residues,
     )
 
 
@@ -147,33 +186,39 @@ def _without(blow: Blow, found: dict[tuple[str, str], tuple[FloatArray, float]])
     return replace(blow, responses=blow.responses - np.array(left), constant_std=np.array(stds))
 
 
-def _poles(lines: Lines, decay: float) -> ComplexArray:
-    """Poles of the structure, (n_poles,), as far as they stand out."""
+def _poles(lines: Lines, decay: float) -> list[LocalPole]:
+    """Poles of the structure, as far as they stand out."""
     size = np.abs(lines.values) ** 2
     level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
-    peaks = find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
+    peaks = find_resonances(2 * np.pi * lines.frequency_hz, level, decay, at_ends=True)
     found = []
     for omega, own in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
         start = complex(-own, omega)
         near = lines_near(lines.s, start)
         sensor = int(np.argmax(size[near].sum(0) / size.sum(0)))
         pole = pole_near(lines.s[near], lines.values[near, sensor], start)
-        found += [] if pole is None else [pole.pole]
-    return np.array(found, complex)
+        found += [] if pole is None else [pole]
+    return found
 
 
 def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
     """Give the leftovers of all blows in one channel, as signals, and the standard deviations of the constants."""
     largest = max(float(np.abs(blow.responses[row]).max()) for group, row in rows for blow in group.blows)
     faintest = FAINTEST * (largest or 1.0)  # of a channel that shows nothing at all, nothing is taken off
-    sizes = [[np.zeros(len(group.rates(blow)) * 2 - 1) for blow in group.blows] for group, _ in rows]
+    sizes = [[np.zeros(group.count(blow)) for blow in group.blows] for group, _ in rows]
+    priors = [_prior(group, row) for group, row in rows]
     stds = np.zeros(0)
     for _ in range(ROUNDS):
         told = [_told(group, row, own, faintest) for (group, row), own in zip(rows, sizes, strict=True)]
         before = np.cumsum([0, *(len(one.slope) for one in told)])
         constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
-        prior = block_diag(*(one.prior for one in told))
-        prior[np.ix_(constants, constants)] += (LARGEST * largest) ** 2
+        prior = block_diag(*priors)
+        prior[np.ix_(constants, constants)] += (LARGEST * largest) ** 2 + block_diag(
+            *(
+                (WANDERS * one.noise) ** 2 * _unlike_levels(group.blows)
+                for (group, _), one in zip(rows, told, strict=True)
+            )
+        )
         curvature = block_diag(*(one.curvature for one in told))
         covariance = np.linalg.solve(np.eye(len(prior)) + prior @ curvature, prior)
         found = covariance @ np.concatenate([one.slope for one in told])
@@ -200,25 +245,16 @@ def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> 
     across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
     along = np.sum(shared.conj() * response, 1)
     own = [(shape.conj() * part[:, None]).T for shape, part in zip(shapes, weight.T, strict=True)]
-    before = [blow.responses[row, :start] for blow, start in zip(group.blows, group.starts, strict=True)]
+    before = [blow.responses[row, : pulse.start] for blow, pulse in zip(group.blows, group.pulses, strict=True)]
     quiet = [_quiet(group, blow, samples, noise) for blow, samples in zip(group.blows, before, strict=True)]
     straight = [(one @ shape).real + more for one, shape, (more, _) in zip(own, shapes, quiet, strict=True)]
     slopes = [(one @ values).real + more for one, values, (_, more) in zip(own, response.T, quiet, strict=True)]
-    told = _Told(
+    return _Told(
         counts=tuple(shape.shape[1] for shape in shapes),
-        prior=np.diag(
-            np.concatenate(
-                [
-                    _motion(blow.responses[row, : max(start, LEAST_BEFORE)], len(size)) ** 2
-                    for blow, start, size in zip(group.blows, group.starts, sizes, strict=True)
-                ]
-            )
-        ),
+        noise=noise,
         curvature=block_diag(*straight) - (across.conj().T @ across).real,
         slope=np.concatenate(slopes) - (across.conj().T @ along).real,
     )
-    told.prior[np.ix_(told.constants, told.constants)] = (WANDERS * noise) ** 2 * _unlike_levels(group.blows)
-    return told
 
 
 def _quiet(group: _Group, blow: Blow, before: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
@@ -229,9 +265,37 @@ def _quiet(group: _Group, blow: Blow, before: FloatArray, noise: float) -> tuple
     return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ before / variance)
 
 
-def _motion(before: FloatArray, count: int) -> FloatArray:
-    """Give the standard deviations of a blow's leftovers but the constant: the motion before it."""
-    return np.concatenate([np.zeros(1), np.full(count - 1, LEFT * np.sqrt(2) * before.std())])
+def _prior(group: _Group, row: int) -> FloatArray:
+    """Give the covariance of the leftovers, without what the constants of a channel have in common and wander by."""
+    kicks = [group.kicks(blow) for blow in group.blows]
+    motions = [
+        LEFT * float(np.sqrt(2 * np.mean(blow.responses[row, : max(pulse.start, LEAST_BEFORE)] ** 2)))
+        for blow, pulse in zip(group.blows, group.pulses, strict=True)
+    ]
+    residues = LEFT * group.residues[:, row]
+    for kick, motion in zip(kicks, motions, strict=True):
+        if kick is not None:  # no mode has left more than moves
+            residues = np.fmin(residues, motion / np.maximum(np.abs(kick[0]), np.finfo(float).tiny))
+    parts = [
+        _parts(blow, kick, residues, motion) for blow, kick, motion in zip(group.blows, kicks, motions, strict=True)
+    ]
+    shared = np.concatenate([of_residues for _, of_residues in parts])
+    return np.asarray(np.diag(np.concatenate([own for own, _ in parts]) ** 2) + shared @ shared.T)
+
+
+def _parts(
+    blow: Blow, kick: tuple[ComplexArray, FloatArray] | None, residues: FloatArray, motion: float
+) -> tuple[FloatArray, FloatArray]:
+    """Give deviations of a blow's own leftovers, (count,), and what residues leave, (count, 2 n_poles)."""
+    n = len(residues)
+    if not blow.follows:
+        return np.zeros(1), np.zeros((1, 2 * n))
+    if kick is None:
+        return np.full(1 + 2 * n, motion), np.zeros((1 + 2 * n, 2 * n))
+    left, error = kick[0] * residues, kick[1] * residues
+    real, imaginary = np.diag(left.real), np.diag(left.imag)
+    shared = np.block([[np.zeros((1, 2 * n))], [real, -imaginary], [-imaginary, -real]])
+    return np.concatenate([[motion], error, error]), shared
 
 
 def _unlike_levels(blows: tuple[Blow, ...]) -> FloatArray:
