@@ -112,6 +112,23 @@ def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
         assert np.linalg.norm(found - moving) < 0.1 * np.linalg.norm(moving)
 
 
+def test_ringing_that_recordings_lack_before_a_blow_is_no_constant(strike):
+    """Near the axis it is as flat as a first sample: with blows at other times it looks like constants by level."""
+    late = (75, 76, 77, 76)  # samples: the blow comes with the fifth or so after that
+    rng = np.random.default_rng(4)
+    lacking = 0.02 * largest(strike()) * rng.standard_normal((4, 2, 1))
+    blows = []
+    for blow, start, lacks in zip(strike().blows, late, lacking, strict=True):
+        responses = blow.responses[:, start:].copy()
+        responses[:, :1] += lacks
+        blows.append(replace(blow, force=blow.force[start:], responses=responses))
+    spoilt = replace(strike(), blows=tuple(blows))
+    for blow, clean, lacks in zip(blows, without_leftovers(spoilt).blows, lacking, strict=True):
+        off = blow.responses - clean.responses
+        assert np.all(np.abs(off[:, :1] - lacks) < 0.1 * 0.02 * largest(strike()))
+        assert np.all(np.abs(off[:, 1:]) < 2e-3 * largest(strike()))
+
+
 @pytest.fixture
 def struck_on(strike, chain):
     """Give blows of one recording, each before the one before has rung out, and what each would be from rest."""

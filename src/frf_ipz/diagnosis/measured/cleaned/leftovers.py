@@ -3,7 +3,8 @@
 Near the axis a constant c looks like c / s, which is largest at the bottom of the band, and the few samples before a
 blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure, each mode
 with as much as the forces before have left it times one residue; what moves far below the band is as good as another
-constant. None of it grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is
+constant. Where a recording begins within the ringing of the converter's filter before a blow, one sample more at its
+beginning stands for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is
 left free, and what no FRF explains gives it, for all blows at once. What the blows do not tell, since they are of one
 level, stays in the recordings; how uncertain the constants are goes on with the blows.
 """
@@ -20,7 +21,7 @@ from scipy.ndimage import uniform_filter1d
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.contour import find_resonances
-from frf_ipz.diagnosis.measured.forces import RINGING, Pulse, isolate_pulse
+from frf_ipz.diagnosis.measured.forces import CUT_OFF, RINGING, Pulse, cut_off, isolate_pulse
 from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_places
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
 
@@ -44,7 +45,7 @@ FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolv
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """Blows at one place, and what may be left in each: a constant and, after another blow, decaying modes."""
+    """Blows at one place, and what may be in each: a constant, its beginning and, after another blow, decaying modes."""
 
     blows: tuple[Blow, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
@@ -52,6 +53,7 @@ class _Group:
     poles: ComplexArray
     pole_stds: FloatArray  # rad/s
     residues: FloatArray  # (n_poles, n_sensors), at most
+    lacking: FloatArray  # (n_blows, n_sensors), of the ringing before a blow: standard deviation of a sample instead
 
     @property
     def n_samples(self) -> int:
@@ -59,8 +61,8 @@ class _Group:
         return min(blow.n_samples for blow in self.blows)
 
     def count(self, blow: Blow) -> int:
-        """Count what may be left in a blow: a constant; after another one also cosines and sines."""
-        return 1 + 2 * len(self.poles) if blow.follows else 1
+        """Count what may be left in a blow: a constant, a first sample; after another one also cosines and sines."""
+        return 2 + 2 * len(self.poles) if blow.follows else 2
 
     def shapes(self, blow: Blow) -> ComplexArray:
         """Transform unit leftovers, (n_lines / FINER, count)."""
@@ -70,19 +72,20 @@ class _Group:
             turn = np.exp((rates - s) * step)
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
-        constant = transformed(np.zeros(1, complex))
+        first = np.hstack([transformed(np.zeros(1, complex)), np.full_like(s, step)])
         if not blow.follows:
-            return constant
+            return first
         up, down = transformed(self.poles), transformed(self.poles.conj())
-        return np.hstack([constant, (up + down) / 2, (up - down) / 2j])
+        return np.hstack([first, (up + down) / 2, (up - down) / 2j])
 
     def unit_signals(self, blow: Blow) -> FloatArray:
         """Give unit leftovers in time, (count, n_samples)."""
-        constant = np.ones((1, blow.n_samples))
+        first = np.ones((2, blow.n_samples))
+        first[1, 1:] = 0.0
         if not blow.follows:
-            return constant
+            return first
         turning = np.exp(np.outer(self.poles, blow.step_s * np.arange(blow.n_samples)))
-        return np.concatenate([constant, turning.real, turning.imag])
+        return np.concatenate([first, turning.real, turning.imag])
 
     def kicks(self, blow: Blow) -> tuple[ComplexArray, FloatArray] | None:
         """Give what unit residues leave at the first sample, (n_poles,), and its error; None if a force is unknown."""
@@ -172,6 +175,7 @@ def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) ->
         poles=np.array([one.pole for one in found], complex),
         pole_stds=np.array([one.std_rad_s for one in found]),
         residues=residues,
+        lacking=np.array([cut_off(pulse, pulse.blow.responses)[1:] * is_hammer for pulse in pulses]) * np.sqrt(CUT_OFF),
     )
 
 
@@ -212,15 +216,14 @@ def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, fl
         told = [_told(group, row, own, faintest) for (group, row), own in zip(rows, sizes, strict=True)]
         before = np.cumsum([0, *(len(one.slope) for one in told)])
         constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
-        prior = block_diag(*priors)
-        prior[np.ix_(constants, constants)] += (LARGEST * largest) ** 2 + block_diag(
-            *(
-                (WANDERS * one.noise) ** 2 * _unlike_levels(group.blows)
-                for (group, _), one in zip(rows, told, strict=True)
-            )
-        )
-        curvature = block_diag(*(one.curvature for one in told))
-        covariance = np.linalg.solve(np.eye(len(prior)) + prior @ curvature, prior)
+        wandering = [
+            WANDERS * one.noise * _unlike_levels(group.blows) for (group, _), one in zip(rows, told, strict=True)
+        ]
+        of_constants = np.zeros((before[-1], 1 + len(constants)))
+        of_constants[constants] = np.hstack([np.full((len(constants), 1), LARGEST * largest), block_diag(*wandering)])
+        spread = np.hstack([block_diag(*priors), of_constants])
+        known = spread.T @ block_diag(*(one.curvature for one in told)) @ spread
+        covariance = spread @ np.linalg.solve(np.eye(len(known)) + known, spread.T)
         found = covariance @ np.concatenate([one.slope for one in told])
         sizes = [
             np.split(part, one.constants[1:]) for part, one in zip(np.split(found, before[1:-1]), told, strict=True)
@@ -266,7 +269,7 @@ def _quiet(group: _Group, blow: Blow, before: FloatArray, noise: float) -> tuple
 
 
 def _prior(group: _Group, row: int) -> FloatArray:
-    """Give the covariance of the leftovers, without what the constants of a channel have in common and wander by."""
+    """Give a square root of the covariance of leftovers, (n, any), but for constants in common and their wandering."""
     kicks = [group.kicks(blow) for blow in group.blows]
     motions = [
         LEFT * float(np.sqrt(2 * np.mean(blow.responses[row, : max(pulse.start, LEAST_BEFORE)] ** 2)))
@@ -277,25 +280,26 @@ def _prior(group: _Group, row: int) -> FloatArray:
         if kick is not None:  # no mode has left more than moves
             residues = np.fmin(residues, motion / np.maximum(np.abs(kick[0]), np.finfo(float).tiny))
     parts = [
-        _parts(blow, kick, residues, motion) for blow, kick, motion in zip(group.blows, kicks, motions, strict=True)
+        _parts(blow, kick, residues, motion, lacking)
+        for blow, kick, motion, lacking in zip(group.blows, kicks, motions, group.lacking[:, row], strict=True)
     ]
     shared = np.concatenate([of_residues for _, of_residues in parts])
-    return np.asarray(np.diag(np.concatenate([own for own, _ in parts]) ** 2) + shared @ shared.T)
+    return np.hstack([np.diag(np.concatenate([own for own, _ in parts])), shared])
 
 
 def _parts(
-    blow: Blow, kick: tuple[ComplexArray, FloatArray] | None, residues: FloatArray, motion: float
+    blow: Blow, kick: tuple[ComplexArray, FloatArray] | None, residues: FloatArray, motion: float, lacking: float
 ) -> tuple[FloatArray, FloatArray]:
     """Give deviations of a blow's own leftovers, (count,), and what residues leave, (count, 2 n_poles)."""
     n = len(residues)
     if not blow.follows:
-        return np.zeros(1), np.zeros((1, 2 * n))
+        return np.array([0.0, lacking]), np.zeros((2, 2 * n))
     if kick is None:
-        return np.full(1 + 2 * n, motion), np.zeros((1 + 2 * n, 2 * n))
+        return np.array([motion, lacking, *[motion] * 2 * n]), np.zeros((2 + 2 * n, 2 * n))
     left, error = kick[0] * residues, kick[1] * residues
     real, imaginary = np.diag(left.real), np.diag(left.imag)
-    shared = np.block([[np.zeros((1, 2 * n))], [real, -imaginary], [-imaginary, -real]])
-    return np.concatenate([[motion], error, error]), shared
+    shared = np.block([[np.zeros((2, 2 * n))], [real, -imaginary], [-imaginary, -real]])
+    return np.concatenate([[motion, lacking], error, error]), shared
 
 
 def _unlike_levels(blows: tuple[Blow, ...]) -> FloatArray:
