@@ -4,9 +4,10 @@ Near the axis a constant c looks like c / s, which is largest at the bottom of t
 blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure, each mode
 with as much as the forces before have left it times one residue; what moves far below the band is as good as another
 constant. Where a recording begins within the ringing of the converter's filter before a blow, one sample more at its
-beginning stands for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in answer to it. On each line the FRF is
-left free, and what no FRF explains gives it, for all blows at once. What the blows do not tell, since they are of one
-level, stays in the recordings; how uncertain the constants are goes on with the blows.
+beginning stands for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in
+answer to it. On each line the FRF is left free, and what no FRF explains gives it, for all blows at once. What the
+blows do not tell, since they are of one level, stays in the recordings; how uncertain the constants are goes on with
+the blows.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolv
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """Blows at one place, and what may be in each: a constant, its beginning and, after another blow, decaying modes."""
+    """Blows at one place, and what may be in each: a constant, a first sample and, after another, decaying modes."""
 
     blows: tuple[Blow, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
