@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
 from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.options import DiagnoseOptions
 
 
 def test_lines_that_are_left_out_are_not_fitted(chain, strike):
@@ -74,3 +76,27 @@ def test_a_record_without_any_motion_is_looked_at_all_the_same(chain, strike, ra
 
 def blow_times(blow):
     return blow.step_s * np.arange(blow.n_samples)
+
+
+@pytest.mark.parametrize(("pause_s", "moves"), [(4.0, True), (40.0, False)], ids=["soon", "late"])
+def test_blows_before_the_structure_rests_start_in_motion(chain, strike, pause_s, moves):
+    """How far the modes may move then is what the strongest blow can have left."""
+    observations = strike()
+    first, *others = observations.blows
+    n = round(pause_s / first.step_s)
+    longer = [
+        replace(blow, number=2, force=np.resize(blow.force, n) * (np.arange(n) < blow.n_samples),
+                responses=np.pad(blow.responses, ((0, 0), (0, n - blow.n_samples))))
+        for blow in others
+    ]  # fmt: skip
+    struck_on = replace(observations, blows=(first, *longer))
+    plant, noise = make_plant(chain.model, struck_on), read_noise(struck_on)
+    stretches = transform(struck_on, plant, noise, Window(duration_s=1.0))
+    assert stretches.moving.tolist() == [False, *[moves] * len(others)]
+    assert np.all((stretches.pause_s > 0) == stretches.moving)
+    freedom = make_freedom(plant, stretches, struck_on.band_hz[1], DiagnoseOptions())
+    if moves:
+        unknown = make_freedom(plant, replace(stretches, pause_s=0 * stretches.pause_s), 75.0, DiagnoseOptions())
+        fastest, slowest = (freedom.starts / unknown.starts)[:, [-1, 0]].max(0)
+        assert fastest < 0.2 * slowest
+        assert slowest < 1.0

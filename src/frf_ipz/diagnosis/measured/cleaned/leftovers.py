@@ -3,11 +3,10 @@
 Near the axis a constant c looks like c / s, which is largest at the bottom of the band, and the few samples before a
 blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure, each mode
 with as much as the forces before have left it times one residue; what moves far below the band is as good as another
-constant. Where a recording begins within the ringing of the converter's filter before a blow, one sample more at its
-beginning stands for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in
-answer to it. On each line the FRF is left free, and what no FRF explains gives it, for all blows at once. What the
-blows do not tell, since they are of one level, stays in the recordings; how uncertain the constants are goes on with
-the blows.
+constant. Where a recording begins within the ringing of the converter's filter before a blow, its first samples stand
+for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in answer to it. On
+each line the FRF is left free, and what no FRF explains gives it, for all blows at once. What the blows do not tell,
+since they are of one level, stays in the recordings; how uncertain the constants are goes on with the blows.
 """
 
 from __future__ import annotations
@@ -40,13 +39,14 @@ ROUNDS = 3  # of weights: at first leftovers count as noise
 AKIN = 0.1  # of a sample's variance: noise that the samples before a blow have in common
 LEAST_RECORDS = 2  # of a shaker at a place: one alone tells no constant
 SHAKEN = 0.02  # of a shaker's largest force: with more it has started
+INSTEAD = 3  # first samples that stand for the ringing that a recording lacks
 LEAST_BEFORE = 4  # samples before a blow that tell what is left
 FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolve, where blows at a place show nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """Blows at one place, and what may be in each: a constant, a first sample and, after another, decaying modes."""
+    """Blows at one place, and what may be in each: a constant, first samples and, after another, decaying modes."""
 
     blows: tuple[Blow, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
@@ -62,8 +62,8 @@ class _Group:
         return min(blow.n_samples for blow in self.blows)
 
     def count(self, blow: Blow) -> int:
-        """Count what may be left in a blow: a constant, a first sample; after another one also cosines and sines."""
-        return 2 + 2 * len(self.poles) if blow.follows else 2
+        """Count what may be left in a blow: a constant, first samples; after another one also cosines and sines."""
+        return 1 + INSTEAD + (2 * len(self.poles) if blow.follows else 0)
 
     def shapes(self, blow: Blow) -> ComplexArray:
         """Transform unit leftovers, (n_lines / FINER, count)."""
@@ -73,16 +73,15 @@ class _Group:
             turn = np.exp((rates - s) * step)
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
-        first = np.hstack([transformed(np.zeros(1, complex)), np.full_like(s, step)])
+        first = np.hstack([transformed(np.zeros(1, complex)), step * np.exp(-s * step * np.arange(INSTEAD))])
         if not blow.follows:
             return first
         up, down = transformed(self.poles), transformed(self.poles.conj())
         return np.hstack([first, (up + down) / 2, (up - down) / 2j])
 
     def unit_signals(self, blow: Blow) -> FloatArray:
-        """Give unit leftovers in time, (count, n_samples)."""
-        first = np.ones((2, blow.n_samples))
-        first[1, 1:] = 0.0
+        """Give unit leftovers in time, (count, n_samples); first samples stay: FRFs allow for what they lack."""
+        first = np.vstack([np.ones(blow.n_samples), np.zeros((INSTEAD, blow.n_samples))])
         if not blow.follows:
             return first
         turning = np.exp(np.outer(self.poles, blow.step_s * np.arange(blow.n_samples)))
@@ -294,13 +293,14 @@ def _parts(
     """Give deviations of a blow's own leftovers, (count,), and what residues leave, (count, 2 n_poles)."""
     n = len(residues)
     if not blow.follows:
-        return np.array([0.0, lacking]), np.zeros((2, 2 * n))
+        return np.array([0.0, *[lacking] * INSTEAD]), np.zeros((1 + INSTEAD, 2 * n))
     if kick is None:
-        return np.array([motion, lacking, *[motion] * 2 * n]), np.zeros((2 + 2 * n, 2 * n))
+        own = np.array([motion, *[lacking] * INSTEAD, *[motion] * 2 * n])
+        return own, np.zeros((len(own), 2 * n))
     left, error = kick[0] * residues, kick[1] * residues
     real, imaginary = np.diag(left.real), np.diag(left.imag)
-    shared = np.block([[np.zeros((2, 2 * n))], [real, -imaginary], [-imaginary, -real]])
-    return np.concatenate([[motion, lacking], error, error]), shared
+    shared = np.block([[np.zeros((1 + INSTEAD, 2 * n))], [real, -imaginary], [-imaginary, -real]])
+    return np.concatenate([[motion, *[lacking] * INSTEAD], error, error]), shared
 
 
 def _unlike_levels(blows: tuple[Blow, ...]) -> FloatArray:

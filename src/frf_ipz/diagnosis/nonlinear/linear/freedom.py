@@ -14,6 +14,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.nonlinear.linear.plant import Deviations, Plant, PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.recorded.stretches import decayed
 from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ DIFFERENCE = 1e-5  # of a frequency or damping ratio: step of a derivative
 NEAREST = 4  # nodes that tell the slope of a shape
 START_SPREAD = 30.0  # times the size of a mode's response: a start that is not known at all
 RIGID_SPREAD = 3.0  # the same of a rigid-body mode, at whose frequency nothing drives it
+LEFT_SPREAD = 2.0  # times what the strongest blow can have left when the next comes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -321,8 +323,11 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
     starts = np.zeros((len(moving), len(modes)))
     if len(moving):
         response = np.abs(plant.at_inputs.shapes[stretches.input_of[moving]][:, modes]).max(1, keepdims=True)
-        impulse = np.sqrt(np.mean(np.abs(stretches.force[:, stretches.used]) ** 2, 1))[moving]
-        starts = np.where(rigid, RIGID_SPREAD, START_SPREAD) * response * impulse[:, None]
+        impulse = np.sqrt(np.mean(np.abs(stretches.force[:, stretches.used]) ** 2, 1))
+        unknown = np.where(rigid, RIGID_SPREAD, START_SPREAD) * response * impulse[moving, None]
+        pause = stretches.pause_s[moving]
+        left = LEFT_SPREAD * response * impulse.max() * decayed(plant, pause)[:, modes]
+        starts = np.where(pause[:, None] > 0, left, unknown)
     return Freedom(
         plant=plant,
         modes=modes,

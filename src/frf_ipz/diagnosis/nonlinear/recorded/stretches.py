@@ -40,6 +40,8 @@ QUIETER = 0.8  # of the largest motion of a record: with less in its first part,
 QUIET = 0.05  # of the largest motion of a record: with less, it has died away
 LOW = 0.5  # of the bottom of the band: slower drift is no motion of the structure
 OUTSIDE = 0.1  # of the response: how far the model is trusted above the band
+SLOWER = 0.5  # of the damping that the model states: with less, more is left of a blow when the next comes
+LEFT = 0.003  # of the motion after a blow: with less left at the next, that starts at rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +76,8 @@ class Stretches:
         Which of the observations' blows each stretch is of.
     moving : (n_blows,) bool array
         The structure moves at the start.
+    pause_s : (n_blows,) array
+        Time since the blow before of stretches that start in what that has left, about, s; 0 of all others.
     first_sample : (n_blows,) int array
         Of the recordings, at the start.
     window : Window
@@ -93,6 +97,7 @@ class Stretches:
     input_of: IntArray
     blow_of: IntArray
     moving: BoolArray
+    pause_s: FloatArray
     first_sample: IntArray
     window: Window
 
@@ -162,7 +167,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         If recordings differ in their time step.
     """
     step = common_step(observations)
-    cuts, n = _cuts(observations, window, step)
+    cuts, n = _cuts(observations, window, step, plant)
     sigma = DECAYS / (n * step)
     s = np.asarray(sigma + 2j * np.pi * np.fft.rfftfreq(n, step))
     force = np.zeros((len(cuts), len(s)), complex)
@@ -198,6 +203,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         input_of=np.array([plant.inputs.index(cut.blow.input_dof) for cut in cuts]),
         blow_of=np.array([cut.number for cut in cuts]),
         moving=np.array([cut.is_moving for cut in cuts]),
+        pause_s=np.array([cut.pause_s for cut in cuts]),
         first_sample=np.array([cut.start for cut in cuts]),
         window=window,
     )
@@ -221,19 +227,26 @@ class _Cut:
     start: int
     _: KW_ONLY
     is_moving: bool
+    pause_s: float = 0.0
 
 
-def _cuts(observations: Observations, window: Window, step: float) -> tuple[list[_Cut], int]:
+def decayed(plant: Plant, pause_s: FloatArray) -> FloatArray:
+    """Give how much of each mode is left after a pause, (n, n_modes), at most: damping may be less than is stated."""
+    return np.asarray(np.exp(-SLOWER * np.outer(pause_s, plant.damping_ratio * plant.omega_rad_s)))
+
+
+def _cuts(observations: Observations, window: Window, step: float, plant: Plant) -> tuple[list[_Cut], int]:
     """Where stretches start: at the blow, or, of a shaker, spread over the record."""
     blows, wanted = observations.blows, round(window.duration_s / step)
     if observations.kind == "hammer" and not window.start_s:
         pulses = [isolate_pulse(blow) for blow in blows]
         starts = [max(int(np.argmax(np.abs(pulse.blow.force) > 0)) - BEFORE, 0) for pulse in pulses]
         n = min(wanted, *(blow.n_samples - start for blow, start in zip(blows, starts, strict=True)))
+        pauses = [blow.duration_s if blow.follows and _is_left(plant, blow.duration_s) else 0.0 for blow in blows]
         return [
-            _Cut(i, pulse.blow, start, is_moving=False)
-            for i, (pulse, start) in enumerate(zip(pulses, starts, strict=True))
-        ], (_fast_length(n))
+            _Cut(i, pulse.blow, start, is_moving=pause > 0, pause_s=pause)
+            for i, (pulse, start, pause) in enumerate(zip(pulses, starts, pauses, strict=True))
+        ], _fast_length(n)
     shortest = min(blow.n_samples for blow in blows)
     n = _fast_length(min(wanted, shortest - 2 * EDGE))
     if observations.kind == "hammer":
@@ -253,6 +266,11 @@ def _cuts(observations: Observations, window: Window, step: float) -> tuple[list
         parts[int(np.argmin([abs(part - loudest) for part in parts]))] = loudest
         cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
     return cuts, n
+
+
+def _is_left(plant: Plant, pause_s: float) -> bool:
+    """Tell whether the structure still moves when the next blow comes."""
+    return bool(decayed(plant, np.array([pause_s]))[:, plant.n_rigid :].max() > LEFT)
 
 
 def _alive(size: FloatArray, n: int, room: int) -> int:
