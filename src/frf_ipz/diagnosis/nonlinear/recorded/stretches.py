@@ -186,8 +186,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     floor = np.where(frequency <= observations.band_hz[1], window.floor, OUTSIDE)
     known, of_force = _noise(plant, noise, s, sigma)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
-    forced = np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)
-    noisy = known + forced[:, None] * size
+    noisy = known + np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)[:, None] * size
     variance = np.where(present[..., None], noisy + floor**2 * size, np.inf)
     return Stretches(
         s=s,
