@@ -159,11 +159,12 @@ def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) ->
     is_hammer = observations.kind == "hammer"
     pulses = tuple(isolate_pulse(blow) if is_hammer else _whole(blow) for blow in blows)
     transformed = tuple(pulse.blow for pulse in pulses)
+    lines = lines_of_band(transformed, observations.band_hz, decay)
     found: list[LocalPole] = []
     residues = np.zeros((0, len(blows[0].sensors)))
     if any(blow.follows for blow in blows):
         from_rest = tuple(blow for blow in transformed if not blow.follows)
-        told = lines_of_band(from_rest or transformed, observations.band_hz, decay)
+        told = lines_of_band(from_rest, observations.band_hz, decay) if from_rest else lines
         found = _poles(told, decay)
         nearest = [int(np.argmin(np.abs(told.s - one.pole))) for one in found]
         away = np.array([np.abs(told.s[line] - one.pole) for line, one in zip(nearest, found, strict=True)])
@@ -171,7 +172,7 @@ def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) ->
     return _Group(
         blows=blows,
         pulses=pulses,
-        lines=lines_of_band(transformed, observations.band_hz, decay),
+        lines=lines,
         poles=np.array([one.pole for one in found], complex),
         pole_stds=np.array([one.std_rad_s for one in found]),
         residues=residues,
