@@ -24,19 +24,29 @@ INTEGRATION = 1e-9  # relative: far below the noise
 
 
 @pytest.fixture(scope="session")
-def chain(tmp_path_factory):
+def chain_like(tmp_path_factory):
+    """Makes models of the chain, of another damping or stiffness."""
+
+    def make(*, ratio=RATIO, stiffness_n_m=STIFFNESS_N_M):
+        text = f'[model]\nkind = "lumped"\nname = "chain"\n[damping]\nmodal_ratio = {ratio}\n[lumped]\ndirection = "x"\n'
+        for node in range(1, N + 1):
+            text += f"[[lumped.mass]]\nnode = {node}\nmass_kg = {MASS_KG}\n"
+            text += f'[[lumped.spring]]\nid = "k{node}"\nnodes = [{node - 1}, {node}]\nstiffness_N_m = {stiffness_n_m}\n'
+        path = tmp_path_factory.mktemp("chain") / "model.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_model(path)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def chain(chain_like):
     """Model, and the same as matrices."""
-    text = f'[model]\nkind = "lumped"\nname = "chain"\n[damping]\nmodal_ratio = {RATIO}\n[lumped]\ndirection = "x"\n'
-    for node in range(1, N + 1):
-        text += f"[[lumped.mass]]\nnode = {node}\nmass_kg = {MASS_KG}\n"
-        text += f'[[lumped.spring]]\nid = "k{node}"\nnodes = [{node - 1}, {node}]\nstiffness_N_m = {STIFFNESS_N_M}\n'
-    path = tmp_path_factory.mktemp("chain") / "model.toml"
-    path.write_text(text, encoding="utf-8")
     K = STIFFNESS_N_M * (2 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
     K[-1, -1] = STIFFNESS_N_M
     values, shapes = np.linalg.eigh(K / MASS_KG)
     C = shapes @ np.diag(2 * RATIO * np.sqrt(values)) @ shapes.T * MASS_KG
-    return SimpleNamespace(model=read_model(path), M=MASS_KG * np.eye(N), K=K, C=C)
+    return SimpleNamespace(model=chain_like(), M=MASS_KG * np.eye(N), K=K, C=C)
 
 
 def pulse(time_s, peak_n):

@@ -18,7 +18,8 @@ def a_fit(log_evidence, name="local_stiffness"):
 
 
 def goodness_of(score, underrated=1.0):
-    return SimpleNamespace(is_good=score <= 1, score=score, times_underrated=underrated)
+    needed = underrated * LIMITS["hammer"].found_nats
+    return SimpleNamespace(is_good=score <= 1, score=score, times_underrated=underrated, needed_nats=needed)
 
 
 def found(score):
@@ -77,3 +78,17 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
     decided = decision.decide(SimpleNamespace(kind=kind), lambda *_: None)
     assert decided.verdict == verdict
     assert decided.final is (best if verdict == "explained" else null)
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(1.0, "explained"), (1.7, "consistent")])
+def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(monkeypatch, left, verdict):
+    """A resonance that the nominal model lacks is one piece of one FRF; errors of the data stay beside any cause."""
+    null, best = a_fit(ALONE, ""), a_fit(ALONE + 33.0, "attached_resonator")
+    best.is_nearly_all = True
+    monkeypatch.setattr(decision, "fit_nothing", lambda _: null)
+    monkeypatch.setattr(decision, "goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else left))
+    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
+    monkeypatch.setattr(decision, "is_significant", lambda *_: True)
+    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
+    assert decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None).verdict == verdict

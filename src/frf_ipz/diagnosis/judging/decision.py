@@ -73,7 +73,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     null_good = goodness(bench, null)
     progress(0.3, "searching for one cause")
     ranking = search(bench, null)
-    needed = null_good.needed_nats
+    needed = _needed(bench, null_good, ranking.best)
     if not null_good.is_good or gain_over(ranking.best, null) >= needed:
         ranking = settle_ties(bench, ranking)
     if ranking.best.is_nearly_all and not goodness(bench, ranking.best).is_good:
@@ -100,6 +100,12 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     progress(0.8, "searching for a third cause")
     three = _beside(bench, two, search_beside(bench, second.best, STRONG_NATS))
     return three if three is not None and three.verdict == EXPLAINED else two
+
+
+def _needed(bench: Bench, null_good: Goodness, best: Fit) -> float:
+    """Evidence that a first cause must have: where it leaves less of a piece, that piece's errors are not underrated."""
+    left = goodness(bench, best).times_underrated
+    return null_good.needed_nats * min(1.0, left / null_good.times_underrated)
 
 
 def _enough(bench: Bench, one: Decision) -> Decision:

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant, PlantResponse
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
-TURNS, SETTLED = 8, 0.01  # the unknowns change how a place reaches the sensors; relative drop that is worth a turn
+TURNS, SETTLED = 16, 0.01  # the unknowns change how a place reaches the sensors; relative drop that is worth a turn
+TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a turn: shorter and shorter steps until one lowers the cost
 TIE = 15.0  # of the cost: less tells no place from another
 POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
 LEAST_SENSORS = 2
@@ -93,29 +94,23 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
     FreeForce
         The best turn.
     """
-    freedom, used = linear.freedom, stretches.used
-    weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    unknowns = linear.as_stated
-    force = np.zeros((stretches.n_blows, len(used)), complex)
-    found: list[FreeForce] = []
+    best = _across(stretches, linear, place, linear.as_stated)
+    used, damping = stretches.used, 0.0
     for _ in range(TURNS):
-        response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns, place))
-        shown = linear_motion(stretches, freedom, response)
-        shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
-        misfit = (stretches.motion - shown)[:, :, used] * weight
-        columns = freedom.columns(stretches, response.on(used), -force, place)
-        reach = response.to_sensors(place)[:, used] * weight
-        across = as_real(_across(reach, np.concatenate([columns, misfit[None]])))
-        rows, left = across[:-1], across[-1]
-        step = solve_even(rows @ rows.T + np.eye(len(rows)), rows @ left - unknowns)
-        unknowns = unknowns + step
-        left = left - step @ rows
-        force = -_along(reach, misfit - np.tensordot(step, columns, 1))
-        cost = float(left @ left + unknowns @ unknowns)
-        found.append(FreeForce(place=place, cost=cost, force=force, unknowns=unknowns))
-        if len(found) > 1 and cost > (1 - SETTLED) * found[-2].cost:
+        columns = linear.freedom.columns(stretches, best.response.on(used), best.along, place)
+        rows = as_real(columns - best.reach * _along(best.reach, columns)[..., None, :])
+        normal, slope = rows @ rows.T + np.eye(len(rows)), rows @ best.left - best.unknowns
+        for _ in range(TRIALS):
+            step = solve_even(normal + damping * np.diag(np.diag(normal)), slope)
+            tried = _across(stretches, linear, place, best.unknowns + step)
+            if tried.cost < best.cost:
+                break
+            damping = max(STIFFER * damping, LEAST_DAMPING)
+        if tried.cost > (1 - SETTLED) * best.cost:
             break
-    return min(found, key=lambda one: one.cost)
+        best, damping = tried, damping / STIFFER
+    best = min(best, tried, key=lambda one: one.cost)
+    return FreeForce(place=place, cost=best.cost, force=-best.along, unknowns=best.unknowns)
 
 
 def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
@@ -182,11 +177,49 @@ def start_at(stretches: Stretches, linear: LinearFit, free: FreeForce, law: Law)
     return best
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Across:
+    """What any force at a place leaves, and which force it is.
+
+    Parameters
+    ----------
+    response : PlantResponse
+        Of the linear model with its unknowns.
+    reach : (n_blows, n_sensors, n_used) complex array
+        How the place reaches the sensors, weighted.
+    along : (n_blows, n_used) complex array
+        Force on the structure that takes up all it can, N s.
+    left : (n_rows,) array
+        What it leaves, weighted.
+    unknowns : (n_unknowns,) array
+        Of the linear model, in prior standard deviations.
+    cost : float
+        Sum of squares of what is left, and of the unknowns.
+    """
+
+    response: PlantResponse
+    reach: ComplexArray
+    along: ComplexArray
+    left: FloatArray
+    unknowns: FloatArray
+    cost: float
+
+
+def _across(stretches: Stretches, linear: LinearFit, place: int, unknowns: FloatArray) -> _Across:
+    freedom, used = linear.freedom, stretches.used
+    weight = 1 / np.sqrt(stretches.variance[:, :, used])
+    response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns, place))
+    shown = linear_motion(stretches, freedom, response)
+    shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+    misfit = (stretches.motion - shown)[:, :, used] * weight
+    reach = response.to_sensors(place)[:, used] * weight
+    along = _along(reach, misfit)
+    left = as_real(misfit - reach * along[:, None])
+    cost = float(left @ left + unknowns @ unknowns)
+    return _Across(response=response, reach=reach, along=along, left=left, unknowns=unknowns, cost=cost)
+
+
 def _along(reach: ComplexArray, values: ComplexArray) -> ComplexArray:
     """(..., n_blows, n_used) part of weighted values (..., n_blows, n_sensors, n_used) along the reach of a force."""
     square = np.maximum(np.sum(np.abs(reach) ** 2, 1), np.finfo(float).tiny)
     return np.asarray(np.sum(reach.conj() * values, -2) / square)
-
-
-def _across(reach: ComplexArray, values: ComplexArray) -> ComplexArray:
-    return np.asarray(values - reach * _along(reach, values)[..., None, :])
