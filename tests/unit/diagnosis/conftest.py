@@ -28,10 +28,14 @@ def chain_like(tmp_path_factory):
     """Makes models of the chain, of another damping or stiffness."""
 
     def make(*, ratio=RATIO, stiffness_n_m=STIFFNESS_N_M):
-        text = f'[model]\nkind = "lumped"\nname = "chain"\n[damping]\nmodal_ratio = {ratio}\n[lumped]\ndirection = "x"\n'
+        text = (
+            f'[model]\nkind = "lumped"\nname = "chain"\n[damping]\nmodal_ratio = {ratio}\n[lumped]\ndirection = "x"\n'
+        )
         for node in range(1, N + 1):
             text += f"[[lumped.mass]]\nnode = {node}\nmass_kg = {MASS_KG}\n"
-            text += f'[[lumped.spring]]\nid = "k{node}"\nnodes = [{node - 1}, {node}]\nstiffness_N_m = {stiffness_n_m}\n'
+            text += (
+                f'[[lumped.spring]]\nid = "k{node}"\nnodes = [{node - 1}, {node}]\nstiffness_N_m = {stiffness_n_m}\n'
+            )
         path = tmp_path_factory.mktemp("chain") / "model.toml"
         path.write_text(text, encoding="utf-8")
         return read_model(path)

@@ -103,7 +103,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
 
 
 def _needed(bench: Bench, null_good: Goodness, best: Fit) -> float:
-    """Evidence that a first cause must have: where it leaves less of a piece, that piece's errors are not underrated."""
+    """Evidence that a first cause must have: where it leaves less of a piece, errors there are not underrated."""
     left = goodness(bench, best).times_underrated
     return null_good.needed_nats * min(1.0, left / null_good.times_underrated)
 
