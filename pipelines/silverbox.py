@@ -99,7 +99,7 @@ def show(found: LawSearch, stiffness: float) -> None:
     for finding in found.findings:
         numbers = {name: f"{one.value:.4g} +- {one.std:.2g}" for name, one in finding.parameters.items()}
         print(f"  {finding.effect}: {finding.log_evidence_gain:.0f} nats, {numbers}")
-    for when, misfit in (("linear", found.before), ("with the law", found.after)):
+    for when, misfit in (("linear", found.updated), ("with the law", found.after)):
         print(f"  {when}: {misfit.training:.2%} of the response is left, {misfit.training_noise:.3g} times the noise")
     print(f"  k3 / k1 = {found.fit.strength / stiffness:.3g} 1/V^2")
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, Diagnosis, Gate, Misfit
+from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, Diagnosis, Gate, LawAtWork, Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.dofs import Dof
@@ -270,6 +270,25 @@ def many_frfs(n_frfs, n_lines):
             averages=np.full(n_frfs, 5),
         ),
         blows=pd.DataFrame(),
+    )
+
+
+def synthetic_law():
+    """A cubic spring of 1e9 N/m^3 in a blow of 20 Hz that it stiffens; a thousandth of it is left."""
+    time = np.linspace(0, 2, 2001)
+    motion = 1e-3 * np.exp(-time) * np.sin(2 * np.pi * 20 * time)
+    return LawAtWork(
+        motion_m=motion,
+        velocity_m_s=np.gradient(motion, time),
+        force_N=1e9 * motion**3,
+        blow="hits/p1_01.csv",
+        is_held_out=True,
+        channel="acc_1",
+        response="acceleration",
+        time_s=time,
+        measured=motion,
+        without=0.5 * motion,
+        simulated=0.999 * motion,
     )
 
 

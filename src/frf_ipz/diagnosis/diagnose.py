@@ -271,9 +271,9 @@ def _unless_a_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
 def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
     found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
-    before, after = laws.before or linear.before, laws.after or linear.updated
+    before, updated, after = laws.before or linear.before, laws.updated or linear.updated, laws.after or linear.updated
     is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.beyond_linear)) > LAW_NATS
-    is_worse = laws.verdict == UNEXPLAINED and after.held_out > before.held_out
+    is_worse = laws.verdict == UNEXPLAINED and after.held_out > updated.held_out
     n_findings = 1 if is_needed and not is_worse else 0
     linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
     return replace(
@@ -282,11 +282,13 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         findings=found[:n_findings],
         alternatives=found[n_findings:],
         before=before,
-        after=after if n_findings else before,
+        updated=updated,
+        after=after if n_findings else updated,
         mismatch_location=laws.place or (found[0].location if n_findings else {}),
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
+        at_work=None if linearised is None else laws.at_work,
         remains="",
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -144,6 +145,39 @@ class Linearised:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LawAtWork:
+    """A force law at its place in time, to be drawn.
+
+    Parameters
+    ----------
+    motion_m, velocity_m_s, force_N : (n_times,) array
+        Of the place in the blow that moves it most, as far as the law was fitted to it, and of the law there.
+    blow : str
+        Whose response is shown; empty where all blows start in motion, which is not simulated.
+    is_held_out : bool
+        That blow was not shown to the fit.
+    channel, response : str
+        Which sensor, the one in which the law shows most, and what it measures: ``acceleration``, for example.
+    time_s : (n_samples,) array
+        s from the start.
+    measured, without, simulated : (n_samples,) array
+        As measured, and of the fitted model without the law and with it, SI.
+    """
+
+    motion_m: FloatArray
+    velocity_m_s: FloatArray
+    force_N: FloatArray  # noqa: N815  a unit
+    blow: str = ""
+    is_held_out: bool = False
+    channel: str = ""
+    response: str = ""
+    time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    measured: FloatArray = field(default_factory=lambda: np.zeros(0))
+    without: FloatArray = field(default_factory=lambda: np.zeros(0))
+    simulated: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Diagnosis:
     """What is missing from a nominal model, if anything.
 
@@ -186,6 +220,8 @@ class Diagnosis:
         What the user has to know.
     linearised : Linearised, optional
         The force law among the findings, for linear models.
+    at_work : LawAtWork, optional
+        The same in time, to be drawn.
     """
 
     verdict: str
@@ -208,6 +244,7 @@ class Diagnosis:
     numbers: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     linearised: Linearised | None = None
+    at_work: LawAtWork | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.ingest.units import si_unit
 from frf_ipz.plotting.curves import Q95
-from frf_ipz.plotting.style import FAINT, UPDATED, axes_or_new, colour, dash, label_axes
+from frf_ipz.plotting.style import FAINT, MEASURED, UPDATED, axes_or_new, colour, dash, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.diagnosis import Diagnosis, LawAtWork
     from frf_ipz.diagnosis.measured.levels import LevelDependence
 
 MOST_RANKED = 12
@@ -106,6 +107,31 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     ax.set_yscale("log")
     ax.set_xticks(place, list(steps))
     return label_axes(ax, "", "Normalised FRF error, %")
+
+
+def plot_law(law: LawAtWork, *, ax: Axes | None = None) -> Axes:
+    """Draw a blow as measured, with a force law and without it; the law's force, where no blow was simulated.
+
+    Parameters
+    ----------
+    law : LawAtWork
+        Of a diagnosis.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Responses over time, or the force over the motion of its place.
+    """
+    ax = axes_or_new(ax)
+    if not law.blow:
+        ax.plot(law.motion_m, law.force_N, color=UPDATED, linewidth=0.8)
+        return label_axes(ax, "Motion of the place, m", "Force of the law, N", legend=False)
+    ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.blow}")
+    ax.plot(law.time_s, law.without, color=FAINT, linestyle=dash(1), linewidth=0.8, label="without the law")
+    ax.plot(law.time_s, law.simulated, color=UPDATED, linewidth=0.8, label="with the law")
+    return label_axes(ax, "Time, s", f"{law.response.capitalize()}, {si_unit(law.response)}")
 
 
 def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:

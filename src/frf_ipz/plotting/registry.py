@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from matplotlib.figure import Figure
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.plotting.diagnosis import plot_levels, plot_mismatch, plot_proof, plot_ranking
+from frf_ipz.plotting.diagnosis import plot_law, plot_levels, plot_mismatch, plot_proof, plot_ranking
 from frf_ipz.plotting.frfs import plot_coherence, plot_fit, plot_frfs, plot_misfit, plot_phases
 from frf_ipz.plotting.poles import plot_pairs, plot_pole_zero_map, plot_stabilization
 from frf_ipz.plotting.recordings import plot_blows, plot_structure
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
@@ -58,6 +59,7 @@ PICTURES: dict[str, _Entry] = {
     "mismatch": _Entry(("diagnose",), plot_mismatch),
     "ranking": _Entry(("diagnose",), plot_ranking),
     "proof": _Entry(("diagnose",), plot_proof),
+    "law": _Entry(("diagnose",), lambda diagnosis: _law(diagnosis)),
     "levels": _Entry(("levels",), lambda levels: _levels(levels)),
 }
 
@@ -120,6 +122,12 @@ def _change(updated: UpdatedModel) -> Axes:
             "the update of this run has not changed named parts of the FE model, so there is no such picture"
         )
     return plot_stiffness_change(updated.parts)
+
+
+def _law(diagnosis: Diagnosis) -> Axes:
+    if diagnosis.at_work is None:
+        raise InputError("the diagnosis of this run has found no force law, so there is no such picture")
+    return plot_law(diagnosis.at_work)
 
 
 def _levels(levels: LevelDependence) -> Axes:

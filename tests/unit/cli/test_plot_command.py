@@ -8,7 +8,7 @@ from demo_case import make_demo
 from frf_ipz.cli import main as command
 
 KINDS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
-OF_DIAGNOSIS = {"mismatch", "ranking", "proof", "levels"}
+OF_DIAGNOSIS = {"mismatch", "ranking", "proof", "law", "levels"}
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 from frf_ipz.errors import InputError
 from frf_ipz.plotting.registry import PICTURES, draw, picture_names
 from frf_ipz.plotting.style import FORMATS, save_figure
-from synthetic_run import Folder, synthetic_folder
+from synthetic_run import Folder, synthetic_folder, synthetic_law
 
 OF_A_DIAGNOSIS = {"mismatch", "ranking", "proof"}
 STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
@@ -18,7 +18,9 @@ STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
 
 @pytest.fixture(scope="module")
 def folder():
-    return synthetic_folder(diagnosed=True)
+    made = synthetic_folder(diagnosed=True)
+    made.results["diagnose"] = replace(made.results["diagnose"], at_work=synthetic_law())
+    return made
 
 
 @pytest.mark.parametrize("name", sorted(PICTURES))
@@ -56,6 +58,17 @@ def test_a_run_with_one_level_has_no_picture_of_levels(folder):
     one = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
     with pytest.raises(InputError, match="no place was struck at several levels"):
         draw("levels", Folder(results={"levels": one}, record={}, stale=()))
+
+
+def test_a_run_without_a_law_has_no_picture_of_one():
+    with pytest.raises(InputError, match="no force law"):
+        draw("law", synthetic_folder(diagnosed=True))
+
+
+def test_the_force_of_a_law_is_drawn_where_no_blow_was_simulated(folder):
+    force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), blow=""))
+    figure = draw("law", Folder(results={"diagnose": force_alone}, record={}, stale=()))
+    assert figure.axes[0].get_ylabel() == "Force of the law, N"
 
 
 def test_names_are_in_the_order_of_the_chain():

@@ -79,7 +79,8 @@ def findings_of(
         listed = mine[: min(int(np.searchsorted(share, LISTED)) + 1, MOST_PLACES)]
         numbers = _numbers(fit, scale)
         places = tuple(dict(plant.places[fits[i].place].location) for i in listed)
-        says = f"At {place.words} sits {fit.law.phrase.format(f'{fit.strength:.3g}')} that the model lacks."
+        what = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
+        says = f"At {place.words} sits {what} that the model lacks."
         found[fit.law.name] = Finding(
             effect=fit.law.name,
             location=dict(place.location),

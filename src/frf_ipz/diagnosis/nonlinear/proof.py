@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 
-def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit, Misfit]:
-    """Compare the linear model with its tolerances, and the law, with what was fitted and what was held out.
+def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit, Misfit, Misfit]:
+    """Compare the nominal model, the same with its tolerances, and the law, with what was fitted and was held out.
 
     Parameters
     ----------
@@ -34,25 +34,24 @@ def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit
 
     Returns
     -------
-    before, after : Misfit
+    before, updated, after : Misfit
         Not a number where nothing was held out, or where it starts in motion.
     """
     freedom, stretches = track.linear.freedom, track.stretches
-    training = (
-        _figures(stretches, _linear(stretches, freedom, track.linear.unknowns)),
-        _figures(stretches, fit.misfit),
-    )
-    other = [(np.nan, np.nan), (np.nan, np.nan)]
+    models = track.linear.as_stated, track.linear.unknowns
+    training = [_figures(stretches, _linear(stretches, freedom, unknowns)) for unknowns in models]
+    training.append(_figures(stretches, fit.misfit))
+    other = [(np.nan, np.nan)] * len(training)
     if held_out is not None and not held_out.moving.any():
         resting, unknowns = freedom.without_starts(fit.unknowns)
         simulated = shoot(held_out, resting, fit.start(unknowns), iterations=0).misfit
-        plain = _linear(held_out, resting, freedom.without_starts(track.linear.unknowns)[1])
-        other = [_figures(held_out, plain), _figures(held_out, simulated)]
-    before, after = (
+        plain = [_linear(held_out, resting, freedom.without_starts(model)[1]) for model in models]
+        other = [_figures(held_out, misfit) for misfit in (*plain, simulated)]
+    before, updated, after = (
         Misfit(training=mine[0], held_out=its[0], training_noise=mine[1], held_out_noise=its[1])
         for mine, its in zip(training, other, strict=True)
     )
-    return before, after
+    return before, updated, after
 
 
 def _linear(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> FloatArray:

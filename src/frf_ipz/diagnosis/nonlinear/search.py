@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.nonlinear.at_work import show_law
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
@@ -37,7 +38,7 @@ from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.diagnosis import Misfit
+    from frf_ipz.diagnosis.diagnosis import LawAtWork, Misfit
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.nonlinear.beyond import Agreement
     from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
@@ -90,8 +91,8 @@ class LawSearch:
         The best place of each law, the most probable first; empty for a linear system.
     beyond_linear : float
         Evidence of the first finding beyond anything linear, nats; NaN where stretches start in motion.
-    before, after : Misfit
-        Of the linear model with its tolerances, and with the first finding.
+    before, updated, after : Misfit
+        Of the nominal model, of the same with its tolerances, and with the first finding.
     statement : str
         The verdict in a sentence or two.
     plant : Plant, optional
@@ -106,6 +107,8 @@ class LawSearch:
         What was taken back of the converters' dispersion before the law was fitted, see `without_dispersion`; rad.
     is_early : bool
         The law explains first moments only: what it misses later grows from small errors of the model.
+    at_work : LawAtWork, optional
+        The best law in time, to be drawn.
     """
 
     verdict: str
@@ -113,6 +116,7 @@ class LawSearch:
     findings: tuple[Finding, ...] = ()
     beyond_linear: float = np.nan
     before: Misfit | None = None
+    updated: Misfit | None = None
     after: Misfit | None = None
     statement: str = ""
     plant: Plant | None = None
@@ -121,6 +125,7 @@ class LawSearch:
     place: Mapping[str, object] = field(default_factory=dict)
     dispersion_rad: float = 0.0
     is_early: bool = False
+    at_work: LawAtWork | None = None
 
     @property
     def is_nonlinear(self) -> bool:
@@ -195,8 +200,10 @@ def search_laws(
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
-    before, after = prove(look.long, look.recordings.held_out_as(look.long), found.fit)
-    return replace(found, freedom=look.long.linear.freedom, before=before, after=after)
+    before, updated, after = prove(look.long, look.recordings.held_out_as(look.long), found.fit)
+    at_work = show_law(look.recordings, look.long, found.fit)
+    freedom = look.long.linear.freedom
+    return replace(found, freedom=freedom, before=before, updated=updated, after=after, at_work=at_work)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

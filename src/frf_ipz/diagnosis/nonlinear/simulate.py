@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.fitting.march import March
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
+    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.dofs import Dof
@@ -35,8 +36,9 @@ class Simulation:
     ----------
     step_s : float
         Time step, s.
-    measured, simulated : (n_blows, n_sensors, n_samples) array
-        Responses from shortly before each blow on, in the sensors' quantities and signs; 0 where a blow lacks a sensor.
+    measured, simulated, without : (n_blows, n_sensors, n_samples) array
+        Responses from shortly before each blow on, as measured, with the law and without it, in the sensors' quantities
+        and signs; 0 where a blow lacks a sensor.
     motion : (n_blows, n_samples) array
         Of the law's place, m.
     force : (n_blows, n_samples) array
@@ -48,13 +50,14 @@ class Simulation:
     step_s: float
     measured: FloatArray
     simulated: FloatArray
+    without: FloatArray
     motion: FloatArray
     force: FloatArray
     misfit: FloatArray
 
 
-def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simulation:
-    """Simulate whole records.
+def simulate(observations: Observations, freedom: Freedom, fit: LawFit, *, duration_s: float = np.inf) -> Simulation:
+    """Simulate records.
 
     Parameters
     ----------
@@ -65,6 +68,8 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
         The law at its place.
+    duration_s : float
+        How much of each record, s; all of it unless told.
 
     Returns
     -------
@@ -76,13 +81,15 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit) -> Simul
     InputError
         If a record starts in motion.
     """
-    place, done = _whole(observations, freedom, fit)
+    place, done = _in_time(observations, freedom, fit, duration_s)
     stretches, shown = place.stretches, _sensors(place, done.force)
-    measured = _measured(observations, stretches)
+    measured = _measured(observations, freedom.plant, stretches)
+    is_there = np.abs(measured).max(-1, keepdims=True) > 0
     return Simulation(
         step_s=stretches.step_s,
         measured=measured,
-        simulated=shown * (np.abs(measured).max(-1, keepdims=True) > 0),
+        simulated=shown * is_there,
+        without=_sensors(place, np.zeros_like(done.force)) * is_there,
         motion=done.motion[:, ::FINER],
         force=done.force[:, ::FINER],
         misfit=_misfit(measured, shown, stretches.step_s, observations),
@@ -111,9 +118,9 @@ def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Ob
     InputError
         If a record starts in motion.
     """
-    place, done = _whole(observations, freedom, fit)
+    place, done = _in_time(observations, freedom, fit, np.inf)
     added = _sensors(place, done.force) - _sensors(place, np.zeros_like(done.force))
-    blows, keys = list(observations.blows), _channels(observations)
+    blows, keys = list(observations.blows), _channels(freedom.plant)
     for row, number in enumerate(place.stretches.blow_of):
         blow, start = blows[number], place.stretches.first_sample[row]
         left = blow.responses.copy()
@@ -123,10 +130,11 @@ def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Ob
     return replace(observations, blows=tuple(blows))
 
 
-def _whole(observations: Observations, freedom: Freedom, fit: LawFit) -> tuple[PlaceInTime, March]:
-    """Go through whole records."""
-    whole = Window(duration_s=max(blow.duration_s for blow in observations.blows), loudest=False)
-    stretches = transform(observations, freedom.plant, read_noise(observations), whole)
+def _in_time(observations: Observations, freedom: Freedom, fit: LawFit, duration_s: float) -> tuple[PlaceInTime, March]:
+    """Go through records, or the first part of them."""
+    longest = max(blow.duration_s for blow in observations.blows)
+    window = Window(duration_s=min(duration_s, longest), loudest=False)
+    stretches = transform(observations, freedom.plant, read_noise(observations), window)
     if stretches.moving.any():
         raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
@@ -134,8 +142,8 @@ def _whole(observations: Observations, freedom: Freedom, fit: LawFit) -> tuple[P
     return place, march(fit.law, (fit.strength, fit.shape), yielding, *place.without_law())
 
 
-def _channels(observations: Observations) -> list[tuple[str, Dof]]:
-    return list(dict.fromkeys((s.channel, s.dof) for blow in observations.blows for s in blow.sensors))
+def _channels(plant: Plant) -> list[tuple[str, Dof]]:
+    return [(sensor.channel, sensor.dof) for sensor in plant.sensors]
 
 
 def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
@@ -159,9 +167,9 @@ def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
     return shown
 
 
-def _measured(observations: Observations, stretches: Stretches) -> FloatArray:
+def _measured(observations: Observations, plant: Plant, stretches: Stretches) -> FloatArray:
     found = np.zeros((stretches.n_blows, stretches.motion.shape[1], stretches.n_samples))
-    keys = _channels(observations)
+    keys = _channels(plant)
     for row, number in enumerate(stretches.blow_of):
         blow, start = observations.blows[number], stretches.first_sample[row]
         for sensor, response in zip(blow.sensors, blow.responses, strict=True):

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging import law_beside
 from frf_ipz.diagnosis.judging.law_beside import STRAINED
+from frf_ipz.diagnosis.nonlinear.at_work import show_law
 from frf_ipz.diagnosis.nonlinear.beyond import Agreement
 from frf_ipz.diagnosis.nonlinear.findings import is_told
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
@@ -60,6 +62,36 @@ def test_whole_records_of_all_levels_are_simulated(solved):
     simulation = simulate(observations, found.freedom, found.fit)
     assert simulation.simulated.shape == simulation.measured.shape
     assert (simulation.misfit < 2 * HELD_OUT).all()
+
+
+def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
+    *_, observations, found = solved
+    law = found.at_work
+    assert (law.blow, law.is_held_out, law.response) == ("blow 55 N", True, "acceleration")
+    blow = next(blow for blow in observations.blows if blow.name == law.blow)
+    row = [sensor.channel for sensor in blow.sensors].index(law.channel)
+    assert set(law.measured) <= set(blow.responses[row])
+    left, without = (np.linalg.norm(law.measured - model) for model in (law.simulated, law.without))
+    assert left < 2 * HELD_OUT * np.linalg.norm(law.measured)
+    assert without > 5 * left
+    force = found.fit.strength * found.fit.law.unit_force(law.motion_m, law.velocity_m_s, found.fit.shape)
+    np.testing.assert_array_equal(law.force_N, force)
+    assert np.abs(law.motion_m).max() == np.abs(found.fit.motion).max()
+
+
+def test_blows_that_start_in_motion_show_the_force_alone(solved):
+    *_, observations, found = solved
+    moving = replace(observations, blows=tuple(replace(blow, number=2) for blow in observations.blows))
+    recordings = SimpleNamespace(training=moving, held_out=replace(moving, blows=()))
+    law = show_law(recordings, None, found.fit)
+    assert (law.blow, len(law.time_s)) == ("", 0)
+    assert np.abs(law.force_N).max() > 0
+
+
+def test_the_model_as_it_is_misses_no_less_than_within_its_tolerances(solved):
+    """In what the fit counts; the chain's model is right but for the law."""
+    found = solved[-1]
+    assert found.after.training_noise < found.updated.training_noise < found.before.training_noise
 
 
 def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, strike, monkeypatch):

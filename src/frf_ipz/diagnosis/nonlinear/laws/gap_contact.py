@@ -16,7 +16,7 @@ class GapContact(Law):
     name = "gap_contact"
     strength_name = "contact_stiffness_N_m"
     shape_name = "gap_m"
-    phrase = "a stop with a contact stiffness of {} N/m"
+    phrase = "a stop behind a gap of {1} m, with a contact stiffness of {0} N/m,"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
         """Say how far the motion goes beyond the gap."""

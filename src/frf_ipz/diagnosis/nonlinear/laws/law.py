@@ -44,7 +44,7 @@ class Law(ABC):
     degree: ClassVar[float] = 2.0
     """Power of the motion that the work of the force grows with."""
     phrase: ClassVar[str] = ""
-    """What sits at the place, in words, with the strength in braces as a number with its unit."""
+    """What sits at the place, in words: ``{}`` is the strength, or ``{0}`` the strength and ``{1}`` the shape."""
 
     @abstractmethod
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:

@@ -10,6 +10,7 @@ from frf_ipz.diagnosis.finding import Estimate
 from frf_ipz.report.findings import place_of_mismatch, plain_signs, verdict_of
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
+from frf_ipz.report.sections.diagnosis.law import law_pictures
 from frf_ipz.report.sections.diagnosis.levels import level_pictures
 from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, number, percent, with_error
@@ -26,6 +27,7 @@ POWERS = {"exponentformat": "power", "dtick": 1}
 SURELY_NOT = 1e-6  # a probability below is written as being below
 CLOSE = 0.8  # of the best evidence: where all explanations gain more, their differences are drawn
 SLIVER = 1e-4  # of the longest bar: all that is drawn of a loss, so that its text still shows
+BESIDE_LABELS_PX = 10  # from names of FRFs to the title of their axis
 WIDE = 30.0  # ratio of evidences from which their axis is logarithmic
 
 
@@ -52,6 +54,7 @@ def build(run: RunContents) -> Section | None:
         gains = [one.log_evidence_gain for one in (*diagnosis.findings, *diagnosis.alternatives)]
         blocks += [_ranking(diagnosis)] if max(gains) > 0 else []
         blocks.append(_findings(diagnosis))
+    blocks += law_pictures(diagnosis.at_work)
     blocks.append(_proof(diagnosis))
     if diagnosis.curves is not None:
         blocks.append(_curves(diagnosis.curves, run.band_hz, _explained(diagnosis)))
@@ -69,33 +72,45 @@ def _map(diagnosis: Diagnosis) -> Picture:
     table = diagnosis.mismatch
     names = list(dict.fromkeys(table["frf"].astype(str)))
     bands = sorted({(float(low), float(high)) for low, high in zip(table["low_hz"], table["high_hz"], strict=True)})
+    titles = _maps(diagnosis)
     traces: list[Trace] = []
-    top = float(np.log10(max(float(table[["before", "after"]].to_numpy(float).max()), 3.0)))
-    for rank, column in enumerate(("before", "after")):
+    top = float(np.log10(max(float(table[list(titles)].to_numpy(float).max()), 3.0)))
+    for rank, column in enumerate(titles):
         values = np.full((len(names), len(bands)), np.nan)
         for row in table.to_dict("records"):
             place = names.index(str(row["frf"])), bands.index((float(row["low_hz"]), float(row["high_hz"])))
             values[place] = row[column]
         traces.append(_heat(values, names, bands, (rank, column, top)))
     shared = {"type": "category", "autorange": "reversed"}
-    axes = (
-        Axis(title="as it is", options=shared),
-        Axis(title=_explained(diagnosis).replace("the ", "").replace("its ", ""), options=shared),
-    )
+    axes = [
+        Axis(title=title, options={**shared, "title": {"text": title, "standoff": BESIDE_LABELS_PX}})
+        for title in titles.values()
+    ]
     x = {"title": {"text": "Band, Hz", "standoff": 30}, "type": "category", "tickangle": -40}
     return Picture(
         name="mismatch",
         title="Where model and measurement disagree: misfit over what noise and tolerances explain",
-        alt=f"Two maps of FRFs by bands, of the model as it is and {_explained(diagnosis)}. {diagnosis.mismatch_where}",
+        alt=f"Maps of FRFs by bands: the model {' and '.join(titles.values())}. {diagnosis.mismatch_where}",
         traces=tuple(traces),
         layout=panels(x, *axes),
-        note=f"1 is as good as the measurement. {diagnosis.mismatch_where}{_of_law(diagnosis)}",
-        height_px=int(np.clip(240 + 44 * len(names), 380, 900)),
+        note=f"1 is as good as the measurement. {diagnosis.mismatch_where}{_of_maps(diagnosis)}",
+        height_px=int(np.clip(140 + 22 * len(names) * len(titles) + 50 * len(titles), 190 * len(titles), 900)),
     )
 
 
-def _of_law(diagnosis: Diagnosis) -> str:
-    return "" if diagnosis.linearised is None else " Both models are linear: what the force law explains follows below."
+def _maps(diagnosis: Diagnosis) -> dict[str, str]:
+    """Columns that are drawn, with their titles: what a law explains, no linear model shows."""
+    if diagnosis.linearised is not None:
+        return {"before": "as it is"}
+    return {"before": "as it is", "after": _explained(diagnosis).replace("the ", "").replace("its ", "")}
+
+
+def _of_maps(diagnosis: Diagnosis) -> str:
+    if diagnosis.linearised is not None:
+        return " The model is linear: what the force law explains follows below."
+    if diagnosis.findings:
+        return ""
+    return " The lower map counts noise alone: what is left once the model has moved within its tolerances."
 
 
 def _heat(
