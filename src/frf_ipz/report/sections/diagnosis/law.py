@@ -42,9 +42,9 @@ def _force(law: LawAtWork) -> Picture:
     hover = "%{x:.4g}: %{y:.4g} N"
     over_motion = line(law.motion_m[kept], law.force_N[kept], "over motion", "@updated", hover=hover)
     over_velocity = line(law.velocity_m_s[kept], law.force_N[kept], "over velocity", "@c1", hover=hover)
-    left = {"title": {"text": "Motion of the place, m"}, "domain": [0, 0.46]}
+    left = {"title": {"text": "Motion, m"}, "domain": [0, 0.46]}
     layout = panels(left, Axis(title="Force of the law, N"), showlegend=False)
-    layout["xaxis2"] = {"title": {"text": "Velocity of the place, m/s"}, "domain": [0.54, 1.0], "anchor": "y"}
+    layout["xaxis2"] = {"title": {"text": "Velocity, m/s"}, "domain": [0.54, 1.0], "anchor": "y"}
     return Picture(
         name="law-force",
         title="Force of the law over motion and velocity of its place",
