@@ -82,8 +82,8 @@ class Truth:
         Of an effect outside the table.
     structure : str
         Kind of the specimen.
-    evidence_nats, separation_nats : float, optional
-        Of the effect, and from the closest other effect; None where the answers do not say.
+    evidence_nats, separation_nats, place_separation_nats : float, optional
+        Of the effect, and from the closest other effect and place; None where the answers do not say.
     each_nats : tuple of float
         Of a pair: evidence for each effect when the other is there.
     has_evidence : bool
@@ -98,6 +98,7 @@ class Truth:
     structure: str = ""
     evidence_nats: float | None = None
     separation_nats: float | None = None
+    place_separation_nats: float | None = None
     each_nats: tuple[float, ...] = ()
     has_evidence: bool = False
 
@@ -170,6 +171,7 @@ def read_truth(path: Path) -> Truth:
         structure=table.get("structure", {}).get("kind", ""),
         evidence_nats=shown.get("evidence_nats"),
         separation_nats=shown.get("separation_nats"),
+        place_separation_nats=shown.get("place_separation_nats"),
         each_nats=tuple(one["evidence_nats"] for one in shown.get("each", []) if "evidence_nats" in one),
         has_evidence="evidence_nats" in shown,
     )

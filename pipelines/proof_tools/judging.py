@@ -11,6 +11,7 @@ from proof_tools.places import EXACT, RANKS, WRONG, Layout, compare_places
 SET_NATS = 5.0  # what lies within this of the best explanation belongs to the reported set
 DETECTABLE_NATS = 100.0
 DECIDABLE_NATS, DECIDABLE_SEPARATION = 300.0, 15.0
+PLACED_SEPARATION = 3.0  # odds of 20 to 1 against the closest other place
 CONFIDENT = 0.9
 
 
@@ -75,6 +76,8 @@ class Judgement:
         Outside the catalogue: how much worse the closest known effect at its place is.
     flagged_place : str or None
         Outside the catalogue, a law at a node or spring: how close the place of the mismatch is.
+    place_told : bool
+        The recordings tell the true place from the closest other one, as far as the answer says.
     in_place_set : bool or None
         Whether the true place is among those that are said to be possible; None where none are said.
     before, held_out, held_over_noise : float
@@ -103,6 +106,7 @@ class Judgement:
     pair_places: int = 0
     substitute_nats: float | None = None
     flagged_place: str | None = None
+    place_told: bool = True
     in_place_set: bool | None = None
     before: float = math.nan
     held_out: float = math.nan
@@ -154,6 +158,7 @@ def judge(truth: Truth, said: Diagnosis, layout: Layout) -> Judgement:
         pair_places=sum(places[0] in (EXACT, None) for places in found),
         substitute_nats=truth.separation_nats if truth.group == "unknown" else None,
         flagged_place=_flagged_place(truth, said, layout),
+        place_told=truth.place_separation_nats is None or truth.place_separation_nats > PLACED_SEPARATION,
         in_place_set=_in_place_set(option, first, layout),
         before=said.before.get("held_out", math.nan),
         held_out=said.after.get("held_out", math.nan),

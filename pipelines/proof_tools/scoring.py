@@ -204,9 +204,11 @@ def calibrated(cases: Judgements) -> tuple[list[float], list[bool]]:
 def _places(cases: Judgements) -> list[Bar]:
     right = [one for one in _group(cases, "linear") if one.right]
     placed = [one.place for one in right if one.place]
+    told = [one.place == EXACT for one in right if one.place and one.place_told]
     in_sets = [one.in_place_set for one in right if one.in_place_set is not None]
     return [
         _at_least("places", "exact, where the effect is right", 0.95, [place == EXACT for place in placed]),
+        _at_least("places", "exact, of those over 3 nats from any other place", 0.95, told),
         _at_least("places", "within one node or element", 0.99, [place in (EXACT, NEAR) for place in placed]),
         _at_least("places", "true place among the possible ones said", 0.98, in_sets),
     ]

@@ -204,6 +204,11 @@ def test_what_can_be_detected_and_decided(truth, evidence, separation, equivalen
     assert (one.detectable, one.decidable) == (detectable, decidable)
 
 
+@pytest.mark.parametrize(("nats", "told"), [(2.9, False), (3.1, True), (None, True)])
+def test_which_places_are_told_apart(truth, nats, told):
+    assert judge(truth(DELAY, detectability={"place_separation_nats": nats}), FAILED, Layout()).place_told is told
+
+
 def test_answers_that_say_nothing_of_evidence_decide_nothing(truth):
     one = judge(truth(DELAY, detectability={"frf_change": 0.3}), FAILED, Layout())
     assert (one.detectable, one.decidable) == (None, None)

@@ -73,6 +73,7 @@ def bar(group, name, *judgements):
         ("linear", "truth in the reported set, of those detected", RIGHT, WRONG, 99),
         ("linear", "detected, of those with over 100 nats", RIGHT, MISSED, 19),
         ("places", "exact, where the effect is right", RIGHT, replace(RIGHT, place="near"), 19),
+        ("places", "exact, of those over 3 nats from any other place", RIGHT, replace(RIGHT, place="near"), 19),
         ("places", "within one node or element", replace(RIGHT, place="near"), replace(RIGHT, place="wrong"), 99),
         ("places", "true place among the possible ones said", RIGHT, replace(RIGHT, in_place_set=False), 49),
         ("outside the catalogue", "flagged, best substitute over 100 nats worse", FLAGGED, NAMED, 9),
@@ -191,3 +192,13 @@ def test_times_are_those_of_the_stage():
     assert bar("time", "linear case, from FRFs, median", *cases).value == 9.0
     slow = [Scored(judgement=LAW, stage_s=16.0)]
     assert bar("time", "nonlinear case, from FRFs, median", *slow).passes is False
+
+
+def test_a_place_that_nothing_tells_from_another_counts_among_all_places_only():
+    cases = [Scored(judgement=one) for one in [RIGHT] * 19 + [replace(RIGHT, place="near", place_told=False)] * 2]
+    values = {bar.name: bar.rate for bar in bars(cases) if bar.group == "places"}
+    assert (values["exact, where the effect is right"].hits, values["exact, where the effect is right"].count) == (
+        19,
+        21,
+    )
+    assert values["exact, of those over 3 nats from any other place"].count == 19
