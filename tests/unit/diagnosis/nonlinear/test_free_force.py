@@ -91,3 +91,18 @@ def test_a_law_that_refining_leads_astray_is_simulated_as_it_was_read(chain, str
     found = candidates.find_candidates(track, track, [GapContact()])
     is_found = bool(found) and (found[0].strength, found[0].shape) == pytest.approx((3e4, 2e-4), rel=0.05)
     assert is_found is far_off
+
+
+def test_a_place_whose_force_reaches_the_sensors_best_is_simulated_whatever_refining_says(chain, strike, monkeypatch):
+    stretches, linear = prepared(chain.model, strike(*LAWS["cubic"][:2]))
+    where = whereabouts(stretches, linear)
+    everywhere = tuple(range(len(linear.freedom.plant.places)))
+    track = candidates.Track(stretches=stretches, linear=linear, where=replace(where, possible=everywhere))
+    refined, read = candidates._refined, candidates._read
+    monkeypatch.setattr(candidates, "_refined", lambda *given: [fit for fit in refined(*given) if fit.place != 2])
+    monkeypatch.setattr(candidates, "_read", lambda *given: [replace(fit, cost=np.inf) for fit in read(*given)])
+    monkeypatch.setattr(candidates.Track, "beside", lambda *_: [])
+    monkeypatch.setattr(candidates, "FEW", 0)
+    monkeypatch.setattr(candidates, "FAR_OFF", np.inf)
+    assert where.equal[0] == 2
+    assert candidates.find_candidates(track, track, [CubicStiffness()])[0].place == 2

@@ -119,7 +119,10 @@ def find_candidates(
     if _explain(known):
         return known
     rough = _refined(short, laws)
-    early = _climbed(short, [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1]])
+    told = [fit for fit in late if fit.place in [free.place for free in long.where.forces[:READ]]]
+    early = _climbed(
+        short, [fit for law in laws for fit in _of(law, rough)[:SIMULATED] + _of(law, late)[:1] + _of(law, told)]
+    )
     finalists = early[:FINALISTS] + [_of(law, early)[0] for law in laws if _of(law, early)] + late[:1]
     fits = _best_of_each(known + _finished(long, finalists))
     if fits and fits[0].cost > FAR_OFF * fits[0].n_rows:
