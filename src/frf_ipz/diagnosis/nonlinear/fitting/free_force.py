@@ -106,7 +106,7 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
             if tried.cost < best.cost:
                 break
             damping = max(STIFFER * damping, LEAST_DAMPING)
-        if tried.cost > (1 - SETTLED) * best.cost:
+        if not tried.cost <= (1 - SETTLED) * best.cost:  # nor where it is no number
             break
         best, damping = tried, damping / STIFFER
     best = min(best, tried, key=lambda one: one.cost)
