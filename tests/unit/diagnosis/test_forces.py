@@ -111,3 +111,17 @@ def test_a_sweep_comes_to_a_part_of_the_band_too_late_noise_and_bursts_do_not():
     burst = rng.standard_normal(n) * (time < 0.3 * time[-1])
     for force, expected in ((sweep, True), (rng.standard_normal(n), False), (burst, False)):
         assert is_sweep(blow(force), band, 8 / time[-1]) is expected
+
+
+@pytest.mark.parametrize(("part", "is_kept"), [(0.0025, True), (0.0, False)])
+def test_what_a_high_pass_leaves_behind_a_pulse_is_a_part_of_it(part, is_kept):
+    """Less than a pulse's least part in each sample, and a tenth of its impulse in all."""
+    end = TOP + PULSE
+    force = (a_force(5, TOP) - a_force(5)) + 0.05 * a_force(5)
+    force[end:] -= part * PEAK_N * np.exp(-np.arange(SAMPLES - end) / 150)
+    found = isolate_pulse(blow(force))
+    if is_kept:
+        assert found.blow.force.sum() == pytest.approx(force[: found.stop].sum(), rel=0.01)
+        assert found.stop > end + 400
+    else:
+        assert found.stop < end + 2 * (RINGING + TAPER)

@@ -14,6 +14,8 @@ from frf_ipz.diagnosis.observations import Blow
 
 LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
 ABOVE_NOISE = 6.0  # standard deviations
+TAIL = 4.0  # standard deviations of means of stretches: below, what a high-pass leaves behind a pulse has died away
+LEAST_STRETCHES = 8  # as long as a filter rings: with fewer the noise of their means is not known
 STRETCHES = 16  # of what is quiet: a second touch, which falls into few of them, is no noise
 RINGING, LEAST_RINGING = 25, 5  # samples before and after the pulse that are kept whole: a converter's filter rings
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out; fewer where less is kept
@@ -60,9 +62,11 @@ def isolate_pulse(blow: Blow) -> Pulse:
     """
     size = np.abs(blow.force)
     top = int(np.argmax(size))
-    noise = _noise_of(np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]]))
+    quiet = np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]])
+    noise = _noise_of(quiet)
     above = np.flatnonzero(size >= min(max(ABOVE_NOISE * noise, LEAST_PART * size[top]), size[top]))
     first, last = int(above[0]), int(above[-1])
+    last += _tail(blow.force[last + 1 :], quiet)
     ringing = max(_rings(size[:first][::-1], noise), _rings(size[last + 1 :], noise))
     sample = np.arange(blow.n_samples)
     outside = np.maximum(first - ringing - sample, sample - last - ringing)
@@ -70,6 +74,21 @@ def isolate_pulse(blow: Blow) -> Pulse:
     window = np.cos(np.pi / 2 * np.clip(outside / taper, 0, 1)) ** 2
     kept = np.flatnonzero(window > 0.5)
     return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+
+
+def _tail(after: FloatArray, quiet: FloatArray) -> int:
+    """Count samples after a pulse in which the high-pass of a charge amplifier comes back: little each, but many."""
+    if len(quiet) < LEAST_STRETCHES * RINGING:
+        return 0
+    usual = np.median(quiet)
+    noise = _means(quiet - usual).std()
+    back = np.flatnonzero(np.abs(_means(after - usual)) <= TAIL * noise)
+    return int(back[0]) * RINGING if len(back) else 0
+
+
+def _means(values: FloatArray) -> FloatArray:
+    """Average stretches as long as a filter rings."""
+    return np.asarray(values[: len(values) // RINGING * RINGING].reshape(-1, RINGING).mean(1))
 
 
 def _rings(beside: FloatArray, noise: float) -> int:
