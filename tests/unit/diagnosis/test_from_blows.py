@@ -1,5 +1,7 @@
 """Noise of recordings, as blows show it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -74,3 +76,33 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
     ratio = np.mean(errors, 0) / np.mean(stated, 0)
     scatter = 4 / np.sqrt(trials)  # four standard deviations of a mean of squared moduli
     assert np.all(np.abs(ratio - 1) < scatter + AS_READ)
+
+
+@pytest.mark.parametrize("lead_s", [0.05, 1.5])
+def test_what_lies_before_a_blow_does_not_blur_its_frfs(lead_s):
+    """A transform beside the axis weighs the first samples most: at 1.5 s the blow itself would count for nothing."""
+    place, shown, drawn = "5:+z", 0.1, np.random.default_rng(1)
+
+    def late(name, level):
+        one = blow(name, place, level, shown)
+        lead = round((lead_s - 0.05) * RATE_HZ)
+        quiet = 1e-3 * drawn.standard_normal((1, lead))
+        hum = 1e-4 * drawn.standard_normal((1, lead + SAMPLES - 50))
+        force = np.concatenate([1e-3 * drawn.standard_normal(lead), one.force[50:]])
+        responses = np.concatenate([quiet, shown * level * _decaying(SAMPLES - 50)[None]], axis=1) + hum
+        return replace(one, force=force, responses=responses)
+
+    blows = tuple(late(f"a{'x' * n}", level) for n, level in enumerate((10.0, 17.0, 30.0)))
+    found = survey(Observations(kind="hammer", blows=blows, band_hz=(20.0, 200.0)))
+    s = np.array([12.0 + 2j * np.pi * 120.0])
+    measured = measure(found, s)
+    pulse = np.where((np.arange(SAMPLES) > 100) & (np.arange(SAMPLES) < 103), 1.0, 0.0)[50:]
+    turned = np.exp(-s * np.arange(SAMPLES - 50) / RATE_HZ)
+    true = shown * (turned @ _decaying(SAMPLES - 50)) / (turned @ pulse)
+    assert abs(measured.values[0, 0] / true - 1) < 0.01
+    assert np.sqrt(measured.covariance[0, 0, 0].real) < 0.01 * abs(true)
+
+
+def _decaying(samples):
+    after = np.maximum((np.arange(samples) + 50) / RATE_HZ - 0.1, 0.0)
+    return np.exp(-8 * after) * np.sin(2 * np.pi * 60 * after)

@@ -30,6 +30,7 @@ SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
 LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
 UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
 BEFORE = 32  # samples before a blow that tell the noise
+AHEAD = 100  # samples that records keep before a pulse: with as many the limits of the verdict were chosen
 MOST_BIAS = 0.5  # of the force's power that may be noise
 COMMON_PART = 1e-2  # of a line's own: independent parts of shared errors below are left out
 
@@ -41,7 +42,7 @@ class Survey:
     Parameters
     ----------
     groups : tuple of tuple of Blow
-        Blows with the same place and the same sensors, forces without noise around them.
+        Blows with the same place and the same sensors, from shortly before their pulses on, without noise around them.
     pulses : tuple of tuple of Pulse
         The stretches of the forces that were kept; all of them for shakers.
     force : Noise
@@ -76,16 +77,17 @@ def survey(observations: Observations) -> Survey:
         What `measure` needs.
     """
     is_hammer = observations.kind == "hammer"
-    groups, pulses = _prepared(observations)
+    whole = _pulses(observations)
+    groups, pulses = _prepared(whole, observations.kind)
     decay = forgetting_1_s(blow for group in groups for blow in group)
     line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
     if is_hammer:
-        flat = tuple(p for group in pulses for p in group)
+        flat = tuple(p for group in whole for p in group)
         noise = force_noise(tuple(b for group in same_places(observations) for b in group), flat)
     else:
         noise = _noise_of_records(groups, line_sets)
-    responses = _response_noise(groups, pulses, line_sets, noise)
+    responses = _response_noise(whole, pulses, line_sets, noise)
     return Survey(
         groups=groups,
         pulses=pulses,
@@ -116,20 +118,37 @@ def like(found: Survey, observations: Observations) -> Survey:
     Survey
         Of these.
     """
-    groups, pulses = _prepared(observations)
+    groups, pulses = _prepared(_pulses(observations), observations.kind)
     return replace(found, groups=groups, pulses=pulses)
 
 
-def _prepared(
-    observations: Observations,
-) -> tuple[tuple[tuple[Blow, ...], ...], tuple[tuple[Pulse, ...], ...]]:
-    """Blows of each place, and the pulses of hammers."""
+def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
+    """Pulses of the blows of each place; of a shaker, the whole records."""
     groups = same_places(observations)
     if observations.kind != "hammer":
-        whole = tuple(tuple(Pulse(blow=blow, start=0, stop=blow.n_samples) for blow in group) for group in groups)
-        return groups, whole
-    pulses = tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
+        return tuple(tuple(Pulse(blow=blow, start=0, stop=blow.n_samples) for blow in group) for group in groups)
+    return tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
+
+
+def _prepared(
+    pulses: tuple[tuple[Pulse, ...], ...], kind: str
+) -> tuple[tuple[tuple[Blow, ...], ...], tuple[tuple[Pulse, ...], ...]]:
+    """Blows of each place from shortly before their pulses on, and these pulses."""
+    if kind == "hammer":
+        pulses = tuple(tuple(_from_pulse(pulse) for pulse in group) for group in pulses)
     return tuple(tuple(pulse.blow for pulse in group) for group in pulses), pulses
+
+
+def _from_pulse(pulse: Pulse) -> Pulse:
+    """Leave out what lies before a pulse: noise alone, which a transform beside the axis weighs most of all."""
+    begin, blow = max(pulse.start - AHEAD, 0), pulse.blow
+    later = replace(
+        blow,
+        force=blow.force[begin:],
+        responses=blow.responses[:, begin:],
+        start_s=blow.start_s + begin * blow.step_s,
+    )
+    return Pulse(blow=later, start=pulse.start - begin, stop=pulse.stop - begin)
 
 
 def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
@@ -139,9 +158,10 @@ def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
 
 
 def _response_noise(
-    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], noise: Noise
+    whole: tuple[tuple[Pulse, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], noise: Noise
 ) -> dict[str, Noise]:
     found = {}
+    groups = tuple(tuple(pulse.blow for pulse in group) for group in pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
@@ -158,7 +178,7 @@ def _response_noise(
             fitted = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
             found[channel] = fitted.rounded(_signals(groups, channel), groups[0][0].step_s)
         else:
-            found[channel] = _noise_of_single(groups, pulses, line_sets, channel)
+            found[channel] = _noise_of_single(groups, whole, line_sets, channel)
     return found
 
 
@@ -192,7 +212,7 @@ def _gain(group: tuple[Blow, ...], lines: Lines) -> FloatArray:
 
 
 def _noise_of_single(
-    groups: tuple[tuple[Blow, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], channel: str
+    groups: tuple[tuple[Blow, ...], ...], whole: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], channel: str
 ) -> Noise:
     """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
     white = 0.0
@@ -203,7 +223,7 @@ def _noise_of_single(
         sensor = names.index(channel)
         energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / _gain(group, lines)
         white = max(white, UNREPEATED**2 * float(np.median(energy)))
-        before = group[0].responses[sensor, : pulses[place][0].start]
+        before = whole[place][0].blow.responses[sensor, : whole[place][0].start]
         if len(before) >= BEFORE:
             white = max(white, float(np.var(before)) * group[0].step_s)
     return Noise(white=white)
