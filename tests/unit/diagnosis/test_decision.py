@@ -92,3 +92,15 @@ def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
     monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
     assert decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None).verdict == verdict
+
+
+@pytest.mark.parametrize(("strain", "causes"), [(0.7, 1), (0.8, 2)])
+def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch, strain, causes):
+    """A joint may stand for a resonator and a damper, if what cannot be known is bent for it."""
+    one = found(strain)
+    pair = SimpleNamespace(hypothesis=SimpleNamespace(causes=(1, 2)), log_evidence=ALONE + 28.0)
+    monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
+    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
+    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=one.final, fits=(), n_tried=1))
+    monkeypatch.setattr(decision, "search_second", lambda *_: Ranking(base=one.final, fits=(pair,), n_tried=9))
+    assert len(decision._enough(SimpleNamespace(kind="hammer"), one).final.hypothesis.causes) == causes

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.progress import Progress
 
+STRAINED = 0.75  # score of a cause that explains, but may stand for two others: 3 of 89 single ones had more
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 
 
@@ -114,7 +115,10 @@ def _enough(bench: Bench, one: Decision) -> Decision:
     if not one.null_good.is_good and gain_over(one.final, one.null) < least:
         return replace(one, verdict=UNEXPLAINED, final=one.null, good=one.null_good)
     second = settle_ties(bench, search_beside(bench, one.final, LIMITS[bench.kind].beside_nats))
-    return _beside(bench, one, second) or one
+    two = _beside(bench, one, second)
+    if two is None and one.good.score > STRAINED:
+        two = _beside(bench, one, search_second(bench, one.ranking, lambda fit: goodness(bench, fit).is_good))
+    return two or one
 
 
 def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
