@@ -69,7 +69,7 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
         decision,
         "goodness",
         lambda _, fit: SimpleNamespace(
-            is_good=fit is best, score=1.01 if fit is null else 0.9, needed_nats=30.0, times_underrated=1.0
+            is_good=fit is best, score=1.01 if fit is null else 0.7, needed_nats=30.0, times_underrated=1.0
         ),
     )
     monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
