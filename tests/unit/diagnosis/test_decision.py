@@ -98,7 +98,8 @@ def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(
 def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch, strain, causes):
     """A joint may stand for a resonator and a damper, if what cannot be known is bent for it."""
     one = found(strain)
-    pair = SimpleNamespace(hypothesis=SimpleNamespace(causes=(1, 2)), log_evidence=ALONE + 28.0)
+    pair = a_fit(ALONE + 28.0)
+    pair.hypothesis.causes *= 2
     monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
     monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=one.final, fits=(), n_tried=1))
