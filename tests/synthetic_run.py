@@ -285,6 +285,7 @@ def synthetic_law():
         is_held_out=True,
         channel="acc_1",
         response="acceleration",
+        unit="m/s^2",
         time_s=time,
         measured=motion,
         without=0.5 * motion,

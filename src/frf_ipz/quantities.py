@@ -43,9 +43,24 @@ class FrfQuantity(Enum):
         >>> FrfQuantity.ACCELERANCE.unit()
         'm/s^2/N'
         """
-        length = "rad" if output_direction.startswith("r") else "m"
         force = "(N m)" if input_direction.startswith("r") else "N"
-        return f"{length}{('', '/s', '/s^2')[self.power]}/{force}"
+        return f"{self.response_unit(output_direction)}/{force}"
+
+    def response_unit(self, direction: str = "z") -> str:
+        """SI unit of the response along a direction.
+
+        Parameters
+        ----------
+        direction : str
+            As for `unit`.
+
+        Returns
+        -------
+        str
+            For example ``m/s^2``.
+        """
+        length = "rad" if direction.startswith("r") else "m"
+        return f"{length}{('', '/s', '/s^2')[self.power]}"
 
 
 RESPONSES = ("displacement", "velocity", "acceleration")

@@ -156,8 +156,8 @@ class LawAtWork:
         Whose response is shown; empty where all blows start in motion, which is not simulated.
     is_held_out : bool
         That blow was not shown to the fit.
-    channel, response : str
-        Which sensor, the one in which the law shows most, and what it measures: ``acceleration``, for example.
+    channel, response, unit : str
+        Which sensor, the one in which the law shows most, and what it measures: ``acceleration`` in ``m/s^2``, say.
     time_s : (n_samples,) array
         s from the start.
     measured, without, simulated : (n_samples,) array
@@ -171,6 +171,7 @@ class LawAtWork:
     is_held_out: bool = False
     channel: str = ""
     response: str = ""
+    unit: str = ""
     time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     measured: FloatArray = field(default_factory=lambda: np.zeros(0))
     without: FloatArray = field(default_factory=lambda: np.zeros(0))

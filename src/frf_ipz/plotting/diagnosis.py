@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.ingest.units import si_unit
 from frf_ipz.plotting.curves import Q95
 from frf_ipz.plotting.style import FAINT, MEASURED, UPDATED, axes_or_new, colour, dash, label_axes
 
@@ -131,7 +130,7 @@ def plot_law(law: LawAtWork, *, ax: Axes | None = None) -> Axes:
     ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.blow}")
     ax.plot(law.time_s, law.without, color=FAINT, linestyle=dash(1), linewidth=0.8, label="without the law")
     ax.plot(law.time_s, law.simulated, color=UPDATED, linewidth=0.8, label="with the law")
-    return label_axes(ax, "Time, s", f"{law.response.capitalize()}, {si_unit(law.response)}")
+    return label_axes(ax, "Time, s", f"{law.response.capitalize()}, {law.unit}")
 
 
 def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:

@@ -67,6 +67,7 @@ def _with_response(
         is_held_out=is_held_out,
         channel=sensor.channel,
         response=sensor.quantity.response,
+        unit=sensor.quantity.response_unit(sensor.dof.direction),
         time_s=np.asarray(shown.step_s * np.arange(shown.measured.shape[-1]), float),
         measured=shown.measured[0, row],
         without=shown.without[0, row],

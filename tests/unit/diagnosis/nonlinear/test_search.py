@@ -67,7 +67,7 @@ def test_whole_records_of_all_levels_are_simulated(solved):
 def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
     *_, observations, found = solved
     law = found.at_work
-    assert (law.blow, law.is_held_out, law.response) == ("blow 55 N", True, "acceleration")
+    assert (law.blow, law.is_held_out, law.response, law.unit) == ("blow 55 N", True, "acceleration", "m/s^2")
     blow = next(blow for blow in observations.blows if blow.name == law.blow)
     row = [sensor.channel for sensor in blow.sensors].index(law.channel)
     assert set(law.measured) <= set(blow.responses[row])

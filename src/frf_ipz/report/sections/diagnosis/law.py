@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.units import si_unit
 from frf_ipz.report.picture import Axis, Picture, line, panels
 from frf_ipz.report.thinning import BINS, thin
 from frf_ipz.report.wording import number, percent
@@ -61,8 +60,7 @@ def _force(law: LawAtWork) -> Picture:
 def _response(law: LawAtWork) -> Picture:
     curves = (law.measured, law.without, law.simulated)
     kept = thin(law.time_s, curves, BINS[1])
-    unit = si_unit(law.response)
-    hover = f"%{{x:.5g}} s: %{{y:.4g}} {unit}"
+    hover = f"%{{x:.5g}} s: %{{y:.4g}} {law.unit}"
     x = law.time_s[kept]
     traces = (
         line(x, law.measured[kept], "measured", "@measured", hover=hover, width=2.6),
@@ -81,8 +79,8 @@ def _response(law: LawAtWork) -> Picture:
         traces=traces,
         layout=panels(
             {"title": {"text": "Time, s"}, "range": _window(law)},
-            Axis(title=f"{law.response.capitalize()}, {unit}", share=2.0),
-            Axis(title=f"Left, {unit}"),
+            Axis(title=f"{law.response.capitalize()}, {law.unit}", share=2.0),
+            Axis(title=f"Left, {law.unit}"),
         ),
         note=f"{note}{percent(errors[0], 2)} of the measured one without the law, of {percent(errors[1], 2)} with it. "
         "Double-click to see the whole stretch.",
