@@ -13,7 +13,7 @@ from tokenize import TokenError
 import pint
 
 from frf_ipz.errors import QuantityError
-from frf_ipz.quantities import RESPONSES, FrfQuantity
+from frf_ipz.quantities import FrfQuantity, frf_quantity_of
 
 EXAMPLES = {
     "force": "N, kN or lbf",
@@ -51,7 +51,7 @@ def si_unit(quantity: str, *, rotational: bool = False) -> str:
         return "s"
     if quantity == "force":
         return "N m" if rotational else "N"
-    return ("rad" if rotational else "m") + ("", "/s", "/s^2")[RESPONSES.index(quantity)]
+    return frf_quantity_of(quantity).response_unit("rx" if rotational else "x")
 
 
 def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:

@@ -78,7 +78,8 @@ def survey(observations: Observations) -> Survey:
     """
     is_hammer = observations.kind == "hammer"
     whole = _pulses(observations)
-    groups, pulses = _prepared(whole, observations.kind)
+    pulses = _from_pulses(whole, observations.kind)
+    groups = _blows_of(pulses)
     decay = forgetting_1_s(blow for group in groups for blow in group)
     line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
@@ -118,8 +119,8 @@ def like(found: Survey, observations: Observations) -> Survey:
     Survey
         Of these.
     """
-    groups, pulses = _prepared(_pulses(observations), observations.kind)
-    return replace(found, groups=groups, pulses=pulses)
+    pulses = _from_pulses(_pulses(observations), observations.kind)
+    return replace(found, groups=_blows_of(pulses), pulses=pulses)
 
 
 def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
@@ -130,13 +131,15 @@ def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
     return tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
 
 
-def _prepared(
-    pulses: tuple[tuple[Pulse, ...], ...], kind: str
-) -> tuple[tuple[tuple[Blow, ...], ...], tuple[tuple[Pulse, ...], ...]]:
-    """Blows of each place from shortly before their pulses on, and these pulses."""
-    if kind == "hammer":
-        pulses = tuple(tuple(_from_pulse(pulse) for pulse in group) for group in pulses)
-    return tuple(tuple(pulse.blow for pulse in group) for group in pulses), pulses
+def _from_pulses(pulses: tuple[tuple[Pulse, ...], ...], kind: str) -> tuple[tuple[Pulse, ...], ...]:
+    """Pulses in blows of a hammer that begin shortly before them; records of a shaker stay whole."""
+    if kind != "hammer":
+        return pulses
+    return tuple(tuple(_from_pulse(pulse) for pulse in group) for group in pulses)
+
+
+def _blows_of(pulses: tuple[tuple[Pulse, ...], ...]) -> tuple[tuple[Blow, ...], ...]:
+    return tuple(tuple(pulse.blow for pulse in group) for group in pulses)
 
 
 def _from_pulse(pulse: Pulse) -> Pulse:
@@ -161,7 +164,7 @@ def _response_noise(
     whole: tuple[tuple[Pulse, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], noise: Noise
 ) -> dict[str, Noise]:
     found = {}
-    groups = tuple(tuple(pulse.blow for pulse in group) for group in pulses)
+    groups = _blows_of(pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
