@@ -128,7 +128,7 @@ def plot_law(law: LawAtWork, *, ax: Axes | None = None) -> Axes:
         ax.plot(law.motion_m, law.force_N, color=UPDATED, linewidth=0.8)
         return label_axes(ax, "Motion of the place, m", "Force of the law, N", legend=False)
     ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.blow}")
-    ax.plot(law.time_s, law.without, color=FAINT, linestyle=dash(1), linewidth=0.8, label="without the law")
+    ax.plot(law.time_s, law.without, color=FAINT, linestyle="--", linewidth=0.8, label="without the law")
     ax.plot(law.time_s, law.simulated, color=UPDATED, linewidth=0.8, label="with the law")
     return label_axes(ax, "Time, s", f"{law.response.capitalize()}, {law.unit}")
 
