@@ -89,7 +89,7 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     progress(0.6, "searching for a second cause")
     if good.is_good:
         return _enough(bench, one)
-    second = settle_ties(bench, search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good))
+    second = _two_at_once(bench, ranking)
     two = _beside(bench, one, second)
     if two is None:
         return replace(one, verdict=UNEXPLAINED, final=best if gain_over(best, null) > needed else null)
@@ -117,8 +117,13 @@ def _enough(bench: Bench, one: Decision) -> Decision:
     second = settle_ties(bench, search_beside(bench, one.final, LIMITS[bench.kind].beside_nats))
     two = _beside(bench, one, second)
     if two is None and one.good.score > STRAINED:
-        two = _beside(bench, one, search_second(bench, one.ranking, lambda fit: goodness(bench, fit).is_good))
+        two = _beside(bench, one, _two_at_once(bench, one.ranking))
     return two or one
+
+
+def _two_at_once(bench: Bench, ranking: Ranking) -> Ranking:
+    """Search for two causes of which neither need be the best one alone."""
+    return settle_ties(bench, search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good))
 
 
 def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
