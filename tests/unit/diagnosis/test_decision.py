@@ -101,7 +101,9 @@ def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch,
     pair = a_fit(ALONE + 28.0)
     pair.hypothesis.causes *= 2
     monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
-    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
-    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=one.final, fits=(), n_tried=1))
-    monkeypatch.setattr(decision, "search_second", lambda *_: Ranking(base=one.final, fits=(pair,), n_tried=9))
+    nothing, tied = (Ranking(base=one.final, fits=fits, n_tried=9) for fits in ((), (a_fit(ALONE - 1.0),)))
+    settled = Ranking(base=one.final, fits=(pair,), n_tried=9)
+    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: settled if ranking is tied else ranking)
+    monkeypatch.setattr(decision, "search_beside", lambda *_: nothing)
+    monkeypatch.setattr(decision, "search_second", lambda *_: tied)
     assert len(decision._enough(SimpleNamespace(kind="hammer"), one).final.hypothesis.causes) == causes
