@@ -3,7 +3,8 @@
 What is analytic in the right half of the s-plane follows there from its values along a line, by Cauchy's integral. A
 factor that falls with the distance makes the integral forget what is far from the piece of the band that is looked at:
 ``H(s) = 1 / (2 pi) int H(s') (2 d)^2 / ((d + i x)^2 (d - i x)) d omega'`` with ``x = omega' - omega`` and d the
-distance from the line.
+distance from the line. Beyond the ends of the band an FRF is taken to stay what it is at the end. It does not, and the
+error follows from a few numbers, what it is in a few pieces beyond each end: all points err together.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ from frf_ipz.frf import FrfSet
 
 SPACINGS = 1.5  # of the lines: nearer to them, the sum is no integral any more
 OF_THE_WAY = 0.3  # to the nearer end of the lines: farther from them, what lies beyond is missed
-BEYOND = 3.0  # times an FRF's size: what may lie beyond the ends of the band
+BEYOND = 3.0  # times an FRF's size at an end of the band: how far from that it may be beyond
+PIECES = (0.02, 0.06, 0.2, 0.6, 2.0, 1e6)  # of the frequency at an end: how far beyond it an FRF is taken as even
+UNEVEN = 0.01  # of that: what pieces do not hold
+NEAR_END = 0.2  # of the frequency at an end: an FRF may happen to be small at the end itself
 FEWEST_LINES = 16
 STRETCH = 51  # lines over which unknown noise is taken as even
 MEDIAN_OF_NOISE = 0.69  # of its mean: the median of a squared modulus
@@ -119,16 +123,16 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     weights = _weights(frfs, placed)
     values = weights @ frfs.values
     wide = _within_reach(found, np.maximum(placed.real, COARSE.width * placed.imag) + 1j * placed.imag, keep=True)
-    size = np.maximum(np.abs(values), np.abs(_weights(frfs, wide) @ frfs.values))
+    level = np.abs(_weights(frfs, wide) @ frfs.values)
+    size = np.maximum(np.abs(values), level)
     inputs = list(frfs.input_dofs)
-    missed = (_missed(found, placed)[:, None] * size) ** 2
     noise = [(weights * column) @ weights.conj().T for column in found.variance.T]
     return Measured(
         s=placed,
         labels=frfs.labels,
         values=values,
         size=size,
-        covariance=np.array([own + np.diag(lost) for own, lost in zip(noise, missed.T, strict=True)]),
+        covariance=np.array(noise) + _missed(frfs, placed, level),
         common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
         input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
     )
@@ -177,21 +181,43 @@ def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> C
     return np.asarray(sigma[kept] + 1j * s.imag[kept])
 
 
-def _missed(found: FrfSurvey, s: ComplexArray) -> FloatArray:
-    """Relative error by what lies beyond the ends of the band."""
-    omega = 2 * np.pi * found.frfs.frequency_hz
-    ends = np.minimum(s.imag - omega[0], omega[-1] - s.imag)
-    distance = s.real - found.frfs.window_decay_1_s
-    return np.asarray(BEYOND * (2 * distance) ** 2 / (4 * np.pi * np.maximum(ends, distance) ** 2))
+def _missed(frfs: FrfSet, s: ComplexArray, level: FloatArray) -> ComplexArray:
+    """Covariance of the errors by what lies beyond the ends of the band, (n_frfs, n_points, n_points)."""
+    _, below, above = _parts(frfs, s)
+    missed = np.zeros((frfs.n_frfs, len(s), len(s)), np.complex128)
+    for part, end in ((below, s.imag[0]), (above, s.imag[-1])):
+        near = np.abs(s.imag / end - 1) <= NEAR_END
+        largest = BEYOND * level[near].max(0)
+        uneven = np.eye(len(s)) * np.abs(part).sum(1) ** 2
+        missed += largest[:, None, None] ** 2 * (part @ part.conj().T + UNEVEN**2 * uneven)
+    return missed
 
 
 def _weights(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
-    """Give what each line contributes to each point, (n_points, n_lines)."""
+    """Give what each line contributes to each point, (n_points, n_lines); the last ones stand for what is beyond."""
+    lines, below, above = _parts(frfs, s)
+    lines[:, 0] += below.sum(1)
+    lines[:, -1] += above.sum(1)
+    return lines
+
+
+def _parts(frfs: FrfSet, s: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Parts of the integral by lines, by pieces below the band and by pieces above it, (n_points, n): 1 in all."""
     omega = 2 * np.pi * frfs.frequency_hz
-    share = np.gradient(omega) / (2 * np.pi)
+    share = np.gradient(omega)
     distance = (s.real - frfs.window_decay_1_s)[:, None]
     along = omega[None] - s.imag[:, None]
-    size = share / (distance**2 + along**2) ** 2  # the kernel, over (2 d)^2 (d - i x): far faster than complex powers
-    kernel = np.empty(along.shape, np.complex128)
-    kernel.real, kernel.imag = size * distance, -size * along
-    return np.asarray(kernel / kernel.sum(1, keepdims=True))
+    size = 2 / np.pi * share * (distance / (distance**2 + along**2)) ** 2  # far faster than complex powers
+    lines = np.empty(along.shape, np.complex128)
+    lines.real, lines.imag = size * distance, -size * along
+    low, high = omega[0] - share[0] / 2, omega[-1] + share[-1] / 2
+    steps = np.array([0.0, *PIECES])
+    below = -np.diff(_integral(low - omega[0] * steps - s.imag[:, None], distance), axis=1)
+    above = np.diff(_integral(high + omega[-1] * steps - s.imag[:, None], distance), axis=1)
+    total = lines.sum(1) + below.sum(1) + above.sum(1)
+    return lines / total[:, None], below / total[:, None], above / total[:, None]
+
+
+def _integral(along: FloatArray, distance: FloatArray) -> ComplexArray:
+    """Integral of the kernel up to x, (n_points, n): a half more than what it is from 0 on."""
+    return np.asarray((2 * np.arctan2(along, distance) + 2j * distance / (distance + 1j * along)) / (2 * np.pi))

@@ -1,0 +1,72 @@
+"""FRFs off their lines: what lies beyond the band."""
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.contour import fine_contour
+from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, survey_frfs
+from frf_ipz.dofs import Dof
+from frf_ipz.frf import FrfLabel, FrfQuantity, FrfSet
+
+BAND_HZ = (4.0, 60.0)
+INSIDE_HZ, BEYOND_HZ = (11.0, 24.0, 41.0), (2.9, 71.0, 120.0)
+
+
+def modes(rng, mostly_beyond):
+    """Poles and residues of a structure of which the band shows three modes."""
+    poles = 2 * np.pi * np.array(INSIDE_HZ + BEYOND_HZ) * (1j - 0.002)
+    sizes = np.array([1.0] * 3 + [mostly_beyond] * 3) * np.abs(poles)
+    return poles, sizes * rng.choice([-1, 1], len(poles)) * rng.uniform(0.5, 1.5, len(poles))
+
+
+def exact(structure, s):
+    """(n_points,) receptance, m/N."""
+    poles, sizes = structure
+    return np.sum(sizes * np.abs(poles) / ((s[:, None] - poles) * (s[:, None] - poles.conj())), axis=1)
+
+
+def seen(structure):
+    """FRFs in the band, off their lines."""
+    frequency_hz = np.arange(2400, 37000) / 600
+    values = exact(structure, 2j * np.pi * frequency_hz)[:, None]
+    label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(2, "z"), quantity=FrfQuantity.RECEPTANCE)
+    even = np.full(values.shape, 1e-12)
+    frfs = FrfSet(
+        frequency_hz=frequency_hz,
+        values=values,
+        labels=(label,),
+        variance=even,
+        coherence=np.ones(values.shape),
+        averages=np.array([3]),
+    )
+    found = survey_frfs(frfs, BAND_HZ)
+    return measure_frfs(found, fine_contour(found.resonances, BAND_HZ, found.least_decay_1_s))
+
+
+def measured_of(n, mostly_beyond):
+    """Structures with their FRFs."""
+    structures = [modes(np.random.default_rng(seed), mostly_beyond) for seed in range(n)]
+    return [(structure, seen(structure)) for structure in structures]
+
+
+def error_of(structure, measured):
+    """(n_points,) array, m/N."""
+    return measured.values[:, 0] - exact(structure, measured.s)
+
+
+def test_an_frf_off_its_lines_goes_on_beyond_the_band_as_at_its_end():
+    """Were it taken to be there what it is in the band, three times as much would be missed."""
+    missed = []
+    for structure, measured in measured_of(5, 0.1):
+        inner = np.abs(measured.frequency_hz - 30.0) < 18.0
+        missed.append(np.median(np.abs(error_of(structure, measured))[inner] / measured.size[inner, 0]))
+    assert np.median(missed) < 6e-5
+
+
+def test_what_is_missed_is_missed_by_all_points_together():
+    """The few numbers that nobody knows beyond the band explain it, and their sizes are as expected."""
+    for structure, measured in measured_of(8, 1.0):
+        error, covariance = error_of(structure, measured), measured.covariance[0]
+        variance = np.diag(covariance).real
+        assert np.mean(np.abs(np.linalg.solve(np.linalg.cholesky(covariance), error)) ** 2) < 0.5
+        assert np.max(np.abs(error) ** 2 / variance) < 16.0
+        assert np.abs(covariance[20, 21]) > 0.9 * np.sqrt(variance[20] * variance[21])
