@@ -122,16 +122,14 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     placed = _within_reach(found, s)
     weights = _weights(frfs, placed)
     values = weights @ frfs.values
-    wide = _within_reach(found, np.maximum(placed.real, COARSE.width * placed.imag) + 1j * placed.imag, keep=True)
-    level = np.abs(_weights(frfs, wide) @ frfs.values)
-    size = np.maximum(np.abs(values), level)
+    level = _level(found, placed)
     inputs = list(frfs.input_dofs)
     noise = [(weights * column) @ weights.conj().T for column in found.variance.T]
     return Measured(
         s=placed,
         labels=frfs.labels,
         values=values,
-        size=size,
+        size=np.maximum(np.abs(values), level),
         covariance=np.array(noise) + _missed(frfs, placed, level),
         common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
         input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
@@ -157,13 +155,12 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
     omega = 2 * np.pi * frfs.frequency_hz
     chosen = np.unique(np.clip(np.searchsorted(omega, s.imag), 0, len(omega) - 1))
     placed, values = frfs.s[chosen], frfs.values[chosen]
-    wide = _within_reach(found, np.maximum(placed.real, COARSE.width * placed.imag) + 1j * placed.imag, keep=True)
     inputs = list(frfs.input_dofs)
     return Measured(
         s=placed,
         labels=frfs.labels,
         values=values,
-        size=np.maximum(np.abs(values), np.abs(_weights(frfs, wide) @ frfs.values)),
+        size=np.maximum(np.abs(values), _level(found, placed)),
         covariance=np.array([np.diag(column) for column in found.variance[chosen].T], np.complex128),
         common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
         input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
@@ -179,6 +176,13 @@ def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> C
     kept = np.full(len(s), fill_value=True) if keep else farthest >= found.least_decay_1_s
     sigma = np.maximum(np.minimum(s.real, farthest), found.least_decay_1_s)
     return np.asarray(sigma[kept] + 1j * s.imag[kept])
+
+
+def _level(found: FrfSurvey, s: ComplexArray) -> FloatArray:
+    """Sizes of FRFs away from their resonances and zeros, by the lines alone, (n_points, n_frfs)."""
+    wide = _within_reach(found, np.maximum(s.real, COARSE.width * s.imag) + 1j * s.imag, keep=True)
+    lines, *_ = _parts(found.frfs, wide)
+    return np.asarray(np.abs(lines / lines.sum(1, keepdims=True) @ found.frfs.values))
 
 
 def _missed(frfs: FrfSet, s: ComplexArray, level: FloatArray) -> ComplexArray:
