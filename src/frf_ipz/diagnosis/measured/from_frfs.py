@@ -121,19 +121,30 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     frfs = found.frfs
     placed = _within_reach(found, s)
     weights = _weights(frfs, placed)
-    values = weights @ frfs.values
-    level = _level(found, placed)
-    inputs = list(frfs.input_dofs)
-    noise = [(weights * column) @ weights.conj().T for column in found.variance.T]
-    return Measured(
-        s=placed,
-        labels=frfs.labels,
-        values=values,
-        size=np.maximum(np.abs(values), level),
-        covariance=np.array(noise) + _missed(frfs, placed, level),
-        common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
-        input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
-    )
+    missed = _missed(frfs, placed, _level(found, placed))
+    return _measured(found, placed, weights @ frfs.values, _noise(found, weights) + missed)
+
+
+def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
+    """Evaluate transfer functions far from the axis, where a search weighs every point by itself.
+
+    Parameters
+    ----------
+    found : FrfSurvey
+        Of the FRFs.
+    s : (n_points,) complex array
+        rad/s; where it goes too far from the lines it is brought nearer.
+
+    Returns
+    -------
+    Measured
+        As if FRFs were beyond the band what they are in it; what that misses is taken for an error of each point.
+    """
+    placed = _within_reach(found, s)
+    weights = _inside(found.frfs, placed)
+    values = weights @ found.frfs.values
+    missed = (_part_beyond(found, placed)[:, None] * np.maximum(np.abs(values), _level(found, placed))) ** 2
+    return _measured(found, placed, values, _noise(found, weights) + np.array([np.diag(one) for one in missed.T]))
 
 
 def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
@@ -154,17 +165,26 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
     frfs = found.frfs
     omega = 2 * np.pi * frfs.frequency_hz
     chosen = np.unique(np.clip(np.searchsorted(omega, s.imag), 0, len(omega) - 1))
-    placed, values = frfs.s[chosen], frfs.values[chosen]
-    inputs = list(frfs.input_dofs)
+    independent = np.array([np.diag(column) for column in found.variance[chosen].T], np.complex128)
+    return _measured(found, frfs.s[chosen], frfs.values[chosen], independent)
+
+
+def _measured(found: FrfSurvey, s: ComplexArray, values: ComplexArray, covariance: ComplexArray) -> Measured:
+    frfs, inputs = found.frfs, list(found.frfs.input_dofs)
     return Measured(
-        s=placed,
+        s=s,
         labels=frfs.labels,
         values=values,
-        size=np.maximum(np.abs(values), _level(found, placed)),
-        covariance=np.array([np.diag(column) for column in found.variance[chosen].T], np.complex128),
-        common=tuple(np.zeros((len(placed), 0), np.complex128) for _ in inputs),
+        size=np.maximum(np.abs(values), _level(found, s)),
+        covariance=covariance,
+        common=tuple(np.zeros((len(s), 0), np.complex128) for _ in inputs),
         input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
     )
+
+
+def _noise(found: FrfSurvey, weights: ComplexArray) -> ComplexArray:
+    """Covariance of the errors that those of the lines make, (n_frfs, n_points, n_points)."""
+    return np.array([(weights * column) @ weights.conj().T for column in found.variance.T])
 
 
 def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> ComplexArray:
@@ -179,10 +199,23 @@ def _within_reach(found: FrfSurvey, s: ComplexArray, *, keep: bool = False) -> C
 
 
 def _level(found: FrfSurvey, s: ComplexArray) -> FloatArray:
-    """Sizes of FRFs away from their resonances and zeros, by the lines alone, (n_points, n_frfs)."""
+    """Sizes of FRFs away from their resonances and zeros, (n_points, n_frfs)."""
     wide = _within_reach(found, np.maximum(s.real, COARSE.width * s.imag) + 1j * s.imag, keep=True)
-    lines, *_ = _parts(found.frfs, wide)
-    return np.asarray(np.abs(lines / lines.sum(1, keepdims=True) @ found.frfs.values))
+    return np.asarray(np.abs(_inside(found.frfs, wide) @ found.frfs.values))
+
+
+def _inside(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
+    """Give what each line contributes to each point if there is nothing but the lines, (n_points, n_lines)."""
+    lines, *_ = _parts(frfs, s)
+    return np.asarray(lines / lines.sum(1, keepdims=True))
+
+
+def _part_beyond(found: FrfSurvey, s: ComplexArray) -> FloatArray:
+    """Part of the integral beyond the nearer end of the lines, times how far the FRF may be off there, (n_points,)."""
+    omega = 2 * np.pi * found.frfs.frequency_hz
+    ends = np.minimum(s.imag - omega[0], omega[-1] - s.imag)
+    distance = s.real - found.frfs.window_decay_1_s
+    return np.asarray(BEYOND * (2 * distance) ** 2 / (4 * np.pi * np.maximum(ends, distance) ** 2))
 
 
 def _missed(frfs: FrfSet, s: ComplexArray, level: FloatArray) -> ComplexArray:

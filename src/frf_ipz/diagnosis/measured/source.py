@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.forces import is_sweep
 from frf_ipz.diagnosis.measured.from_blows import Survey, forgetting_1_s, like, measure, survey
-from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, search_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.from_running import finer_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError
@@ -123,7 +123,7 @@ def _of_frfs(observations: Observations) -> Source:
     running = observations.kind == "random" and not observations.frfs.window_decay_1_s
     frfs = finer_frfs(observations, observations.frfs) if running else observations.frfs
     found = survey_frfs(frfs, observations.band_hz)
-    far = _far(observations, found.least_decay_1_s, lambda s: measure_frfs(found, s))
+    far = _far(observations, found.least_decay_1_s, lambda s: search_frfs(found, s))
     kind = "running" if running else "frf"
     return _by_points(far, _looked_at(_near(found, observations), observations), found, kind)
 
