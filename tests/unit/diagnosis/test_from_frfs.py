@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from frf_ipz.diagnosis.measured.contour import fine_contour
-from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.contour import COARSE, fine_contour, wide_contour
+from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, search_frfs, survey_frfs
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity, FrfSet
 
@@ -24,8 +24,8 @@ def exact(structure, s):
     return np.sum(sizes * np.abs(poles) / ((s[:, None] - poles) * (s[:, None] - poles.conj())), axis=1)
 
 
-def seen(structure):
-    """FRFs in the band, off their lines."""
+def survey(structure):
+    """FRFs in the band."""
     frequency_hz = np.arange(2400, 37000) / 600
     values = exact(structure, 2j * np.pi * frequency_hz)[:, None]
     label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(2, "z"), quantity=FrfQuantity.RECEPTANCE)
@@ -38,7 +38,12 @@ def seen(structure):
         coherence=np.ones(values.shape),
         averages=np.array([3]),
     )
-    found = survey_frfs(frfs, BAND_HZ)
+    return survey_frfs(frfs, BAND_HZ)
+
+
+def seen(structure):
+    """The same, off their lines."""
+    found = survey(structure)
     return measure_frfs(found, fine_contour(found.resonances, BAND_HZ, found.least_decay_1_s))
 
 
@@ -70,3 +75,14 @@ def test_what_is_missed_is_missed_by_all_points_together():
         assert np.mean(np.abs(np.linalg.solve(np.linalg.cholesky(covariance), error)) ** 2) < 0.5
         assert np.max(np.abs(error) ** 2 / variance) < 16.0
         assert np.abs(covariance[20, 21]) > 0.9 * np.sqrt(variance[20] * variance[21])
+
+
+def test_a_search_takes_each_point_for_itself():
+    """An error that points share would make a model that is far off look wrong in its details alone."""
+    structure = modes(np.random.default_rng(0), 1.0)
+    found = survey(structure)
+    measured = search_frfs(found, wide_contour(BAND_HZ, found.least_decay_1_s, COARSE))
+    covariance = measured.covariance[0]
+    variance = np.diag(covariance).real
+    assert np.abs(covariance - np.diag(variance)).max() < 1e-6 * variance.max()
+    assert np.max(np.abs(error_of(structure, measured)) ** 2 / variance) < 16.0

@@ -118,11 +118,13 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     Measured
         With the covariance of their errors.
     """
-    frfs = found.frfs
     placed = _within_reach(found, s)
-    weights = _weights(frfs, placed)
-    missed = _missed(frfs, placed, _level(found, placed))
-    return _measured(found, placed, weights @ frfs.values, _noise(found, weights) + missed)
+    weights, below, above = _parts(found.frfs, placed)
+    weights[:, 0] += below.sum(1)  # lines at the ends stand for what is beyond
+    weights[:, -1] += above.sum(1)
+    level = _level(found, placed)
+    covariance = _noise(found, weights) + _missed(placed, below, above, level)
+    return _measured(found, placed, weights @ found.frfs.values, level, covariance)
 
 
 def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
@@ -142,9 +144,10 @@ def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     """
     placed = _within_reach(found, s)
     weights = _inside(found.frfs, placed)
-    values = weights @ found.frfs.values
-    missed = (_part_beyond(found, placed)[:, None] * np.maximum(np.abs(values), _level(found, placed))) ** 2
-    return _measured(found, placed, values, _noise(found, weights) + np.array([np.diag(one) for one in missed.T]))
+    values, level = weights @ found.frfs.values, _level(found, placed)
+    missed = (_part_beyond(found, placed)[:, None] * np.maximum(np.abs(values), level)) ** 2
+    covariance = _noise(found, weights) + np.array([np.diag(one) for one in missed.T])
+    return _measured(found, placed, values, level, covariance)
 
 
 def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
@@ -166,16 +169,18 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
     omega = 2 * np.pi * frfs.frequency_hz
     chosen = np.unique(np.clip(np.searchsorted(omega, s.imag), 0, len(omega) - 1))
     independent = np.array([np.diag(column) for column in found.variance[chosen].T], np.complex128)
-    return _measured(found, frfs.s[chosen], frfs.values[chosen], independent)
+    return _measured(found, frfs.s[chosen], frfs.values[chosen], _level(found, frfs.s[chosen]), independent)
 
 
-def _measured(found: FrfSurvey, s: ComplexArray, values: ComplexArray, covariance: ComplexArray) -> Measured:
+def _measured(
+    found: FrfSurvey, s: ComplexArray, values: ComplexArray, level: FloatArray, covariance: ComplexArray
+) -> Measured:
     frfs, inputs = found.frfs, list(found.frfs.input_dofs)
     return Measured(
         s=s,
         labels=frfs.labels,
         values=values,
-        size=np.maximum(np.abs(values), _level(found, s)),
+        size=np.maximum(np.abs(values), level),
         covariance=covariance,
         common=tuple(np.zeros((len(s), 0), np.complex128) for _ in inputs),
         input_of=np.array([inputs.index(label.input_dof) for label in frfs.labels]),
@@ -218,24 +223,15 @@ def _part_beyond(found: FrfSurvey, s: ComplexArray) -> FloatArray:
     return np.asarray(BEYOND * (2 * distance) ** 2 / (4 * np.pi * np.maximum(ends, distance) ** 2))
 
 
-def _missed(frfs: FrfSet, s: ComplexArray, level: FloatArray) -> ComplexArray:
+def _missed(s: ComplexArray, below: ComplexArray, above: ComplexArray, level: FloatArray) -> ComplexArray:
     """Covariance of the errors by what lies beyond the ends of the band, (n_frfs, n_points, n_points)."""
-    _, below, above = _parts(frfs, s)
-    missed = np.zeros((frfs.n_frfs, len(s), len(s)), np.complex128)
+    missed = np.zeros((level.shape[1], len(s), len(s)), np.complex128)
     for part, end in ((below, s.imag[0]), (above, s.imag[-1])):
         near = np.abs(s.imag / end - 1) <= NEAR_END
         largest = BEYOND * level[near].max(0)
         uneven = np.eye(len(s)) * np.abs(part).sum(1) ** 2
         missed += largest[:, None, None] ** 2 * (part @ part.conj().T + UNEVEN**2 * uneven)
     return missed
-
-
-def _weights(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
-    """Give what each line contributes to each point, (n_points, n_lines); the last ones stand for what is beyond."""
-    lines, below, above = _parts(frfs, s)
-    lines[:, 0] += below.sum(1)
-    lines[:, -1] += above.sum(1)
-    return lines
 
 
 def _parts(frfs: FrfSet, s: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
