@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lapack
 from scipy.signal import lfilter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -26,7 +25,6 @@ DIFFERENCE = 1e-6  # of a size: step of a derivative, half the digits of double 
 SMALLEST = 1e-300
 SLOW = 1.0  # rad that a mode turns in a step: up to there its samples tell it apart from what they fold down
 AHEAD = 0.6  # part of a step: at 1/2 a held force is neither early nor late, above it does not ring while it holds
-BLOCK = 32  # time steps that are solved together where the force is linear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,42 +229,19 @@ def follow(law: Law, place: Yielding, done: March, changes: FloatArray, added: F
     if added is not None:
         yields = 1 - done.step.motion * by_motion - done.step.velocity * by_velocity
         by_numbers = np.concatenate([by_numbers, added * yields])
-    n_changes, n_numbers = len(changes), len(by_numbers)
-    n_blows, n_times = done.force.shape
-    given = np.zeros((n_changes + n_numbers, n_blows, n_times))
-    given[:n_changes] = changes[:, 0] * by_motion + changes[:, 1] * by_velocity
-    given[n_changes:] = by_numbers
-    given = np.ascontiguousarray(given.transpose(1, 2, 0))
-    slopes = np.stack([by_motion, by_velocity], 2)  # blow, time, which
-    block, found = _Block(place), np.zeros_like(given)
-    state = np.zeros((n_blows, n_changes + n_numbers, len(place.weights)), complex)
-    for first in range(0, n_times, BLOCK):
-        here = slice(first, min(first + BLOCK, n_times))
-        found[:, here], state = block.solve(given[:, here], slopes[:, here], state)
-    return found.transpose(2, 0, 1)
-
-
-class _Block:
-    """A number of time steps at once, for a force that is linear in what it does to its place."""
-
-    def __init__(self, place: Yielding) -> None:
-        modes, readers = place.modes, place.readers
-        self.powers = modes.turn ** np.arange(BLOCK + 1)[:, None]  # time, mode
-        self.per_force = modes.turn * modes.after + modes.before
-        kernel = np.vstack([np.zeros((1, 2)), ((self.powers[: BLOCK - 1] * self.per_force) @ readers).imag])
-        late = np.arange(BLOCK)[:, None] - np.arange(BLOCK)
-        self.lower = np.where(late[..., None] > 0, kernel[np.maximum(late, 0)], 0.0)  # time, earlier time, which
-        self.read = np.concatenate([self.powers[:BLOCK].T * reader[:, None] for reader in readers.T], 1)
-
-    def solve(self, given: FloatArray, slopes: FloatArray, state: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-        """Force at the times of the block, (n_blows, n_times, n_changes), and the state after it."""
-        n = given.shape[1]
-        free = (state @ self.read).imag.reshape(*state.shape[:2], 2, BLOCK)[..., :n]
-        right = given + np.einsum("bcit,bti->btc", free, slopes)
-        matrix = np.eye(n) + np.einsum("bti,tki->btk", slopes, self.lower[:n, :n])
-        force = np.stack([lapack.dtrtrs(*both, lower=1, unitdiag=1)[0] for both in zip(matrix, right, strict=True)])
-        added = force.swapaxes(1, 2) @ (self.powers[n - 1 :: -1] * self.per_force)
-        return force, state * self.powers[n] - added
+    by_free = np.concatenate([changes[:, 0] * by_motion + changes[:, 1] * by_velocity, by_numbers])
+    force = np.ascontiguousarray(by_free.transpose(2, 1, 0))  # time, blow, change: without what they do to the place
+    slopes = np.stack([by_motion.T, by_velocity.T], 1)[..., None]
+    readers, modes = np.ascontiguousarray(place.readers.T), place.modes
+    turn, per_force = modes.turn[:, None], -(modes.turn * modes.after + modes.before)[:, None]
+    z = np.zeros((len(turn), force[0].size), complex)
+    added_to = np.empty_like(z)
+    for here, (to_motion, to_velocity) in zip(force, slopes, strict=True):
+        motion, velocity = (readers @ z).imag.reshape(2, *here.shape)
+        here += to_motion * motion + to_velocity * velocity
+        z *= turn
+        z += np.multiply(per_force, here.reshape(1, -1), out=added_to)
+    return np.ascontiguousarray(force.transpose(2, 1, 0))
 
 
 def _slopes(law: Law, done: March) -> tuple[FloatArray, FloatArray, FloatArray]:
