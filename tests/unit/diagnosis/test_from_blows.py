@@ -15,6 +15,7 @@ RATE_HZ, SAMPLES = 1000.0, 4000
 STEP = 0.02  # of the recorder, m/s^2
 HALF_HZ, HARDLY = 200.0, 0.02  # above that line a shaker does less, by this factor
 RESONANCE = np.poly(0.99 * np.exp([0.8j, -0.8j])).real  # of a digital filter, 127 Hz
+LEAD = 100  # samples before a shaker begins
 AS_READ = 0.3  # of the noise's density, which is read from three records
 
 
@@ -76,6 +77,53 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
     ratio = np.mean(errors, 0) / np.mean(stated, 0)
     scatter = 4 / np.sqrt(trials)  # four standard deviations of a mean of squared moduli
     assert np.all(np.abs(ratio - 1) < scatter + AS_READ)
+
+
+def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of_the_band():
+    """Two resonances, a decade apart; white noise alone would miss the lower one's by a factor of five."""
+    white, pink, found = 1e-9, 2e-7, []
+    two = np.convolve(
+        np.poly(0.995 * np.exp([0.12j, -0.12j])).real, np.poly(0.98 * np.exp([1.6j, -1.6j])).real
+    )  # 19 and 255 Hz
+    frequency = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
+    density = white + pink / np.maximum(frequency, frequency[1])
+    for trial in range(8):
+        blows = []
+        for k in range(3):
+            rng = np.random.default_rng((trial, k))
+            one = record(f"r{k}", (trial, k), 0.0)
+            noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(SAMPLES)) * np.sqrt(density * RATE_HZ), SAMPLES)
+            force = np.random.default_rng((k, trial)).standard_normal(SAMPLES)
+            force[:LEAD] = 0.0
+            shown = lfilter([1.0], two, force)[None]
+            shown += 1e-4 * np.abs(shown).max() * rng.standard_normal(shown.shape)
+            blows.append(replace(one, force=force + noise, responses=shown))
+        survey_ = survey(Observations(kind="random", blows=tuple(blows), band_hz=(10.0, 390.0)))
+        found.append(survey_.force.density(np.array([19.0, 255.0])))
+    ratio = np.median(found, axis=0) / (white + pink / np.array([19.0, 255.0]))
+    assert np.all((ratio > 0.5) & (ratio < 2.0))
+
+
+def test_records_that_end_in_motion_say_what_they_lack():
+    """A slow resonance is shaken up over the whole record: what a transform beside the axis lacks is its end."""
+    slow = np.poly(0.9995 * np.exp([0.3j, -0.3j])).real  # 48 Hz, and its motion lasts for 2 s of 4
+    s = 2.0 + 2j * np.pi * np.arange(30.0, 70.0, 2.5)
+    errors, stated = [], []
+    for trial in range(40):
+        blows = []
+        for k in range(3):
+            one = record(f"r{k}", (trial, k), 0.0)
+            force = np.where(np.arange(SAMPLES) > LEAD, one.force, 0.0)
+            blows.append(replace(one, force=force, responses=lfilter([1.0], slow, force)[None]))
+        found = survey(Observations(kind="random", blows=tuple(blows), band_hz=(20.0, 190.0)))
+        measured = measure(found, s)
+        true = 1 / np.polyval(slow[::-1], np.exp(-s / RATE_HZ))
+        errors.append(np.abs((measured.values[:, 0] - true) / true) ** 2)
+        common = np.sum(np.abs(measured.common[0]) ** 2, 1)
+        own = np.diagonal(measured.covariance[0]).real / np.abs(measured.values[:, 0]) ** 2
+        stated.append(common + own)
+    ratio = np.sqrt(np.mean(errors, 0) / np.mean(stated, 0))
+    assert np.all((ratio > 0.3) & (ratio < 2.0)), ratio
 
 
 @pytest.mark.parametrize("lead_s", [0.05, 1.5])

@@ -254,7 +254,7 @@ def test_what_nobody_knows_costs_its_prior_and_no_more():
     ruler = make_ruler(world, make_lines(world, case.drives, case.noise))
     model = world.receptance
     faster, damped = model.omega_rad_s.copy(), model.damping_ratio.copy()
-    faster[0] *= 1 + 2e-5  # small, since the ruler is linear
+    faster[0] *= 1 + 2e-5
     damped[1] *= 1 + 0.01
     others = [
         replace(world, receptance=replace(model, omega_rad_s=faster)),
@@ -271,6 +271,19 @@ def test_what_nobody_knows_costs_its_prior_and_no_more():
         assert 0 < ruler.nats(frf) < 1
         assert 0.5 * ruler.scale * np.sum(ruler.whiten(frf) ** 2) > 30 * ruler.nats(frf)
     assert ruler.nats(ruler.truth) == 0
+
+
+def test_a_frequency_that_moves_far_for_a_resonance_but_within_its_tolerance_costs_its_prior():
+    """By a part of a resonance's width: to the first order that would be ten times as much."""
+    case = make_case(33, "null", structure="stepped", analyse=False)
+    ringing = replace(case.base.receptance, damping_ratio=0.2 * case.base.receptance.damping_ratio)
+    world = replace(case.base, receptance=ringing)
+    ruler = make_ruler(world, make_lines(world, case.drives, case.noise))
+    faster = world.receptance.omega_rad_s.copy()
+    faster[0] *= 1 + 1e-3  # two standard deviations
+    frf = replace(world, receptance=replace(world.receptance, omega_rad_s=faster)).measured_frf(ruler.frequencies_hz)
+    assert 0.5 < ruler.nats(frf) < 2.1
+    assert 0.5 * ruler.scale * np.sum(ruler.residuals(frf) ** 2) > 5 * ruler.nats(frf)
 
 
 def test_two_effects_are_both_there():

@@ -87,8 +87,8 @@ def survey(observations: Observations) -> Survey:
         flat = tuple(p for group in whole for p in group)
         noise = force_noise(tuple(b for group in same_places(observations) for b in group), flat)
     else:
-        noise = _noise_of_records(groups, line_sets)
-    responses = _response_noise(whole, pulses, line_sets, noise)
+        noise = _noise_of_records(groups, line_sets, resonances)
+    responses = _response_noise(whole, pulses, line_sets, noise, resonances)
     return Survey(
         groups=groups,
         pulses=pulses,
@@ -161,10 +161,15 @@ def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
 
 
 def _response_noise(
-    whole: tuple[tuple[Pulse, ...], ...], pulses: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], noise: Noise
+    whole: tuple[tuple[Pulse, ...], ...],
+    pulses: tuple[tuple[Pulse, ...], ...],
+    line_sets: list[Lines],
+    noise: Noise,
+    resonances: Resonances,
 ) -> dict[str, Noise]:
     found = {}
     groups = _blows_of(pulses)
+    gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
@@ -176,6 +181,7 @@ def _response_noise(
             energy = lines.unexplained[:, sensor]
             kept_s = np.mean([window_energies(lines.s, pulse) for pulse in pulses[place]], axis=0)
             known = np.abs(lines.values[:, sensor]) ** 2 * noise.density(lines.frequency_hz) * kept_s
+            known += gone_on[place][:, sensor]
             stacks.append((lines.frequency_hz, energy, _gain(group, lines), known))
         if stacks:
             fitted = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
@@ -195,17 +201,16 @@ def _signals(groups: tuple[tuple[Blow, ...], ...], channel: str) -> list[FloatAr
     ]
 
 
-def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines]) -> Noise:
+def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines], resonances: Resonances) -> Noise:
     """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
-    found = [
-        fit_force_noise(
-            lines.frequency_hz, lines.unexplained[:, sensor], _gain(group, lines), np.abs(lines.values[:, sensor]) ** 2
-        )
-        for group, lines in zip(groups, line_sets, strict=True)
-        if len(group) > 1
-        for sensor in range(len(group[0].sensors))
-    ]
-    return Noise(white=float(np.median(found)) if found else 0.0)
+    found = []
+    for group, lines in zip(groups, line_sets, strict=True):
+        if len(group) > 1:
+            gain, known = _gain(group, lines), _gone_on_energy(resonances, lines, group)
+            each = zip(lines.unexplained.T, np.abs(lines.values.T) ** 2, known.T, strict=True)
+            found += [fit_force_noise(lines.frequency_hz, energy, gain, *others) for energy, *others in each]
+    white, pink = np.median([(one.white, one.pink) for one in found], axis=0) if found else (0.0, 0.0)
+    return Noise(white=float(white), pink=float(pink))
 
 
 def _gain(group: tuple[Blow, ...], lines: Lines) -> FloatArray:
@@ -268,6 +273,8 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
         too_small = _bias(found, place, points)
         size = np.maximum(np.abs(points.values), np.abs(_at(group, wide).values))
         crossed = points.force.conj() @ points.force.T / np.outer(points.power, points.power)
+        units, left = _gone_on(found.resonances, points, group)
+        units *= (points.force.conj() / points.power[:, None])[..., None]
         common.append(_common(found, place, points))
         for column, sensor in enumerate(group[0].sensors):
             labels.append(
@@ -276,7 +283,13 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
             values.append(points.values[:, column] * too_small)
             sizes.append(size[:, column])
             noise = crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group))
-            errors = np.column_stack([_constants(points, group, column), _cut_off(found, place, points, column)])
+            errors = np.column_stack(
+                [
+                    _constants(points, group, column),
+                    _cut_off(found, place, points, column),
+                    (units * left[..., column]).reshape(len(s), -1),
+                ]
+            )
             covariances.append(noise + errors @ errors.conj().T)
             input_of.append(place)
     return Measured(
@@ -310,6 +323,27 @@ def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexAr
         (points.force.conj() @ size / points.power)[:, None] * units for size in (sizes[:, 0], sizes[:, 1 + column])
     )
     return np.hstack([of_response, points.values[:, [column]] * of_force])
+
+
+def _gone_on(resonances: Resonances, points: Lines, group: tuple[Blow, ...]) -> tuple[ComplexArray, FloatArray]:
+    """Transform what resonances went on to do after records ended, and say with how much of it each record ended.
+
+    Each is by itself and of unknown phase: (n_points, n_blows, n_peaks) for half an amplitude of 1, and these halves,
+    (n_blows, n_peaks, n_sensors).
+    """
+    decay = ENOUGH / _duration_s(group)
+    backwards = [replace(blow, force=blow.force[::-1], responses=blow.responses[:, ::-1]) for blow in group]
+    pairs = spectra(backwards, np.asarray(decay + 1j * resonances.omega_rad_s, np.complex128))
+    poles = -resonances.decay_1_s + 1j * resonances.omega_rad_s
+    ends = np.exp(-np.outer(points.s, [blow.duration_s for blow in group]))
+    return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([shown for _, shown in pairs])
+
+
+def _gone_on_energy(resonances: Resonances, lines: Lines, group: tuple[Blow, ...]) -> FloatArray:
+    """Energy, (n_lines, n_sensors), that blows do not share because of what went on after records ended."""
+    units, left = _gone_on(resonances, lines, group)
+    part = (1 - np.abs(lines.force) ** 2 / lines.power[:, None]) / max(len(group) - 1, 1)
+    return np.asarray(np.einsum("pb,pbr,brs->ps", part, np.abs(units) ** 2, left**2, optimize=True))
 
 
 def _bias(found: Survey, place: int, points: Lines) -> FloatArray:

@@ -93,7 +93,9 @@ def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, kn
     return Noise(white=white, pink=float(found[1]))
 
 
-def fit_force_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, squared_frf: FloatArray) -> float:
+def fit_force_noise(
+    frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, squared_frf: FloatArray, known: FloatArray
+) -> Noise:
     """Fit noise of the force that residuals of a response show through its FRF.
 
     Parameters
@@ -102,14 +104,17 @@ def fit_force_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArr
         As for `fit_noise`.
     squared_frf : (n,) array
         Squared modulus of the FRF.
+    known : (n,) array
+        As for `fit_noise`.
 
     Returns
     -------
-    float
-        Density of white noise, N^2 s.
+    Noise
+        Of the force, white and 1/f.
     """
-    shape = np.stack([gain, gain / frequency_hz, gain * squared_frf], 1)
-    return float(_fit(shape, energy, np.zeros_like(energy))[2])
+    own = np.stack([gain, gain / frequency_hz], 1)
+    found = _fit(np.hstack([own, own * squared_frf[:, None]]), energy, known)
+    return Noise(white=float(found[2]), pink=float(found[3]))
 
 
 def _fit(shape: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting.anywhere import simple_forces
 
-LEFT = 0.12  # of the force, whose bend is smooth and theirs is not; three limits up to 0.2 leave 0.19
+LEFT = 0.015  # of the force; springs that slip at once, whose bend is not smooth, leave 0.12
 
 
 def gradual_slip(x, limit):
@@ -17,8 +17,8 @@ def gradual_slip(x, limit):
     return found
 
 
-@pytest.mark.parametrize("limit", [0.05, 0.1, 0.2, 0.4])
-def test_a_joint_that_slips_gradually_is_a_sum_of_springs_that_slip_at_once(limit):
+@pytest.mark.parametrize("limit", [0.05, 0.07, 0.15, 0.3, 0.4])
+def test_a_joint_that_slips_gradually_is_a_sum_of_simple_forces(limit):
     t = np.linspace(0, 1, 4000)
     x = np.exp(-3 * t) * (np.sin(60 * t) + 0.3 * np.sin(210 * t))
     x /= np.abs(x).max()

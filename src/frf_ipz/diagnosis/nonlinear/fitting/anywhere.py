@@ -1,12 +1,14 @@
 """Where a force sits whose law is not known: a sum of many simple laws at one place, free in all their strengths.
 
 Powers of the motion and of the velocity, dead zones on either side and friction bend into nearly any law that has no
-memory. Such a sum says nothing about the law, but only at the right place does it reach all sensors as it should.
+memory; springs that slip, at once or more and more (Bouc 1967, Wen 1976), into many a hysteresis. Such a sum says
+nothing about the law, but only at the right place does it reach all sensors as it should.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,11 +28,11 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 DEAD_ZONES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # parts of the largest motion
-YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring slips beyond; all of them, gradually
+YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring slips beyond, at once or more and more
 STEEP = 3e-3  # of the largest velocity: below, friction grows with it
 FEW_TURNS, MANY_TURNS = 3, 8
 FINALISTS = 4  # places that are fitted on long stretches
-CLIMBS = 24  # steps to better neighbours: few are taken, unless what is likely is far off
+CLIMBERS, CLIMBS = 3, 24  # places from which better neighbours are looked for, and steps: few, unless it is far off
 RIDGE = 1e-6  # of a column's own square: many of the laws are nearly alike
 SETTLED = 1e-3  # relative change of the cost between turns
 
@@ -80,11 +82,11 @@ def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyFor
     done = {*(place for place in likely if place in equal), *(one.place for one in rough[:FINALISTS])}
     fits = [fit_anything(long, place, MANY_TURNS) for place in sorted(done)]
     for _ in range(CLIMBS):
-        best = min(fits, key=lambda one: one.cost)
-        near = [place for place in long.beside(best.place) if place in equal and place not in done]
+        best = sorted(fits, key=lambda one: one.cost)[:CLIMBERS]
+        near = {place for one in best for place in long.beside(one.place) if place in equal} - done
         if not near:
             break
-        done.update(near)
+        done |= near
         fits += [fit_anything(long, place, MANY_TURNS) for place in near]
     return min(fits, key=lambda one: one.cost), fit_anything(short, rough[0].place, MANY_TURNS)
 
@@ -148,14 +150,25 @@ def simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def _slipping(x: FloatArray) -> FloatArray:
-    """(n_yields, n_blows, n_times) stretches of springs in series with friction, which slip beyond a limit."""
-    steps = np.ascontiguousarray(np.diff(x, axis=-1, prepend=0.0).T)
+    """(2 n_yields, n_blows, n_times) stretches of springs that slip beyond a limit, or the more the nearer it is.
+
+    The latter is a model of Bouc and Wen, dz = dx (1 - |z| / limit) while it is loaded and dx while it is unloaded.
+    Both are known in closed form from one turn of the motion to the next.
+    """
     limits = np.array(YIELDS)[:, None]
-    lowest, found, stretch = -limits, np.zeros((len(steps), len(limits), len(x))), np.zeros((len(limits), len(x)))
-    for step, here in zip(steps, found, strict=True):
-        np.minimum(np.maximum(stretch + step, lowest), limits, out=here)
-        stretch = here
-    return np.asarray((found / limits).transpose(1, 2, 0))
+    found = np.zeros((len(x), 2, len(limits), x.shape[1]))
+    for path, (at_once, gradual) in zip(np.pad(x, ((0, 0), (1, 0))), found, strict=True):
+        ways = np.where(np.diff(path) < 0, -1.0, 1.0)
+        stretch = bent = np.zeros_like(limits)
+        for first, last in pairwise([0, *(np.flatnonzero(np.diff(ways)) + 1), len(ways)]):
+            way, here = ways[first], slice(first, last)
+            gone = way * (path[first + 1 : last + 1] - path[first])
+            at_once[:, here] = way * np.minimum(way * stretch + gone, limits)
+            loaded, unloaded = np.maximum(way * bent, 0.0), np.minimum(way * bent, 0.0) + gone
+            ahead = limits - (limits - loaded) * np.exp(-np.maximum(unloaded, 0.0) / limits)
+            gradual[:, here] = way * np.where(unloaded < 0, unloaded, ahead)
+            stretch, bent = at_once[:, last - 1 : last], gradual[:, last - 1 : last]
+    return np.concatenate((found / limits).swapaxes(0, 1).swapaxes(1, 2))
 
 
 def _rows(
