@@ -72,6 +72,7 @@ WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a l
 EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to explain, where later ones are not reached
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
 MOSTLY = 0.05  # or so much of the linear model's: what the forces lack is then their law, not their place
+LARGELY = 0.2  # or so much, where some force there, whatever it does, would leave no more than can be expected
 NEARLY_ALL = 0.05  # of what the linear model leaves of first moments: a law that leaves no more explains them
 UNDISPERSED = 0.9  # of the cost: what a law may leave where a dispersion of the converters is to be believed
 LATER = 2.0**0.5, 2.0  # times as long as short stretches: first moments by which a law may be told better
@@ -196,7 +197,8 @@ def search_laws(
     found = look.found
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
-        found = _with_place(found, plant, _anywhere(look))
+        best = _anywhere(look)
+        found = _with_place(found, plant, best, LARGELY if _can_explain(look.long, best.place) else MOSTLY)
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
@@ -262,10 +264,16 @@ def _anywhere(look: _Look) -> AnyForce:
     of_each_law = {fit.law.name: fit.place for fit in reversed(fits)}
     found, first = find_place(short, long, of_each_law.values())
     best = min((one for one in bent if one.cost < PROMISED * found.cost), key=lambda one: one.cost, default=found)
-    if best.left < PLACED or first.left > EXPLAINED_FIRST:
+    if best.left < PLACED or first.left > EXPLAINED_FIRST or _can_explain(long, best.place):
         return best
     early = fit_anything(short, best.place, MANY_TURNS)
     return early if early.cost < first.cost + TIE else first
+
+
+def _can_explain(track: Track, place: int) -> bool:
+    """Say whether sensors tell that some force at a place, whatever it does, explains what nothing linear does."""
+    least = min((free.cost for free in track.where.forces if free.place == place), default=np.inf)
+    return least < min(track.linear.n_rows, HALVED * track.linear.cost)
 
 
 def _bend(track: Track, fit: LawFit) -> float:
@@ -273,10 +281,10 @@ def _bend(track: Track, fit: LawFit) -> float:
     return gain_of_further(track.stretches, track.linear.freedom, fit.start(), simple_forces)
 
 
-def _with_place(found: LawSearch, plant: Plant, best: AnyForce) -> LawSearch:
+def _with_place(found: LawSearch, plant: Plant, best: AnyForce, part: float) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
     left = best.left
-    if left > max(min(PLACED, HALVED * best.missed), MOSTLY * best.missed):
+    if left > max(min(PLACED, HALVED * best.missed), part * best.missed):
         return found
     place = plant.places[best.place]
     where = (

@@ -1,5 +1,6 @@
 """Which stretches laws are fitted to, when a law is bent, and where an unknown one sits."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -85,7 +86,9 @@ def a_force(place, cost, *, n_rows=100, missed=50.0):
 
 
 def a_track(n_rows=100, missed=50.0, equal=EVERY):
-    return SimpleNamespace(linear=SimpleNamespace(n_rows=n_rows), missed=missed, where=where(equal))
+    return SimpleNamespace(
+        linear=SimpleNamespace(n_rows=n_rows, cost=n_rows * missed), missed=missed, where=where(equal)
+    )
 
 
 def where(equal):
@@ -151,8 +154,44 @@ def test_neighbours_move_alike_or_the_other_way_round():
 def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
     plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
-    again = search._with_place(found, plant, a_force(0, 100 * left, missed=linear))
+    again = search._with_place(found, plant, a_force(0, 100 * left, missed=linear), search.MOSTLY)
     assert bool(again.place) == said
+
+
+@pytest.mark.parametrize(("costs", "linear", "can"), [({3: 90.0}, 5e3, True), ({3: 90.0}, 150.0, False)])
+def test_sensors_tell_where_a_force_is_whatever_it_does(costs, linear, can):
+    """Of 100 data a force at place 3, free at every moment, leaves 90; one at place 5 leaves 4000."""
+    forces = tuple(SimpleNamespace(place=place, cost=cost) for place, cost in {**costs, 5: 4e3}.items())
+    track = SimpleNamespace(linear=SimpleNamespace(n_rows=100, cost=linear), where=SimpleNamespace(forces=forces))
+    assert search._can_explain(track, 3) == can
+    assert not search._can_explain(track, 5)
+    assert not search._can_explain(track, 4)
+
+
+@pytest.mark.parametrize(("free", "said"), [(90.0, 3), (400.0, 5)])
+def test_long_stretches_are_believed_where_sensors_tell_the_place(monkeypatch, free, said):
+    """Sums of laws leave much of the long stretches at place 3, and nothing of the first moments at place 5."""
+    monkeypatch.setattr(search, "find_place", lambda *_: (a_force(3, 5000.0), a_force(5, 50.0)))
+    monkeypatch.setattr(search, "fit_anything", lambda _, one, __: a_force(one, 500.0))
+    look = a_look([a_law_at(7, 1000.0)], lambda _: 950.0)
+    look.long.where = replace(look.long.where, forces=(SimpleNamespace(place=3, cost=free),))
+    assert search._anywhere(look).place == said
+
+
+def test_several_places_are_climbed_from(monkeypatch):
+    """The best start leads nowhere; the second best leads to the place of the force."""
+    costs = dict.fromkeys(range(20), 99.0) | {0: 20.0, 10: 40.0, 11: 30.0, 12: 10.0}
+    tracks = {
+        name: SimpleNamespace(
+            name=name, missed=9.0, where=where(tuple(range(20))), beside=lambda place: [place - 1, place + 1]
+        )
+        for name in ("short", "long")
+    }
+    monkeypatch.setattr(
+        anywhere, "fit_anything", lambda track, place, _: a_force(place, costs[place], missed=track.missed)
+    )
+    monkeypatch.setattr(anywhere, "FINALISTS", 0)
+    assert anywhere.find_place(tracks["short"], tracks["long"], [0, 10])[0].place == 12
 
 
 @pytest.mark.parametrize(("there", "strength"), [((0.5, 0.0), 16.0), ((1e-9, 1.0), 2.0), ((-0.5, 0.0), 16.0)])
