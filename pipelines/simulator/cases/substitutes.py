@@ -90,14 +90,14 @@ def _fit(substitute: Substitute, world: World, ruler: Ruler) -> dict[str, Any]:
     def residuals(logs: FloatArray) -> FloatArray:
         return ruler.residuals(trial.frf(substitute.build(values(logs)), ruler.frequencies_hz))
 
-    best, left = start, residuals(start)
+    best = start
     if names:
         bounds = (start - 7, start + 7)
-        done = least_squares(residuals, start, bounds=bounds, diff_step=1e-4, max_nfev=EVALUATIONS, xtol=1e-5)
-        best, left = done.x, done.fun
+        best = least_squares(residuals, start, bounds=bounds, diff_step=1e-4, max_nfev=EVALUATIONS, xtol=1e-5).x
+    nats = ruler.nats(trial.frf(substitute.build(values(best)), ruler.frequencies_hz))
     return {
         "effect": substitute.name,
         "location": substitute.location,
         "parameters": {name: float(f"{value:.4g}") for name, value in values(best).items()} | substitute.fixed,
-        "nats": float(f"{0.5 * ruler.scale * np.sum(left**2):.4g}"),
+        "nats": float(f"{nats:.4g}"),
     }
