@@ -83,12 +83,13 @@ def survey(observations: Observations) -> Survey:
     decay = forgetting_1_s(blow for group in groups for blow in group)
     line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
+    gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
     if is_hammer:
         flat = tuple(p for group in whole for p in group)
         noise = force_noise(tuple(b for group in same_places(observations) for b in group), flat)
     else:
-        noise = _noise_of_records(groups, line_sets, resonances)
-    responses = _response_noise(whole, pulses, line_sets, noise, resonances)
+        noise = _noise_of_records(groups, line_sets, gone_on)
+    responses = _response_noise(whole, pulses, line_sets, noise, gone_on)
     return Survey(
         groups=groups,
         pulses=pulses,
@@ -165,11 +166,10 @@ def _response_noise(
     pulses: tuple[tuple[Pulse, ...], ...],
     line_sets: list[Lines],
     noise: Noise,
-    resonances: Resonances,
+    gone_on: list[FloatArray],
 ) -> dict[str, Noise]:
     found = {}
     groups = _blows_of(pulses)
-    gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
@@ -201,12 +201,12 @@ def _signals(groups: tuple[tuple[Blow, ...], ...], channel: str) -> list[FloatAr
     ]
 
 
-def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines], resonances: Resonances) -> Noise:
+def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines], gone_on: list[FloatArray]) -> Noise:
     """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
     found = []
-    for group, lines in zip(groups, line_sets, strict=True):
+    for group, lines, known in zip(groups, line_sets, gone_on, strict=True):
         if len(group) > 1:
-            gain, known = _gain(group, lines), _gone_on_energy(resonances, lines, group)
+            gain = _gain(group, lines)
             each = zip(lines.unexplained.T, np.abs(lines.values.T) ** 2, known.T, strict=True)
             found += [fit_force_noise(lines.frequency_hz, energy, gain, *others) for energy, *others in each]
     white, pink = np.median([(one.white, one.pink) for one in found], axis=0) if found else (0.0, 0.0)

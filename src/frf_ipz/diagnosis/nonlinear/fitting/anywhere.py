@@ -168,7 +168,7 @@ def _slipping(x: FloatArray) -> FloatArray:
             ahead = limits - (limits - loaded) * np.exp(-np.maximum(unloaded, 0.0) / limits)
             gradual[:, here] = way * np.where(unloaded < 0, unloaded, ahead)
             stretch, bent = at_once[:, last - 1 : last], gradual[:, last - 1 : last]
-    return np.concatenate((found / limits).swapaxes(0, 1).swapaxes(1, 2))
+    return np.concatenate((found / limits).transpose(1, 2, 0, 3))
 
 
 def _rows(
