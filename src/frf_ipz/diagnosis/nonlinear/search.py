@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.finding import doubt_of_place
 from frf_ipz.diagnosis.nonlinear.at_work import show_law
 from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
@@ -290,7 +291,8 @@ def _with_place(found: LawSearch, plant: Plant, best: AnyForce, part: float) -> 
     where = (
         f"A force of another kind at {place.words} would: {np.sqrt(left):.2g} times the expected misfit is then left."
     )
-    return replace(found, place=dict(place.location), statement=f"{found.statement} {where}")
+    doubt = doubt_of_place([plant.places[i].location for i in best.alike])
+    return replace(found, place=dict(place.location), statement=f"{found.statement} {where}{doubt}")
 
 
 def _divide(observations: Observations) -> tuple[Observations, Observations]:
@@ -383,15 +385,16 @@ def _explains_most(track: Track, fit: LawFit) -> bool:
     agreement = agreement_with(track.stretches, track.linear.freedom, again)
     gain = 0.5 * (track.linear.cost - again.cost) / max(1.0, again.cost / again.n_rows)
     bent = _bend(track, again)
-    return bent < _bend_of_errors(track, again) and not _complaint(track, again, agreement, gain, lambda _: bent)
+    return bent < _bend_of_errors(track, again, BENT) and not _complaint(track, again, agreement, gain, lambda _: bent)
 
 
 def _is_bent(track: Track, fit: LawFit, drop: float, *, least: float) -> bool:
     """Other forces at the place of a law explain more than errors of the model imitate, and so many nats at least."""
-    return drop > _bend_of_errors(track, fit) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > least
+    parts = BENT_MOVING if track.stretches.moving.any() else BENT
+    return drop > _bend_of_errors(track, fit, parts) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > least
 
 
-def _bend_of_errors(track: Track, fit: LawFit) -> float:
+def _bend_of_errors(track: Track, fit: LawFit, parts: tuple[float, float]) -> float:
     """Drop of the cost by forces of other kinds that errors of the model imitate."""
-    of_cost, of_gain = BENT_MOVING if track.stretches.moving.any() else BENT
+    of_cost, of_gain = parts
     return max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))

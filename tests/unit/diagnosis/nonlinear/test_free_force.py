@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
+from frf_ipz.diagnosis.nonlinear.fitting import free_force as module
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import free_force, start_at, whereabouts
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
@@ -41,6 +42,20 @@ def test_a_force_is_placed_whatever_its_law(chain, strike, name):
     assert found.forces[0].cost < 1e-3 * linear.cost
     assert set(found.equal) <= set(found.possible)
     assert len(found.possible) < len(linear.freedom.plant.places)
+
+
+def test_a_place_is_fitted_from_what_explains_beside_it(chain, strike, monkeypatch):
+    """By themselves all places but one end where ten times as much is left."""
+    law, where, _ = LAWS["cubic"]
+    stretches, linear = prepared(chain.model, strike(law, where))
+    best = whereabouts(stretches, linear).forces[0]
+
+    def astray(stretches, linear, place, unknowns=None):
+        found = free_force(stretches, linear, place, unknowns)
+        return found if place == best.place + 1 or unknowns is not None else replace(found, cost=found.cost + 1e5)
+
+    monkeypatch.setattr(module, "free_force", astray)
+    assert whereabouts(stretches, linear).forces[0].place == best.place
 
 
 def test_any_force_leaves_less_than_a_law_at_its_place_however_far_off_the_model_starts(chain_like, strike):

@@ -7,7 +7,7 @@ nothing about the law, but only at the right place does it reach all sensors as 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
@@ -22,7 +23,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, as_real, linea
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
@@ -49,12 +50,15 @@ class AnyForce:
         Weighted sum of squared misfits, and of squared unknowns.
     left, missed : float
         The cost, and that of the linear model, over the number of data.
+    alike : tuple of int
+        Places at which such sums explain as much, with itself, the best first; empty where others were not compared.
     """
 
     place: int
     cost: float
     left: float
     missed: float
+    alike: tuple[int, ...] = ()
 
     @classmethod
     def on(cls, track: Track, place: int, cost: float) -> AnyForce:
@@ -88,7 +92,15 @@ def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyFor
             break
         done |= near
         fits += [fit_anything(long, place, MANY_TURNS) for place in near]
-    return min(fits, key=lambda one: one.cost), fit_anything(short, rough[0].place, MANY_TURNS)
+    return _with_alike(fits), fit_anything(short, rough[0].place, MANY_TURNS)
+
+
+def _with_alike(fits: Sequence[AnyForce]) -> AnyForce:
+    """Take the best, with places that may be it as well: where less is left than expected, less tells them apart."""
+    best_first = sorted(fits, key=lambda one: one.cost)
+    best = best_first[0]
+    most = best.cost + TIE * min(best.left, 1.0)
+    return replace(best, alike=tuple(one.place for one in best_first if one.cost <= most))
 
 
 def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import start_at
-from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
+from frf_ipz.diagnosis.nonlinear.fitting.free_force import neighbours, start_at
+from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, place_lines, refine
 from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
+from frf_ipz.diagnosis.nonlinear.linear.plant import respond
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
     from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
 
 OF_EACH_LAW = 3  # places that are refined
@@ -38,7 +38,7 @@ FINALISTS = 3  # that are simulated on long stretches
 FAR_OFF = 4.0  # mean square over the expected one: with more, laws are simulated as they were read
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
 BETTER = 0.02  # relative drop of the cost that is worth more: by another start, or places beside to be fitted again
-NEIGHBOURS = 2
+NEIGHBOURS = 3
 LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighbours, and a law would grow without end
 CLIMBS = 8  # steps to better neighbours
 EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
@@ -76,7 +76,7 @@ class Track:
         return self.stretches.duration_s
 
     def beside(self, place: int) -> list[int]:
-        """Possible places among the two that move most like a place."""
+        """Possible places among the few that move most like a place."""
         near = neighbours(self.linear.freedom.plant, place, NEIGHBOURS)
         return [other for other in near if other in self.where.possible]
 
@@ -293,32 +293,16 @@ def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
     """Bring a law to another place, where it moves as much and does as much work as at its own."""
     freedom = track.linear.freedom
     here, there = freedom.plant.at_places.shapes[[fit.place, place]]
-    fit = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
-    own = max(float(np.linalg.norm(here)), 1e-300)
-    if abs(float(here @ there)) < LEAST_RATIO * own**2:
-        return fit
-    ratio = float(np.linalg.norm(there)) / own
-    return replace(fit, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
+    moved = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
+    if abs(float(here @ there)) < LEAST_RATIO * max(float(np.linalg.norm(here)), 1e-300) ** 2:
+        return moved
+    ratio = _size(track, moved) / max(_size(track, fit), 1e-300)
+    return replace(moved, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
 
-def neighbours(plant: Plant, place: int, count: int) -> list[int]:
-    """List the places whose mode shapes are most like those of a place, or most like their opposite.
-
-    Parameters
-    ----------
-    plant : Plant
-        The structure.
-    place : int
-        Index in `Plant.places`.
-    count : int
-        How many.
-
-    Returns
-    -------
-    list of int
-        The most alike first.
-    """
-    shapes = plant.at_places.shapes
-    alike = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
-    nearest = np.argsort(-np.abs(alike @ alike[place]), kind="stable")
-    return [int(i) for i in nearest if i != place][:count]
+def _size(track: Track, fit: LawFit) -> float:
+    """How much the place of a law moves in all stretches, with the linear model of its fit but without its force."""
+    stretches, freedom = track.stretches, track.linear.freedom
+    response = respond(freedom.plant, stretches.s, freedom.deviations(fit.unknowns, fit.place))
+    lines = place_lines(stretches, freedom, fit.unknowns, response, fit.place)
+    return float(np.linalg.norm(lines))

@@ -30,6 +30,7 @@ TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a turn: shorter and shorter 
 TIE = 15.0  # of the cost: less tells no place from another
 POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
 LEAST_SENSORS = 2
+BESIDE = 2  # places beside a possible one that are fitted from its unknowns, where by themselves they leave more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +78,7 @@ def anywhere(plant: Plant) -> Whereabouts:
     return Whereabouts(possible=every, equal=every)
 
 
-def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce:
+def free_force(stretches: Stretches, linear: LinearFit, place: int, unknowns: FloatArray | None = None) -> FreeForce:
     """Fit the linear model with any force at a place.
 
     Parameters
@@ -88,13 +89,15 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int) -> FreeForce
         The linear model.
     place : int
         Index in `Plant.places`.
+    unknowns : (n_unknowns,) array, optional
+        Where to start; with the linear model as it is stated otherwise.
 
     Returns
     -------
     FreeForce
         The best turn.
     """
-    best = _across(stretches, linear, place, linear.as_stated)
+    best = _across(stretches, linear, place, linear.as_stated if unknowns is None else unknowns)
     used, damping = stretches.used, 0.0
     for _ in range(TURNS):
         columns = linear.freedom.columns(stretches, best.response.on(used), best.along, place)
@@ -131,11 +134,57 @@ def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
     every = anywhere(linear.freedom.plant)
     if np.isfinite(stretches.variance).any(2).sum(1).min() < LEAST_SENSORS:
         return every
-    found = sorted((free_force(stretches, linear, place) for place in every.possible), key=lambda one: one.cost)
-    least = found[0].cost
-    equal = tuple(one for one in found if one.cost < least + TIE)
-    possible = tuple(one.place for one in found if one.cost < least + POSSIBLE + PART * least)
+    found = {place: free_force(stretches, linear, place) for place in every.possible}
+    _spread(stretches, linear, found)
+    least = min(one.cost for one in found.values())
+    best_first = sorted(found.values(), key=lambda one: one.cost)
+    equal = tuple(one for one in best_first if one.cost < least + TIE)
+    possible = tuple(one.place for one in best_first if _is_possible(one, least))
     return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
+
+
+def _spread(stretches: Stretches, linear: LinearFit, found: dict[int, FreeForce]) -> None:
+    """Fit places beside possible ones from what explains there: by themselves some end where little is explained."""
+    plant, waiting = linear.freedom.plant, sorted(found, key=lambda place: found[place].cost)
+    while waiting:
+        here = found[waiting.pop(0)]
+        if not _is_possible(here, min(one.cost for one in found.values())):
+            continue
+        for place in neighbours(plant, here.place, BESIDE):
+            if found[place].cost < here.cost + TIE:
+                continue
+            start = linear.freedom.of_no_place(here.unknowns)
+            again = free_force(stretches, linear, place, start)
+            if again.cost < found[place].cost:
+                found[place] = again
+                waiting.append(place)
+
+
+def _is_possible(free: FreeForce, least: float) -> bool:
+    return free.cost < least + POSSIBLE + PART * least
+
+
+def neighbours(plant: Plant, place: int, count: int) -> list[int]:
+    """List the places whose mode shapes are most like those of a place, or most like their opposite.
+
+    Parameters
+    ----------
+    plant : Plant
+        The structure.
+    place : int
+        Index in `Plant.places`.
+    count : int
+        How many.
+
+    Returns
+    -------
+    list of int
+        The most alike first.
+    """
+    shapes = plant.at_places.shapes
+    alike = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
+    nearest = np.argsort(-np.abs(alike @ alike[place]), kind="stable")
+    return [int(i) for i in nearest if i != place][:count]
 
 
 def start_at(stretches: Stretches, linear: LinearFit, free: FreeForce, law: Law) -> Start:

@@ -184,12 +184,40 @@ def motion_at(
     response = respond(plant, stretches.s, freedom.deviations(start.unknowns, start.place))
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
     beyond[freedom.moving] -= freedom.sensor_starts(start.unknowns, response)
-    own, driven = response.at_place(start.place)
-    linear = driven[stretches.input_of] * stretches.force
-    linear[freedom.moving] += freedom.place_starts(start.unknowns, response, start.place)
+    linear = place_lines(stretches, freedom, start.unknowns, response, start.place)
+    own, _ = response.at_place(start.place)
     ratio = response.to_sensors(start.place) / own
     w = clock.at_times(place_motion(stretches, beyond, linear, ratio, None if force is None else -own * force))
     return response, w, clock.velocity(w)
+
+
+def place_lines(
+    stretches: Stretches, freedom: Freedom, unknowns: FloatArray, response: PlantResponse, place: int
+) -> ComplexArray:
+    """Give the motion of a place by the linear model alone.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The data.
+    freedom : Freedom
+        Unknowns of the linear model.
+    unknowns : (n_unknowns,) array
+        In prior standard deviations.
+    response : PlantResponse
+        With these unknowns.
+    place : int
+        Index in `Plant.places`.
+
+    Returns
+    -------
+    (n_blows, n_lines) complex array
+        m s.
+    """
+    _, driven = response.at_place(place)
+    lines = driven[stretches.input_of] * stretches.force
+    lines[freedom.moving] += freedom.place_starts(unknowns, response, place)
+    return np.asarray(lines)
 
 
 def _turn(
