@@ -30,7 +30,7 @@ TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a turn: shorter and shorter 
 TIE = 15.0  # of the cost: less tells no place from another
 POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
 LEAST_SENSORS = 2
-BESIDE = 2  # places beside a possible one that are fitted from its unknowns, where by themselves they leave more
+BESIDE = 3  # places beside a possible one that are fitted from its unknowns, where by themselves they leave more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
