@@ -77,6 +77,15 @@ def test_a_small_bend_is_too_much_only_where_noise_may_hide_a_larger_one(drop, l
     assert search._is_bent(track, fit, drop, least=least) == bent
 
 
+@pytest.mark.parametrize(("drop", "bent"), [(2500.0, False), (3900.0, True)])
+def test_starts_in_motion_imitate_a_larger_bend(drop, bent):
+    """Of 10000 that a law leaves: a two-sided stop that was taken for a cubic spring would gain 3900."""
+    track = SimpleNamespace(
+        stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: True)), linear=SimpleNamespace(cost=3.5e4)
+    )
+    assert search._is_bent(track, SimpleNamespace(cost=1e4, n_rows=16848), drop, least=250.0) == bent
+
+
 def a_look(fits, bend_of):
     return SimpleNamespace(short=None, long=a_track(), fits=fits, bend_of=bend_of)
 
