@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.nonlinear.fitting.free_force import neighbours, start_at
-from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, place_lines, refine
-from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, screen
+from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
+from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, linear_motion_of_place, screen
 from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 from frf_ipz.diagnosis.nonlinear.linear.plant import respond
 
@@ -38,7 +38,7 @@ FINALISTS = 3  # that are simulated on long stretches
 FAR_OFF = 4.0  # mean square over the expected one: with more, laws are simulated as they were read
 MOST_LEFT = 0.5  # of what a linear model leaves of the first moments: with more, they say little of a law
 BETTER = 0.02  # relative drop of the cost that is worth more: by another start, or places beside to be fitted again
-NEIGHBOURS = 3
+NEIGHBOURS = 3  # places beside one: near an end that moves freely the two most alike are both nearer to the end
 LEAST_RATIO = 0.01  # of the motions of two places: with less they are no neighbours, and a law would grow without end
 CLIMBS = 8  # steps to better neighbours
 EXCHANGED, LIKELY = 2, 2.0  # places of the best law that are fitted from its numbers, and times its cost at most
@@ -304,5 +304,5 @@ def _size(track: Track, fit: LawFit) -> float:
     """How much the place of a law moves in all stretches, with the linear model of its fit but without its force."""
     stretches, freedom = track.stretches, track.linear.freedom
     response = respond(freedom.plant, stretches.s, freedom.deviations(fit.unknowns, fit.place))
-    lines = place_lines(stretches, freedom, fit.unknowns, response, fit.place)
-    return float(np.linalg.norm(lines))
+    _, motion = linear_motion_of_place(stretches, freedom, fit.unknowns, response, fit.place)
+    return float(np.linalg.norm(motion))

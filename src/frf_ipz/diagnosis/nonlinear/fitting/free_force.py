@@ -136,8 +136,8 @@ def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
         return every
     found = {place: free_force(stretches, linear, place) for place in every.possible}
     _spread(stretches, linear, found)
-    least = min(one.cost for one in found.values())
     best_first = sorted(found.values(), key=lambda one: one.cost)
+    least = best_first[0].cost
     equal = tuple(one for one in best_first if one.cost < least + TIE)
     possible = tuple(one.place for one in best_first if _is_possible(one, least))
     return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
@@ -150,10 +150,10 @@ def _spread(stretches: Stretches, linear: LinearFit, found: dict[int, FreeForce]
         here = found[waiting.pop(0)]
         if not _is_possible(here, min(one.cost for one in found.values())):
             continue
+        start = linear.freedom.of_no_place(here.unknowns)
         for place in neighbours(plant, here.place, BESIDE):
             if found[place].cost < here.cost + TIE:
                 continue
-            start = linear.freedom.of_no_place(here.unknowns)
             again = free_force(stretches, linear, place, start)
             if again.cost < found[place].cost:
                 found[place] = again

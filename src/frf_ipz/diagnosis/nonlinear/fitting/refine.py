@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
-from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion, linear_motion_of_place
 from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
 
 if TYPE_CHECKING:
@@ -184,40 +184,10 @@ def motion_at(
     response = respond(plant, stretches.s, freedom.deviations(start.unknowns, start.place))
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
     beyond[freedom.moving] -= freedom.sensor_starts(start.unknowns, response)
-    linear = place_lines(stretches, freedom, start.unknowns, response, start.place)
-    own, _ = response.at_place(start.place)
+    own, linear = linear_motion_of_place(stretches, freedom, start.unknowns, response, start.place)
     ratio = response.to_sensors(start.place) / own
     w = clock.at_times(place_motion(stretches, beyond, linear, ratio, None if force is None else -own * force))
     return response, w, clock.velocity(w)
-
-
-def place_lines(
-    stretches: Stretches, freedom: Freedom, unknowns: FloatArray, response: PlantResponse, place: int
-) -> ComplexArray:
-    """Give the motion of a place by the linear model alone.
-
-    Parameters
-    ----------
-    stretches : Stretches
-        The data.
-    freedom : Freedom
-        Unknowns of the linear model.
-    unknowns : (n_unknowns,) array
-        In prior standard deviations.
-    response : PlantResponse
-        With these unknowns.
-    place : int
-        Index in `Plant.places`.
-
-    Returns
-    -------
-    (n_blows, n_lines) complex array
-        m s.
-    """
-    _, driven = response.at_place(place)
-    lines = driven[stretches.input_of] * stretches.force
-    lines[freedom.moving] += freedom.place_starts(unknowns, response, place)
-    return np.asarray(lines)
 
 
 def _turn(

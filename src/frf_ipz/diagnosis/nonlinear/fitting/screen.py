@@ -179,7 +179,7 @@ def screen(
     plant = fit.response.plant
     clock = Clock(stretches)
     contracted = _Contracted(stretches, fit)
-    linear_size = np.array([_linear_motion(fit, stretches, place).std() for place in range(len(plant.places))])
+    linear_size = np.array([_of_place(fit, stretches, place)[1].std() for place in range(len(plant.places))])
     chosen = range(len(plant.places)) if places is None else places
     guesses: list[Guess] = []
     for place in chosen:
@@ -219,16 +219,45 @@ def linear_motion(stretches: Stretches, freedom: Freedom, response: PlantRespons
     return motion
 
 
+def linear_motion_of_place(
+    stretches: Stretches, freedom: Freedom, unknowns: FloatArray, response: PlantResponse, place: int
+) -> tuple[ComplexArray, ComplexArray]:
+    """Give the motion of a place by the linear model alone, and how it answers a force on itself.
+
+    Parameters
+    ----------
+    stretches : Stretches
+        The forces.
+    freedom : Freedom
+        Unknowns of the linear model.
+    unknowns : (n_unknowns,) array
+        In prior standard deviations: how stretches start that start in motion.
+    response : PlantResponse
+        With these unknowns, on all lines.
+    place : int
+        Index in `Plant.places`.
+
+    Returns
+    -------
+    own : (n_lines,) complex array
+        Receptance of the place to itself, m/N.
+    motion : (n_blows, n_lines) complex array
+        m s.
+    """
+    own, driven = response.at_place(place)
+    motion = driven[stretches.input_of] * stretches.force
+    motion[freedom.moving] += freedom.place_starts(unknowns, response, place)
+    return own, motion
+
+
 def as_real(values: ComplexArray) -> FloatArray:
     """Lay complex arrays out as rows of real numbers: (..., n_blows, n_sensors, n_lines) to (..., n_rows)."""
     lead = values.shape[:-3]
     return np.ascontiguousarray(values.reshape(*lead, -1)).view(np.float64)
 
 
-def _linear_motion(fit: LinearFit, stretches: Stretches, place: int) -> ComplexArray:
-    motion = fit.response.at_place(place)[1][stretches.input_of] * stretches.force
-    motion[fit.freedom.moving] += fit.freedom.place_starts(fit.unknowns, fit.response, place)
-    return motion
+def _of_place(fit: LinearFit, stretches: Stretches, place: int) -> tuple[ComplexArray, ComplexArray]:
+    return linear_motion_of_place(stretches, fit.freedom, fit.unknowns, fit.response, place)
 
 
 class _Contracted:
@@ -260,8 +289,7 @@ def _at_place(
     place: int,
 ) -> list[Guess]:
     to_sensors = fit.response.to_sensors(place)
-    own, _ = fit.response.at_place(place)
-    linear = _linear_motion(fit, stretches, place)
+    own, linear = _of_place(fit, stretches, place)
     w = clock.at_times(place_motion(stretches, fit.beyond, linear, to_sensors / own))
     v = clock.velocity(w)
     tried = [(law, float(shape)) for law in laws for shape in law.shapes(np.abs(w).max(), np.abs(v).max())]
