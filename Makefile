@@ -46,7 +46,7 @@ bench: .venv/peers
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-only -s
 
 proof: .venv/run
-	$(BIN)/python pipelines/proof.py
+	$(BIN)/frf-testbench prove
 
 clean:
 	rm -rf .venv results

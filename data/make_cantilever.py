@@ -6,22 +6,19 @@ Run ``python data/make_cantilever.py`` to write ``raw/cantilever/hits/*.csv`` an
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "pipelines"))
-
-from simulator.cases.files import read_beam, write_recording
-from simulator.signals.channels import AntiAlias, Noise, quantise
-from simulator.signals.hammer import Blow
-from simulator.signals.laplace import LaplaceGrid
-from simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
-from simulator.structures.beams import build_beam
-from simulator.structures.points import Point
-from simulator.structures.reality import Reality
+from frf_testbench.simulator.cases.files import read_beam, write_recording
+from frf_testbench.simulator.signals.channels import AntiAlias, Noise, quantise
+from frf_testbench.simulator.signals.hammer import Blow
+from frf_testbench.simulator.signals.laplace import LaplaceGrid
+from frf_testbench.simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
+from frf_testbench.simulator.structures.beams import build_beam
+from frf_testbench.simulator.structures.points import Point
+from frf_testbench.simulator.structures.reality import Reality
 
 FloatArray = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from frf_ipz.pairing.assignment import pair
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.update import update_model
-from updating_bench.random_structures import random_beam, scaled, stiffness_errors
-from updating_bench.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
+from frf_testbench.updating.random_structures import random_beam, scaled, stiffness_errors
+from frf_testbench.updating.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
 
 NOISE = 0.002
 SEED = 3

@@ -13,8 +13,8 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.published.step import PublishedStep, StepSettings
 from frf_ipz.updating.update import update_model
-from updating_bench.paper_cases import section_4
-from updating_study import set_up
+from frf_testbench.updating.paper_cases import section_4
+from frf_testbench.updating.study import set_up
 
 UPDATE_MS = 50.0  # one minimal-change update of a reduced model of order 12
 LAPACK_RATIO = 4.0  # a published iteration over its two bare dgeev calls of order 12

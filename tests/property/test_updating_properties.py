@@ -13,7 +13,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from updating_study import set_up
+from frf_testbench.updating.study import set_up
 
 EXAMPLES = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])  # an update each
 SEEDS = st.integers(2000, 10**6)  # beyond all that constants were chosen or reported on

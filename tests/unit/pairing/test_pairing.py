@@ -17,8 +17,8 @@ from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet
-from updating_bench.synthetic_fit import as_fit
-from updating_study import set_up
+from frf_testbench.updating.study import set_up
+from frf_testbench.updating.synthetic_fit import as_fit
 
 SEEDS = range(500, 512)  # none of them was looked at when the constants were chosen
 LABELS = (label(2, 1), label(4, 1))

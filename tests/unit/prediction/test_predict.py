@@ -15,7 +15,7 @@ from frf_ipz.fe.response import model_frfs
 from frf_ipz.prediction.advice import WIDE_DB, wide_stretches
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
-from updating_study import set_up, study
+from frf_testbench.updating.study import set_up, study
 
 LINES = np.linspace(3.0, 110.0, 400)
 LABELS = (label(2, 1, FrfQuantity.ACCELERANCE), label(-4, -3, FrfQuantity.ACCELERANCE))
@@ -144,7 +144,7 @@ def test_a_point_that_the_model_does_not_know_is_refused():
 
 
 def test_bands_cover_the_truth_on_held_back_structures():
-    """A slice of the study in pipelines/updating_study.py; the whole of it is what is reported."""
+    """A slice of the study in frf_testbench/updating/study.py; the whole of it is what is reported."""
     rows = pd.concat([study(seed, with_ipz=False) for seed in range(700, 712)])
     assert 0.8 < rows.covered.mean() < 0.97  # 36 FRFs: two standard deviations of the mean are 0.06
     assert rows["minimal-change"].median() < rows.nominal.median() / 8

@@ -6,9 +6,9 @@ import math
 import pytest
 from numpy.testing import assert_allclose
 
-from proof_tools.answers import FAILED, AnswerError, read_diagnosis, read_truth
-from proof_tools.judging import is_wrong_name, judge, reported_set
-from proof_tools.places import Layout
+from frf_testbench.proof.answers import FAILED, AnswerError, read_diagnosis, read_truth
+from frf_testbench.proof.judging import is_wrong_name, judge, reported_set
+from frf_testbench.proof.places import Layout
 
 EXACT = 1e-12  # relative: quotients of decimal numbers
 MASS = {"effect": "added_mass", "location": {"nodes": [12]}, "parameters": {"mass_kg": 0.02}}

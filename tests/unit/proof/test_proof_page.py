@@ -1,20 +1,17 @@
 """The whole proof with a command that guesses: the page stands on its own and says what was counted."""
 
-import ast
 import base64
 import json
 import re
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-import proof
-import proof_tools
-from proof_tools.page import write_page, write_scores
-from proof_tools.scoring import bars
+from frf_testbench.proof.page import write_page, write_scores
+from frf_testbench.proof.prove import run_proof
+from frf_testbench.proof.scoring import bars
 
 GUESS = """
 import json, sys
@@ -70,7 +67,7 @@ def scored(tmp_path_factory):
     guess = folder / "guess.py"
     guess.write_text(GUESS, encoding="utf-8")
     out = folder / "results"
-    proof.main(["--cases", str(folder), "--out", str(out)], command=[sys.executable, str(guess)])
+    run_proof(cases=folder, out=out, command=[sys.executable, str(guess)])
     return out
 
 
@@ -116,13 +113,3 @@ def test_a_page_without_cases_is_drawn(tmp_path):
     page.feed((tmp_path / "proof.html").read_text(encoding="utf-8"))
     assert page.open == []
     assert json.loads((tmp_path / "scores.json").read_text(encoding="utf-8"))["cases"] == []
-
-
-def test_modules_and_functions_are_small():
-    for path in [*Path(proof_tools.__file__).parent.glob("*.py"), Path(proof.__file__)]:
-        text = path.read_text(encoding="utf-8")
-        assert len(text.splitlines()) <= 400, path.name
-        for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.FunctionDef):
-                start = node.body[1 if ast.get_docstring(node) else 0].lineno
-                assert node.end_lineno - start < 40, f"{path.name}: {node.name}"

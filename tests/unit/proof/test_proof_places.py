@@ -2,7 +2,7 @@
 
 import pytest
 
-from proof_tools.places import Layout, compare_places, read_layout
+from frf_testbench.proof.places import Layout, compare_places, read_layout
 
 BEAM = Layout(ends={"left": 1, "right": 41})
 FRAME = Layout(springs={"k1": (0, 1), "k2": (1, 2), "k3": (2, 3), "k4": (0, 3)})

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from proof_tools.points import frf_error, nominal_frfs, point_errors
+from frf_testbench.proof.points import frf_error, nominal_frfs, point_errors
 
 EXACT = 1e-12  # relative: the same numbers in another order
 FORMULA = 1e-9  # relative: one mass on one spring against its formula, in double precision

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom
 
-from proof_tools.rates import Rate, calibration, calibration_error
+from frf_testbench.proof.rates import Rate, calibration, calibration_error
 
 ROOT_FINDING = 1e-6  # relative: quantiles of the beta distribution in double precision
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 from numpy.testing import assert_allclose
 
-from proof_tools.commands import Done
-from proof_tools.judging import Judgement, ParameterScore
-from proof_tools.points import PointErrors
-from proof_tools.scoring import Scored, bars
+from frf_testbench.proof.commands import Done
+from frf_testbench.proof.judging import Judgement, ParameterScore
+from frf_testbench.proof.points import PointErrors
+from frf_testbench.proof.scoring import Scored, bars
 
 EXACT = 1e-12  # relative: quotients of small numbers
 RIGHT = Judgement(

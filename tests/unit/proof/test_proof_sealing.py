@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from proof_tools.blind import diagnose_all, predict_all, worth_predicting, write_pipeline
-from proof_tools.commands import code_digest, read_done, run, run_all
-from proof_tools.plan import FULL, SLICE, Folders, plan_cases, turns
-from proof_tools.sealing import BrokenSealError, check_seal, make_cases
-from simulator.effects.catalogue import CONTRACT, NONLINEAR
+from frf_testbench.proof.blind import diagnose_all, predict_all, worth_predicting, write_pipeline
+from frf_testbench.proof.commands import code_digest, read_done, run, run_all
+from frf_testbench.proof.plan import FULL, SLICE, Folders, plan_cases, turns
+from frf_testbench.proof.sealing import BrokenSealError, check_seal, make_cases
+from frf_testbench.simulator.effects.catalogue import CONTRACT, NONLINEAR
 
 COUNTS = {"linear": 1, "null": 1}
 FAKE = """

@@ -4,16 +4,15 @@ import json
 
 import pytest
 
-import proof
-from proof_tools.commands import public_command
+from frf_testbench.proof.commands import public_command
+from frf_testbench.proof.prove import run_proof
 
 SLICE = {"linear": 2, "null": 1, "nonlinear": 1, "pair": 0, "unknown": 1}
 
 
 @pytest.mark.slow
 def test_a_slice_of_the_proof_runs_through(tmp_path):
-    counts = [text for group, count in SLICE.items() for text in (f"--{group}", str(count))]
-    proof.main([*counts, "--out", str(tmp_path)], command=public_command())
+    run_proof(out=tmp_path, counts=SLICE, command=public_command())
     scores = json.loads((tmp_path / "scores.json").read_text(encoding="utf-8"))
     judged = [case["judgement"] for case in scores["cases"]]
     assert sorted(one["group"] for one in judged) == ["linear", "linear", "nonlinear", "null", "unknown"]

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from simulator.signals.receptance import solve_modes
-from simulator.structures.beams import BeamDrawing, PointPart, Section, build_beam
-from simulator.structures.points import Point
-from simulator.structures.reality import Reality
+from frf_testbench.simulator.signals.receptance import solve_modes
+from frf_testbench.simulator.structures.beams import BeamDrawing, PointPart, Section, build_beam
+from frf_testbench.simulator.structures.points import Point
+from frf_testbench.simulator.structures.reality import Reality
 
 CLOSED_FORM = 1e-7  # roots of the characteristic equations are given to 1e-9
 MESH = 2e-6  # what doubling the number of splines still moves in the first six frequencies

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import pytest
 from numpy.testing import assert_allclose
 
-from simulator.cases.campaign import swing
-from simulator.cases.case import make_case
-from simulator.effects import catalogue
-from simulator.effects.effect import Bench, Effect
-from simulator.structures.points import Point
+from frf_testbench.simulator.cases.campaign import swing
+from frf_testbench.simulator.cases.case import make_case
+from frf_testbench.simulator.effects import catalogue
+from frf_testbench.simulator.effects.effect import Bench, Effect
+from frf_testbench.simulator.structures.points import Point
 
 ALGEBRA = 1e-12  # relative: the same sum of modes twice
 

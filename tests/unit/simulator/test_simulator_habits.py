@@ -6,16 +6,16 @@ from functools import cache
 import numpy as np
 from numpy.testing import assert_allclose
 
-from simulator.cases.campaign import store, swing, true_records
-from simulator.cases.case import make_case
-from simulator.cases.set_up import draw_set_up
-from simulator.cases.specimens import draw_specimen
-from simulator.cases.world import make_world
-from simulator.effects.effect import Effect
-from simulator.signals.channels import Noise
-from simulator.signals.laws import PowerSpring
-from simulator.signals.receptance import solve_modes
-from simulator.structures.points import Point
+from frf_testbench.simulator.cases.campaign import store, swing, true_records
+from frf_testbench.simulator.cases.case import make_case
+from frf_testbench.simulator.cases.set_up import draw_set_up
+from frf_testbench.simulator.cases.specimens import draw_specimen
+from frf_testbench.simulator.cases.world import make_world
+from frf_testbench.simulator.effects.effect import Effect
+from frf_testbench.simulator.signals.channels import Noise
+from frf_testbench.simulator.signals.laws import PowerSpring
+from frf_testbench.simulator.signals.receptance import solve_modes
+from frf_testbench.simulator.structures.points import Point
 
 ROUND = 5e-5  # what comes round in the transforms of the short and of the long record
 SHORT = 1500  # samples from blow to blow: the structure still moves

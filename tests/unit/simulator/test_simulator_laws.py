@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from simulator.effects.nonlinear import draw_place
-from simulator.signals.hammer import Blow
-from simulator.signals.integrate import _weights, law_force
-from simulator.signals.laplace import LaplaceGrid
-from simulator.signals.laws import BoucWen, Coulomb, Gap, PowerSpring, SquareDrag, TwoSided
-from simulator.signals.receptance import ModalReceptance
+from frf_testbench.simulator.effects.nonlinear import draw_place
+from frf_testbench.simulator.signals.hammer import Blow
+from frf_testbench.simulator.signals.integrate import _weights, law_force
+from frf_testbench.simulator.signals.laplace import LaplaceGrid
+from frf_testbench.simulator.signals.laws import BoucWen, Coulomb, Gap, PowerSpring, SquareDrag, TwoSided
+from frf_testbench.simulator.signals.receptance import ModalReceptance
 
 OMEGA = 2 * np.pi * np.array([20.0, 57.0, 130.0])
 RATIO = np.full(3, 0.005)

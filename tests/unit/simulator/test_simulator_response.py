@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from simulator.effects.dissipative import lossy
-from simulator.signals.channels import AntiAlias, Noise, quantise
-from simulator.signals.hammer import Blow, draw_blows
-from simulator.signals.laplace import LaplaceGrid
-from simulator.signals.receptance import Attachment, ModalReceptance
+from frf_testbench.simulator.effects.dissipative import lossy
+from frf_testbench.simulator.signals.channels import AntiAlias, Noise, quantise
+from frf_testbench.simulator.signals.hammer import Blow, draw_blows
+from frf_testbench.simulator.signals.laplace import LaplaceGrid
+from frf_testbench.simulator.signals.receptance import Attachment, ModalReceptance
 
 EXACT = 1e-4  # what comes round after twice the length of the record
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from simulator.signals.receptance import modal_receptance, solve_modes
-from simulator.structures.frames import FrameDrawing, Spring, build_frame
-from simulator.structures.grids import GridDrawing, Member, build_grid
-from simulator.structures.nominal import nominal_grid, nominal_plate
-from simulator.structures.plates import PlateDrawing, build_plate
-from simulator.structures.points import Point
-from simulator.structures.reality import Extra, Reality, Variation
+from frf_testbench.simulator.signals.receptance import modal_receptance, solve_modes
+from frf_testbench.simulator.structures.frames import FrameDrawing, Spring, build_frame
+from frf_testbench.simulator.structures.grids import GridDrawing, Member, build_grid
+from frf_testbench.simulator.structures.nominal import nominal_grid, nominal_plate
+from frf_testbench.simulator.structures.plates import PlateDrawing, build_plate
+from frf_testbench.simulator.structures.points import Point
+from frf_testbench.simulator.structures.reality import Extra, Reality, Variation
 
 EIGENSOLVER = 1e-9  # what a dense generalised eigenproblem leaves of exact matrices
 SPLINES = 2e-6  # of a plate on 20 intervals, in its first six frequencies

@@ -11,7 +11,7 @@ from frf_ipz.runs.codec import load_result, save_result
 from frf_ipz.updating.along_structure import change_along_structure, notable_changes
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
-from updating_study import set_up
+from frf_testbench.updating.study import set_up
 
 LOCAL, GLOBAL = 11, 7  # a beam that is off in stretches, and a plate whose stiffness is 20 % lower throughout
 SEEDS = range(800, 810)

@@ -12,8 +12,8 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.published.step import PublishedStep, StepSettings
 from frf_ipz.updating.update import method_names, update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from updating_bench.paper_cases import section_4, section_5
-from updating_study import set_up
+from frf_testbench.updating.paper_cases import section_4, section_5
+from frf_testbench.updating.study import set_up
 
 STEP = 1e-4  # relative change of the root that moves most
 SLOPES = 1e-4  # of the largest entry of a row: roots are good to 1e-9 without balancing, and bend by the step

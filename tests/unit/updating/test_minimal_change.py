@@ -17,9 +17,9 @@ from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, structural_ba
 from frf_ipz.updating.regions import reduced_regions
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from updating_bench.random_structures import random_case, scaled
-from updating_bench.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
-from updating_study import set_up
+from frf_testbench.updating.random_structures import random_case, scaled
+from frf_testbench.updating.study import set_up
+from frf_testbench.updating.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
 
 SEEDS = (3, 7, 11, 21)  # structures with one to four FRFs, one of them free to fly
 WITHIN_NOISE = 4.0  # standard deviations: hardly one of a hundred targets lies beyond

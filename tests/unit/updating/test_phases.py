@@ -13,7 +13,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, structural_basis
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.updated_model import UpdateStatus
-from updating_study import set_up
+from frf_testbench.updating.study import set_up
 
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step

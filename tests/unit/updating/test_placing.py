@@ -9,7 +9,7 @@ from frf_ipz.diagnosis.misplacements import misplacements
 from frf_ipz.updating.placing import Misplacement, with_misplacements
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model
-from updating_study import set_up
+from frf_testbench.updating.study import set_up
 
 SEEDS = (20, 12)  # a plate and a frame
 SMALL = 1e-5  # of a row: what is left of second order is as small

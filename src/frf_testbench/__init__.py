@@ -1,0 +1,1 @@
+"""What frf_ipz is judged by: an independent simulator, the blind proof of the diagnosis, the study of updating."""

@@ -1,0 +1,105 @@
+"""``frf-testbench``: make blind cases, prove the diagnosis on them, and judge the update on known structures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    help="What frf_ipz is judged by: simulated machines with sealed answers, and structures that are known.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Option("--out", help="Folder of the case.")],
+    seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same case.")],
+    effect: Annotated[
+        str, typer.Option("--effect", help="What is concealed: null, an effect, unknown[:KIND], pair[:A+B].")
+    ] = "null",
+    structure: Annotated[str | None, typer.Option("--structure", help="Kind of specimen; drawn by default.")] = None,
+    truth: Annotated[Path | None, typer.Option("--truth", help="Folder of the answers; truth beside the case.")] = None,
+) -> None:
+    """Make a blind case of a vibration test: recordings, a model, and sealed answers."""
+    from frf_testbench.simulator.cases.case import make_case
+
+    case = make_case(seed, effect, structure=structure)
+    answers = (truth or out.parent / "truth") / f"{out.name}.json"
+    case.write(out, answers)
+    print(f"{out}: {case.world.specimen.name}, {len(case.drives)} recordings; answers in {answers}")
+
+
+@app.command("check-simulator")
+def check_simulator(
+    each: Annotated[int, typer.Option("--each", help="Specimens of each kind.")] = 3,
+    kinds: Annotated[list[str] | None, typer.Option("--kind", help="Kind of specimen; all by default.")] = None,
+    laws: Annotated[bool, typer.Option("--laws/--no-laws", help="Halve the step of force laws too.")] = True,
+) -> None:
+    """Check the simulator against nominal models and its own time step."""
+    from frf_testbench.simulator.self_check import print_checks
+
+    print_checks(each=each, kinds=kinds, laws=laws)
+
+
+@app.command()
+def prove(
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; results/proof by default.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A slice of a few cases.")] = False,
+    linear: Annotated[int | None, typer.Option("--linear", metavar="N", help="Cases with a linear effect.")] = None,
+    null: Annotated[int | None, typer.Option("--null", metavar="N", help="Cases with nothing missing.")] = None,
+    nonlinear: Annotated[int | None, typer.Option("--nonlinear", metavar="N", help="Cases with a force law.")] = None,
+    pair: Annotated[int | None, typer.Option("--pair", metavar="N", help="Cases with two effects.")] = None,
+    unknown: Annotated[int | None, typer.Option("--unknown", metavar="N", help="Cases outside the table.")] = None,
+    seed_shift: Annotated[int, typer.Option("--seed-shift", metavar="N", help="Added to all seeds, for a trial.")] = 0,
+    jobs: Annotated[int, typer.Option("--jobs", help="Cases at the same time.")] = 2,
+    points: Annotated[
+        int | None, typer.Option("--points", metavar="N", help="Explained cases whose points are predicted.")
+    ] = None,
+    cases: Annotated[
+        Path | None, typer.Option("--cases", help="Folder of case_NN folders to score instead of making cases.")
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option("--answers", help="Folder of their answers case_NN.json; truth in it by default.")
+    ] = None,
+) -> None:
+    """Prove the diagnosis on blind cases: make, seal, diagnose, open, score, and write a page.
+
+    It goes on where it was stopped; cases that a changed package has not seen are diagnosed again.
+    """
+    from frf_testbench.proof.prove import MOST_PREDICTED, run_proof
+
+    counts = {"linear": linear, "null": null, "nonlinear": nonlinear, "pair": pair, "unknown": unknown}
+    run_proof(
+        out=out,
+        quick=quick,
+        counts={group: count for group, count in counts.items() if count is not None},
+        seed_shift=seed_shift,
+        jobs=jobs,
+        points=MOST_PREDICTED if points is None else points,
+        cases=cases,
+        answers=answers,
+    )
+
+
+@app.command()
+def updating(
+    first_seed: Annotated[int | None, typer.Argument(metavar="[FIRST_SEED]", help="1000 or more.")] = None,
+    count: Annotated[int | None, typer.Argument(metavar="[COUNT]", help="Structures; 200 take ten minutes.")] = None,
+) -> None:
+    """Update random beams, frames and plates, and judge FRFs predicted where nobody measured."""
+    from frf_testbench.updating.study import COUNT, FIRST_SEED, print_study
+
+    print_study(FIRST_SEED if first_seed is None else first_seed, COUNT if count is None else count)
+
+
+@app.command()
+def paper() -> None:
+    """Compare `ipz`, `minimal-change` and the trivial answer on both examples of Dorosti et al. (2018)."""
+    from frf_testbench.updating.paper_comparison import print_comparison
+
+    print_comparison()

@@ -1,0 +1,184 @@
+"""Check the simulator against closed formulas and against nominal models, before its cases judge anything.
+
+``frf-testbench check-simulator`` prints a table: for random specimens of every kind, without scatter, noise
+and effects, how far the truth is from the nominal model in frequency and in the FRFs, and how far FRFs that are
+estimated from the simulated records are from the nominal model and from the truth. Then the convergence of the
+nonlinear laws with the time step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from frf_testbench.simulator.cases.campaign import draw_drives, true_records
+from frf_testbench.simulator.cases.case import make_case
+from frf_testbench.simulator.cases.scatter import no_scatter
+from frf_testbench.simulator.cases.set_up import draw_set_up
+from frf_testbench.simulator.cases.specimens import KINDS, draw_specimen
+from frf_testbench.simulator.cases.world import World, make_world
+from frf_testbench.simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
+from frf_testbench.simulator.structures.points import Point
+from frf_testbench.simulator.structures.reality import hang
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SIGMA = 12.0  # decay of the exponential window over a record, for estimates from records: what is cut off is e^-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """How far the truth without scatter is from the nominal model.
+
+    Parameters
+    ----------
+    kind, seed
+        Of the specimen.
+    frequency : float
+        Largest relative difference of the natural frequencies in band.
+    frf : float
+        Norm of the difference of all FRFs in band over their norm, at the decay of the estimates.
+    recorded : float
+        The same between FRFs estimated from simulated records and the nominal model.
+    exact : float
+        The same between FRFs estimated from simulated records and the truth: the simulation itself.
+    median : float
+        Median over all lines and FRFs of the relative difference: without the peaks, where a small shift weighs much.
+    """
+
+    kind: str
+    seed: int
+    frequency: float
+    frf: float
+    recorded: float
+    exact: float
+    median: float
+
+
+def check_nominal(kind: str, seed: int) -> Check:
+    """Compare truth, records and nominal model of one specimen.
+
+    Parameters
+    ----------
+    kind : str
+        Of the specimen.
+    seed : int
+        Of the draw.
+
+    Returns
+    -------
+    Check
+        Of a hammer test.
+    """
+    rng = np.random.default_rng([seed, 99])
+    specimen = draw_specimen(rng, kind)
+    drawn = specimen.build()
+    modes = solve_modes(drawn)
+    set_up = draw_set_up(rng, specimen, drawn, modes)
+    early = 100 / set_up.rate_hz  # all that rings before the blow is in the record
+    set_up = replace(set_up, kind="hammer", running=False, start_s=early, in_one_file=False)
+    ideal = make_world(specimen, set_up, no_scatter(specimen, set_up, float(modes.frequencies_hz[drawn.n_rigid])), ())
+    nominal_frequencies, nominal = _nominal_motion(ideal)
+    low, high = set_up.band_hz
+    truth_frequencies = ideal.modes.frequencies_hz
+    inside = np.flatnonzero((truth_frequencies >= low) & (truth_frequencies <= high))
+    ratio = nominal_frequencies[inside] / truth_frequencies[inside]
+    s, estimate = _from_records(ideal, rng)
+    truth, model = ideal.motion(s), ideal.motion(s, nominal)
+    return Check(
+        kind=kind,
+        seed=seed,
+        frequency=float(np.abs(ratio - 1).max()),
+        frf=_norm(model, truth),
+        recorded=_norm(estimate, model),
+        exact=_norm(estimate, truth),
+        median=float(np.median(np.abs(model / truth - 1))),
+    )
+
+
+def _norm(a: ComplexArray | FloatArray, b: ComplexArray | FloatArray) -> float:
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+def _nominal_motion(ideal: World) -> tuple[FloatArray, ModalReceptance]:
+    """Natural frequencies and receptance of the nominal model, with the truth's damping and cords."""
+    structure = hang(ideal.specimen.nominal().structure(), ideal.scatter.cords_hz)
+    modes = solve_modes(structure)
+    set_up, direction = ideal.set_up, ideal.specimen.direction
+    nodes = [sensor.node for sensor in set_up.sensors] + [node for node, _ in set_up.struck]
+    rows = np.array([structure.row(Point(node, direction)) for node in nodes])
+    ratio = np.concatenate([np.full(structure.n_rigid, ideal.scatter.cords_damping), [set_up.damping_ratio]])
+    return modes.frequencies_hz, modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[-1]))
+
+
+def _from_records(world: World, rng: np.random.Generator) -> tuple[ComplexArray, ComplexArray]:
+    """Lines s and FRFs (n_s, n_sensors, n_struck) estimated from the strongest noise-free blow of each point."""
+    set_up = world.set_up
+    drives = draw_drives(rng, replace(set_up, blows_each=1))
+    signals, _ = true_records(world, drives)
+    n = set_up.n_samples
+    index = np.round(set_up.lines_hz * n / set_up.rate_hz).astype(int)
+    sigma = SIGMA * set_up.rate_hz / n
+    spectra = np.fft.rfft(signals * np.exp(-SIGMA * np.arange(n) / n), axis=-1)[:, :, index]
+    units = np.array([sensor.unit_si for sensor in set_up.sensors])
+    frf = spectra[:, 1:] * units[:, None] / spectra[:, :1]
+    return sigma + 2j * np.pi * set_up.lines_hz, frf.transpose(2, 1, 0)
+
+
+def check_step(effect: str, seed: int) -> tuple[float, float]:
+    """Halve the time step of a nonlinear case.
+
+    Parameters
+    ----------
+    effect : str
+        A nonlinear effect.
+    seed : int
+        Of the case.
+
+    Returns
+    -------
+    all, in_band : float
+        Change of the responses, and of their part in the band, norm over norm.
+    """
+    case = make_case(seed, effect)
+    world, drives = case.world, case.drives
+    coarse, _ = true_records(world, drives)
+    fine, _ = true_records(world, drives, refine=2)
+    set_up = world.set_up
+    index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
+    a, b = (np.fft.rfft(signals[:, 1:], axis=-1)[:, :, index] for signals in (coarse, fine))
+    return _norm(coarse[:, 1:], fine[:, 1:]), _norm(a, b)
+
+
+def print_checks(*, each: int = 3, kinds: Sequence[str] | None = None, laws: bool = True) -> None:
+    """Print the tables.
+
+    Parameters
+    ----------
+    each : int
+        Specimens of each kind.
+    kinds : sequence of str, optional
+        Kinds of specimens; all by default.
+    laws : bool
+        Halve the step of force laws too.
+    """
+    print(f"{'specimen':17}{'seed':>5}{'frequency':>12}{'FRF':>10}{'median':>10}{'records':>10}{'simulation':>12}")
+    for kind in kinds or KINDS:
+        for seed in range(each):
+            c = check_nominal(kind, seed)
+            print(
+                f"{kind:17}{seed:5}{c.frequency:12.1e}{c.frf:10.1e}{c.median:10.1e}{c.recorded:10.1e}{c.exact:12.1e}",
+                flush=True,
+            )
+    if not laws:
+        return
+    print(f"\n{'law':25}{'seed':>5}{'responses':>12}{'in band':>10}   (change when the step is halved)")
+    effects = ("cubic_stiffness", "gap_contact", "dry_friction", "unknown:bouc_wen", "unknown:square_drag")
+    for effect in effects:
+        for seed in range(each):
+            change, in_band = check_step(effect, seed)
+            print(f"{effect:25}{seed:5}{change:12.1e}{in_band:10.1e}", flush=True)

@@ -1,0 +1,130 @@
+"""Compare `ipz` as published, `minimal-change` and the trivial answer on the two examples of Dorosti et al. (2018).
+
+``frf-testbench paper``; it takes half a minute. Section 4 has a known truth, so the point of interest can be judged
+there; of section 5 only the poles and zeros of table 5 are known.
+"""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
+from frf_ipz.structure import ReducedModel
+from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.update import update_model
+from frf_ipz.updating.updated_model import UpdatedModel
+from frf_testbench.updating.paper_cases import PaperCase, published, section_4, section_5, shown_zeros, table
+
+BAND_RAD_S = np.linspace(40.0, 3900.0, 4000)  # section 4: where the paper compares FRFs
+
+
+def print_comparison() -> None:
+    """Print the tables."""
+    with pd.option_context("display.width", 200, "display.max_columns", 20, "display.float_format", "{:.5g}".format):
+        print("Section 4 (poles and zeros in rad/s)\n", compare_section_4().to_string(), "\n")
+        for blow, where in (("89:z", "44 cm, as the text says"), ("88:z", "43.5 cm, as the table's zeros say")):
+            print(f"Section 5, table 5 (Hz), the blow at {where}\n", compare_section_5(blow).to_string(), "\n")
+        print("Where the blow was: misfit to the three numerical zeros of table 5\n", places_struck().to_string())
+        print(f"Smallest misfit at {fitted_place_cm():.2f} cm from the clamp")
+
+
+def compare_section_4() -> pd.DataFrame:
+    """One row a method: how it ended and how good the point of interest is."""
+    case = section_4()
+    rows = {"nominal": judge(case, case.reduced)}
+    rows["measured poles, nominal shapes"] = judge(case, with_measured_poles(case.reduced, case.pairs))
+    for name, options, parts in (
+        ("ipz, delta 1e-5", published(4, 1e-5), False),
+        ("ipz, delta 1e-1", published(4, 1e-1), False),
+        ("minimal-change, any stiffness", UpdateOptions(), False),
+        ("minimal-change, elements", UpdateOptions(), True),
+    ):
+        start = process_time()
+        basis = structural_basis(case.full, case.reduced) if parts else None
+        updated = update_model(case.reduced, case.fit, case.pairs, options, basis=basis)
+        rows[name] = judge(case, updated.model, updated) | {"cpu_s": process_time() - start}
+    return pd.DataFrame(rows).T
+
+
+def judge(case: PaperCase, model: ReducedModel, updated: UpdatedModel | None = None) -> dict[str, float]:
+    """Judge a model by its FRF and its zeros at the point of interest, and an update by its targets."""
+    s = 1j * BAND_RAD_S
+    agreement = compare_frfs(case.truth.receptance(s, case.point)[:, None], model_frfs(model, [case.point], s))
+    real = case.truth.zeros(case.point)
+    real = real[(real.imag < BAND_RAD_S[-1]) & (np.abs(real.real) < 0.1 * np.abs(real))]
+    zeros = shown_zeros(model, case.point)[: len(real)]
+    row = {
+        "dB": float(agreement.median_db[0]),
+        "X_S": float(agreement.shape[0]),
+        "X_A": float(agreement.amplitude[0]),
+        "zeros_%": worst_percent(zeros, real),
+    }
+    if updated is not None:
+        matrix = model.stiffness
+        row["iterations"] = float(updated.history.groupby("phase").iteration.max().sum())
+        row["targets_%"] = worst_percent(updated.after, case.targets)
+        row["epsilon"] = epsilon(updated.after, case.targets)
+        row["eta"] = float(np.linalg.norm(matrix - matrix.T, 2) / np.linalg.norm(matrix + matrix.T, 2))
+    return row
+
+
+def compare_section_5(blow: str) -> pd.DataFrame:
+    """Table 5 side by side: one row a pole or zero, Hz."""
+    case, printed = section_5(blow), table(5)
+    columns = {"kind": printed.kind, "experimental": printed.experimental_imag, "numerical": printed.numerical_imag}
+    columns["numerical here"] = np.array([pair.computed_value.imag for pair in case.pairs.targets]) / (2 * np.pi)
+    columns["ipz, paper"] = printed.updated_imag
+    for name, options in (("ipz", published(5, 1e-3)), ("minimal-change", UpdateOptions())):
+        updated = update_model(case.reduced, case.fit, case.pairs, options)
+        counts = updated.history.groupby("phase", sort=False).iteration.max()
+        hertz = updated.after / (2 * np.pi)
+        columns[f"{name}, {' + '.join(str(count) for count in counts)} iterations"] = hertz.imag
+        columns[f"{name}, real"] = hertz.real
+    columns["experimental, real"], columns["ipz, paper, real"] = printed.experimental_real, printed.updated_real
+    return pd.DataFrame(columns)
+
+
+def places_struck() -> pd.DataFrame:
+    """Deviation of the nominal zeros from those printed in table 5, for every node near the one of the text."""
+    nodes = np.arange(84, 94)
+    deviations = np.array([zero_deviations(node) for node in nodes])
+    places = {"from_clamp_cm": place_cm(nodes), "zeros_rms_%": 100 * np.sqrt(np.mean(deviations**2, axis=1))}
+    return pd.DataFrame(places, index=pd.Index(nodes, name="node"))
+
+
+def fitted_place_cm() -> float:
+    """Place of the blow that fits the printed zeros best, between the nodes; zeros move linearly over one element."""
+    nodes = np.array([88, 89])
+    near, next_to_it = (zero_deviations(node) for node in nodes)
+    slope = next_to_it - near
+    part = -float(slope @ near) / float(slope @ slope)
+    return float(np.interp(part, [0.0, 1.0], place_cm(nodes)))
+
+
+def zero_deviations(node: int) -> FloatArray:
+    """Relative deviation of each nominal zero from the printed one, (3,), if that node was struck."""
+    printed = table(5).query("kind == 'zero'").numerical_imag.to_numpy()
+    zeros = [pair.computed_value.imag / (2 * np.pi) for pair in section_5(f"{node}:z").pairs.targets if pair.frf >= 0]
+    return np.asarray(np.array(zeros) / printed - 1)
+
+
+def place_cm(nodes: IntArray) -> FloatArray:
+    """Distance of nodes from the clamp, cm."""
+    return np.asarray(49.95 * (nodes - 1) / 100)
+
+
+def worst_percent(found: ComplexArray, wanted: ComplexArray) -> float:
+    """Largest deviation in per cent of the modulus."""
+    return float(100 * np.max(np.abs(found - wanted) / np.abs(wanted)))
+
+
+def epsilon(found: ComplexArray, wanted: ComplexArray) -> float:
+    """Eq. (6) with the weights of eq. (7)."""
+    weights = np.abs(found).max() / np.abs(found)
+    return float(np.sum(np.abs(weights * (found - wanted)) ** 2))

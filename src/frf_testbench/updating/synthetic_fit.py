@@ -1,0 +1,298 @@
+"""What a fitter would report of a structure that is known: poles, residues and zeros with their joint covariance.
+
+The covariance is the smallest that unbiased estimates from noisy lines can have (linearised least squares); what is
+reported is the truth plus one draw from it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from scipy.linalg import eigh
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.frf import FrfLabel
+from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.numerics.pencils import damped_zeros
+from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.rational import PoleResidueModel, ZeroSet, poles_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.structure import StructuralModel
+    from frf_testbench.updating.random_structures import Case
+
+N_LINES = 800
+SEEN = 0.5  # real part over modulus above which a zero has no antiresonance
+SHARP = 3e-3  # standard deviation of a pole over its modulus up to which a fitter finds it
+ROUGH = 0.03  # the same of a zero up to which it is identifiable
+FAR = 60  # modes of the true structure that are used; those beyond hardly reach into the band
+
+
+class Truth:
+    """Modes of a structure at all its free DOFs."""
+
+    def __init__(self, model: StructuralModel, damping: FloatArray) -> None:
+        values, shapes = eigh(model.stiffness.toarray(), model.mass.toarray())
+        values[np.abs(values) < 1e-9 * values[-1] / len(values)] = 0
+        self.omega = np.sqrt(np.maximum(values, 0))[:FAR]
+        self.damping = np.asarray(damping)[: len(self.omega)]
+        self.shapes = shapes[:, : len(self.omega)]
+        self.model = model
+
+    def row(self, dof: Dof) -> FloatArray:
+        """Motion of a DOF in every mode, (n,), 1/sqrt(kg)."""
+        return dof.sign * self.shapes[self.model.index(dof)]
+
+    def receptance(self, s: ComplexArray, label: FrfLabel) -> ComplexArray:
+        """Give the receptance, whatever the label's quantity, (n_lines,), m/N."""
+        products = self.row(label.output_dof) * self.row(label.input_dof)
+        return (products / (s[:, None] ** 2 + 2 * self.damping * self.omega * s[:, None] + self.omega**2)).sum(1)
+
+    def zeros(self, label: FrfLabel) -> ComplexArray:
+        """Give the zeros of an FRF by ascending modulus, imaginary part > 0, rad/s."""
+        dynamic = np.eye(len(self.omega)), np.diag(2 * self.damping * self.omega), np.diag(self.omega**2)
+        values = damped_zeros(*dynamic, self.row(label.output_dof), self.row(label.input_dof)).values
+        values = values[values.imag > 1e-3 * np.abs(values)]
+        return values[np.argsort(np.abs(values))]
+
+    def flexible(self) -> BoolArray:
+        """Tell which modes are no rigid-body motion."""
+        return self.omega > 1e-3 * self.omega[self.omega > 0].max() / len(self.omega)
+
+
+def band_of(truth: Truth, n_modes: int) -> tuple[float, float]:
+    """Choose a band: from half the first flexible mode to half way between the last one wanted and the next, Hz."""
+    omega = truth.omega[truth.flexible()]
+    return omega[0] / 4 / np.pi, (omega[n_modes - 1] + omega[n_modes]) / 4 / np.pi
+
+
+def synthetic_fit(
+    truth: Truth,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    *,
+    noise: float = 0.002,
+    rng: np.random.Generator | None = None,
+) -> ModalFit:
+    """Give the fit of all FRFs; `noise` is the standard deviation of a line over the root mean square of its FRF."""
+    inside = truth.flexible() & (truth.omega > 2 * np.pi * band_hz[0]) & (truth.omega < 2 * np.pi * band_hz[1])
+    while True:
+        fit = fit_of_modes(truth, labels, band_hz, noise, rng, inside)
+        spread = np.sqrt(np.diagonal(fit.covariance)[1 : 2 * fit.n_modes : 2]) / np.abs(fit.model.poles)
+        if spread.max() < SHARP:
+            return fit
+        inside[np.flatnonzero(inside)[np.argmax(spread)]] = False  # nobody would find this mode in these data
+
+
+def fit_of_modes(
+    truth: Truth,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    noise: float,
+    rng: np.random.Generator | None,
+    inside: BoolArray,
+) -> ModalFit:
+    """Give the fit with some of the modes only."""
+    s = 2j * np.pi * np.linspace(*band_hz, N_LINES)
+    poles = poles_from(truth.omega[inside] / 2 / np.pi, truth.damping[inside])
+    powers = (-2, 0, 2)
+    scale = float(np.abs(s).max())
+    residues, coefficients, zeros, kinds, where, frf_noise = [], [], [], [], [], []
+    for number, label in enumerate(labels):
+        values = truth.receptance(s, label)
+        products = (truth.row(label.output_dof) * truth.row(label.input_dof))[inside]
+        mine = products / (2j * poles.imag)
+        rest = values - (mine / (s[:, None] - poles) + mine.conj() / (s[:, None] - poles.conj())).sum(1)
+        terms = (s[:, None] / scale) ** np.array(powers)
+        coefficients.append(np.linalg.lstsq(np.vstack([terms.real, terms.imag]), np.r_[rest.real, rest.imag])[0])
+        residues.append(mine)
+        found, found_kinds = zeros_in_band(truth.zeros(label), band_hz)
+        zeros += found
+        kinds += found_kinds
+        where += [number] * len(found)
+        frf_noise.append(noise * np.sqrt(np.mean(np.abs(values) ** 2)))
+    model = PoleResidueModel(
+        poles=poles,
+        residues=np.array(residues).T,
+        powers=powers,
+        coefficients=np.array(coefficients).T,
+        scale_rad_s=scale,
+        delay_s=np.zeros(len(labels)),
+    )
+    zeros, where = np.array(zeros, complex), np.array(where, int)
+    root, residue_covariance = joint_root(model, s, zeros, where, np.array(frf_noise))
+    if rng is not None and noise > 0:
+        step = root @ rng.standard_normal(root.shape[1])
+        step = step[::2] + 1j * step[1::2]
+        poles, zeros = poles + step[: len(poles)], zeros + step[len(poles) :]
+        model = PoleResidueModel(
+            poles=poles,
+            residues=model.residues,
+            powers=powers,
+            coefficients=model.coefficients,
+            scale_rad_s=scale,
+            delay_s=model.delay_s,
+        )
+    return as_fit(model, labels, band_hz, zeros, where, kinds, root @ root.T, residue_covariance)
+
+
+def fit_of_targets(
+    poles: ComplexArray,
+    zeros: ComplexArray,
+    label: FrfLabel,
+    band_hz: tuple[float, float],
+    *,
+    relative_std: float = 0.0,
+) -> ModalFit:
+    """Give a fit that holds given poles and zeros of one FRF and nothing else: residues are 0."""
+    values = np.concatenate([poles, zeros])
+    model = PoleResidueModel(
+        poles=np.asarray(poles),
+        residues=np.zeros((len(poles), 1), complex),
+        powers=(),
+        coefficients=np.zeros((0, 1)),
+        scale_rad_s=1.0,
+        delay_s=np.zeros(1),
+    )
+    covariance = np.diag(np.repeat((relative_std * np.abs(values)) ** 2, 2))
+    kinds = ("complex",) * len(zeros)
+    where = np.zeros(len(zeros), int)
+    nothing = np.zeros((len(poles), 1, 2, 2))
+    return as_fit(model, (label,), band_hz, np.asarray(zeros), where, kinds, covariance, nothing)
+
+
+def in_order(fit: ModalFit, computed_poles: ComplexArray, computed_zeros: ComplexArray) -> Pairs:
+    """Pair a fit of one FRF, the k-th with the k-th."""
+    rows = []
+    for kind, frf, measured, computed in (
+        ("pole", -1, fit.model.poles, computed_poles),
+        ("zero", 0, fit.zeros.values, computed_zeros),
+    ):
+        for place, (one, other) in enumerate(zip(measured, computed, strict=True)):
+            rows.append(
+                Pair(
+                    kind=kind,
+                    frf=frf,
+                    measured=place,
+                    computed=place,
+                    measured_value=complex(one),
+                    computed_value=complex(other),
+                    distance=0.0,
+                    verdict=Verdict.PAIRED,
+                    reason="in order",
+                )
+            )
+    return Pairs(rows=tuple(rows))
+
+
+def zeros_in_band(values: ComplexArray, band_hz: tuple[float, float]) -> tuple[list[complex], list[str]]:
+    """Keep those that a fitter would list, once a conjugate pair or quadruple, and their kinds."""
+    found, kinds = [], []
+    for z in values:
+        mirrored = np.abs(values + z.conj()).min() < 0.5 * abs(z.real)
+        if band_hz[0] < abs(z) / 2 / np.pi < band_hz[1] and z.real < 0 and abs(z.real) < SEEN * abs(z):
+            found.append(z)
+            kinds.append("quadruple" if mirrored else "complex")
+    return found, kinds
+
+
+def as_fit(
+    model: PoleResidueModel,
+    labels: tuple[FrfLabel, ...],
+    band_hz: tuple[float, float],
+    zeros: ComplexArray,
+    where: IntArray,
+    kinds: Sequence[str],
+    covariance: FloatArray,
+    residue_covariance: FloatArray,
+) -> ModalFit:
+    """Build a ModalFit that carries what pairing and updating read."""
+    n_modes = len(model.poles)
+    sharp = np.sqrt(np.diagonal(covariance)[2 * n_modes + 1 :: 2]) < ROUGH * np.abs(zeros)
+    return ModalFit(
+        model=model,
+        n_modes=n_modes,
+        labels=tuple(labels),
+        band_hz=tuple(band_hz),
+        used_lines=np.ones(N_LINES, bool),
+        zeros=ZeroSet(
+            values=zeros,
+            frf=where,
+            kind=tuple(kinds),
+            identifiable=sharp,
+            reason=tuple("" if known else "its standard deviation is too large" for known in sharp),
+        ),
+        covariance=covariance,
+        residue_covariance=residue_covariance,
+        value_std=np.zeros((N_LINES, len(labels))),
+        stabilization=pd.DataFrame(),
+        decisions=pd.DataFrame(),
+        modes=pd.DataFrame(),
+        misfit=pd.DataFrame(),
+        noise_from="recordings",
+        gain=np.ones(len(labels)),
+        channel_gains=pd.DataFrame(columns=["channel", "gain", "gain_std"]),
+    )
+
+
+def joint_root(
+    model: PoleResidueModel, s: ComplexArray, zeros: ComplexArray, where: IntArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Give a root of the covariance of poles and zeros, and the covariance of residues, by linearised least squares."""
+    n, n_frfs = len(model.poles), model.residues.shape[1]
+    rows, size = [], 2 * n + n_frfs * (2 * n + len(model.powers))
+    for frf in range(n_frfs):
+        block = np.zeros((len(s), size), complex)
+        block[:, : 2 * n] = pole_slopes(model, s, frf)
+        start = 2 * n + frf * (2 * n + len(model.powers))
+        block[:, start : start + 2 * n + len(model.powers)] = linear_slopes(model, s)
+        rows.append(block / max(noise[frf], 1e-30) * np.sqrt(2))
+    jacobian = np.vstack([np.vstack([block.real, block.imag]) for block in rows])
+    lengths = np.linalg.norm(jacobian, axis=0)
+    inverse = np.linalg.pinv(jacobian / lengths)
+    root = inverse / lengths[:, None]
+    whole = root @ root.T
+    take = np.zeros((2 * (n + len(zeros)), size))
+    take[: 2 * n, : 2 * n] = np.eye(2 * n)
+    for place, (zero, frf) in enumerate(zip(zeros, where, strict=True)):
+        start = 2 * n + frf * (2 * n + len(model.powers))
+        gradient = np.zeros(size, complex)
+        at = np.array([zero])
+        gradient[: 2 * n] = pole_slopes(model, at, frf)[0]
+        gradient[start : start + 2 * n + len(model.powers)] = linear_slopes(model, at)[0]
+        step = 1e-6 * abs(zero)
+        slope = (model(at + step)[0, frf] - model(at - step)[0, frf]) / (2 * step)
+        moved = -gradient / slope
+        take[2 * (n + place)], take[2 * (n + place) + 1] = moved.real, moved.imag
+    residue_covariance = np.zeros((n, n_frfs, 2, 2))
+    for frf in range(n_frfs):
+        start = 2 * n + frf * (2 * n + len(model.powers))
+        for mode in range(n):
+            parts = slice(start + 2 * mode, start + 2 * mode + 2)
+            residue_covariance[mode, frf] = whole[parts, parts]
+    return take @ root, residue_covariance
+
+
+def pole_slopes(model: PoleResidueModel, s: ComplexArray, frf: int) -> ComplexArray:
+    """Differentiate one FRF by real and imaginary part of every pole in turn."""
+    direct = model.residues[:, frf] / (s[:, None] - model.poles) ** 2
+    mirrored = model.residues[:, frf].conj() / (s[:, None] - model.poles.conj()) ** 2
+    return np.stack([direct + mirrored, 1j * (direct - mirrored)], axis=2).reshape(len(s), -1)
+
+
+def linear_slopes(model: PoleResidueModel, s: ComplexArray) -> ComplexArray:
+    """Differentiate by real and imaginary part of every residue in turn, then by the residual terms."""
+    direct, mirrored = 1 / (s[:, None] - model.poles), 1 / (s[:, None] - model.poles.conj())
+    pairs = np.stack([direct + mirrored, 1j * (direct - mirrored)], axis=2).reshape(len(s), -1)
+    return np.hstack([pairs, (s[:, None] / model.scale_rad_s) ** np.array(model.powers)])
+
+
+def labels_of(case: Case) -> tuple[FrfLabel, ...]:
+    """Name every blow with every sensor, as receptances."""
+    return tuple(FrfLabel(sensor, blow, FrfQuantity.RECEPTANCE) for blow in case.blows for sensor in case.sensors)
