@@ -30,7 +30,7 @@ import frf_ipz
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.comparing.compare import judge
-from frf_ipz.diagnosis.comparing.learn import bench_of, learn
+from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn
 from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
 from frf_ipz.diagnosis.judging.findings import describe
 from frf_ipz.diagnosis.measured.source import divide

@@ -44,8 +44,8 @@ from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, goodness
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.bench import Bench
 from frf_ipz.diagnosis.search.fit import Fit
+from frf_ipz.diagnosis.search.inference_problem import Bench
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import set_up
 

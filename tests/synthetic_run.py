@@ -18,7 +18,7 @@ from frf_ipz.export.state_space import to_state_space
 from frf_ipz.fe.options import ReduceOptions
 from frf_ipz.fe.reduction import reduce_model
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.recordings import Recordings, Trace
+from frf_ipz.ingest.frf_estimate import Recordings, Trace
 from frf_ipz.pairing.assignment import pair
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity

@@ -33,9 +33,9 @@ from .identification.fit import fit_modes as fit_modes
 from .identification.fit import fit_residues as fit_residues
 from .identification.options import FitOptions as FitOptions
 from .identification.results.gains import gains_against as gains_against
+from .ingest.campaign_file import read_test as read_test
 from .ingest.estimate import estimate_frfs as estimate_frfs
 from .ingest.options import IngestOptions as IngestOptions
-from .ingest.test_file import read_test as read_test
 from .pairing.assignment import pair as pair
 from .pipeline.run import run_pipeline as run_pipeline
 from .pipeline.summary import summarise as summarise

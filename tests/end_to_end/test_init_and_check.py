@@ -6,7 +6,7 @@ import pytest
 
 from frf_ipz.cli import main as command
 from frf_ipz.errors import InputError
-from frf_ipz.ingest.test_file import read_test
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.pipeline.init import write_starting_files
 from small_campaign import write_campaign

@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.options import IngestOptions
@@ -15,7 +16,6 @@ from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 from frf_ipz.ingest.spectra import empty_sums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.survey.checks import SECOND_PULSE
-from frf_ipz.ingest.test_file import read_test
 from frf_ipz.ingest.variance import frf_variance
 from synthetic_campaign import HIT, Structure, blow, pulse, write_csv, write_test
 

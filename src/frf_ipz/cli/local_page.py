@@ -12,7 +12,7 @@ from frf_ipz.show.server import serve
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder
 
@@ -52,7 +52,7 @@ def _run(path: Path, out: Path, *, progress: Progress) -> RunFolder:
 
 def _read(path: Path) -> Job:
     """Read a pipeline; what reads tests and models is imported with the first page that needs it."""
-    from frf_ipz.pipeline.job import read_job
+    from frf_ipz.pipeline.inputs import read_job
 
     return read_job(path)
 

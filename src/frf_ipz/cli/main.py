@@ -91,7 +91,7 @@ for _stage in HELP:
 def check(pipeline: PipelineArgument) -> None:
     """Validate test, model and pipeline, draw the set-up, run nothing."""
     from frf_ipz.pipeline.check import describe_setup
-    from frf_ipz.pipeline.job import read_job
+    from frf_ipz.pipeline.inputs import read_job
 
     print(describe_setup(read_job(pipeline)))
 

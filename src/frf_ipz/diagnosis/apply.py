@@ -10,8 +10,8 @@ from scipy import sparse
 
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.catalogue.specimen import Specimen
-from frf_ipz.diagnosis.catalogue.together import build_together
+from frf_ipz.diagnosis.catalogue.joint_change import build_together
+from frf_ipz.diagnosis.catalogue.model_context import Specimen
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import make_basis

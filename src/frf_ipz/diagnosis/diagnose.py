@@ -15,8 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
-from frf_ipz.diagnosis.judging.another_force import describe_another, find_another
-from frf_ipz.diagnosis.judging.another_kind import another_kind
+from frf_ipz.diagnosis.judging.data_checks import check, warn
 from frf_ipz.diagnosis.judging.decision import (
     CONSISTENT,
     EXPLAINED,
@@ -31,12 +30,13 @@ from frf_ipz.diagnosis.judging.detectable import detectable_sizes
 from frf_ipz.diagnosis.judging.figures import disagreement, prove
 from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
 from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
-from frf_ipz.diagnosis.judging.gates import check, warn
-from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.judging.resolving import best_sensor
-from frf_ipz.diagnosis.judging.tracing import trace
-from frf_ipz.diagnosis.measured.cleaned.leftovers import without_leftovers
-from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
+from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
+from frf_ipz.diagnosis.judging.mismatch_location import trace
+from frf_ipz.diagnosis.judging.next_sensor import best_sensor
+from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
+from frf_ipz.diagnosis.judging.unnamed_force import describe_another, find_another
+from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_quiet_constants
+from frf_ipz.diagnosis.measured.cleaned.residual_motion import without_leftovers
 from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -60,8 +60,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data
+    from frf_ipz.diagnosis.search.inference_problem import Bench
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.physics.layout import extents, shift_rows
 from frf_ipz.diagnosis.physics.nuisance import UNIFORM
-from frf_ipz.updating.placing import Misplacement
+from frf_ipz.updating.position_uncertainty import Misplacement
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 from frf_ipz.identification.lines.measured import measured_lines
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.records import read_blows
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
-    from frf_ipz.ingest import blows as recorded
+    from frf_ipz.ingest import records as recorded
+    from frf_ipz.ingest.campaign_file import Test
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.test_file import Test
 
 
 def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None) -> Observations:

@@ -10,9 +10,9 @@ from frf_ipz.ingest.kinds.random import estimate_random
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.frf_estimate import Recordings
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.recordings import Recordings
-    from frf_ipz.ingest.test_file import Test
 
 KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
+    from frf_ipz.ingest.campaign_file import Channel, Run, Test
     from frf_ipz.ingest.formats.recording import RawRecording
-    from frf_ipz.ingest.test_file import Channel, Run, Test
 
 BUDGET = 64_000_000  # bytes of recordings that are kept
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs

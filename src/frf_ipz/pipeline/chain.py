@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.pipeline.desk import Desk
+from frf_ipz.pipeline.stage_runner import Desk
 from frf_ipz.pipeline.stages import measurement, mismatch, modelling, results
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder
 

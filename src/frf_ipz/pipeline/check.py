@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
     from frf_ipz.structure import Geometry
 
 WIDTH = 72

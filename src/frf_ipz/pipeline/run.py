@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frf_ipz import __version__
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.pipeline.chain import STAGES, chain
-from frf_ipz.pipeline.job import Job, read_job
+from frf_ipz.pipeline.inputs import Job, read_job
 from frf_ipz.progress import Progress, silent
 from frf_ipz.runs.digests import plain
 from frf_ipz.runs.folder import RunFolder, open_run, read_run

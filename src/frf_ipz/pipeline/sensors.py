@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.ingest.test_file import Test
+    from frf_ipz.ingest.campaign_file import Test
 
 
 def unweighed_sensors(test: Test, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.ingest.recordings import Recordings
+    from frf_ipz.ingest.frf_estimate import Recordings
     from frf_ipz.structure import Geometry
 
 MARKS = {"sensor": ("s", CYCLE[0]), "blow": ("v", CYCLE[1]), "point of interest": ("*", CYCLE[2])}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.recordings import Recordings
+    from frf_ipz.ingest.frf_estimate import Recordings
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.survey.choice import is_named
+from frf_ipz.ingest.survey.selection import is_named
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.wording import number, percent
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
     from frf_ipz.show.workbench import Run
 
 ADDRESS = "127.0.0.1"

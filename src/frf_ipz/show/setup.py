@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
 
 
 def read_setup(pipeline: Path, read: Callable[[Path], Job]) -> tuple[RunContents, Section]:

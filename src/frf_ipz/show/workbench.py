@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.pipeline.config import PipelineFile
-    from frf_ipz.pipeline.job import Job
+    from frf_ipz.pipeline.inputs import Job
     from frf_ipz.progress import Progress
     from frf_ipz.show.campaign import Place
     from frf_ipz.show.worker import Status

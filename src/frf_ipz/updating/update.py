@@ -15,7 +15,7 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.progress import silent
 from frf_ipz.updating import methods
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.placing import with_misplacements
+from frf_ipz.updating.position_uncertainty import with_misplacements
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.parameters import ParameterBasis
-    from frf_ipz.updating.placing import Misplacement
+    from frf_ipz.updating.position_uncertainty import Misplacement
     from frf_ipz.updating.updated_model import UpdatedModel
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from diagnosed import beam, bench_of, measured
-from frf_ipz.diagnosis.search import climb, pairs
+from frf_ipz.diagnosis.search import neighbourhood_search as climb
+from frf_ipz.diagnosis.search import pairs
 from frf_ipz.diagnosis.search import search as searching
-from frf_ipz.diagnosis.search.far.sketches import Start
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
 

@@ -7,7 +7,7 @@ import pytest
 
 import frf_ipz
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.comparing.learn import bench_of, learn, nominal_after
+from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn, nominal_after
 from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
 from frf_ipz.diagnosis.comparing.nominal import LEAST_SQUARE, as_fitted
 from frf_ipz.diagnosis.measured.source import divide

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, labels, lumped
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.catalogue.model_context import Specimen
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import make_basis

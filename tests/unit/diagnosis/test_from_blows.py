@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from frf_ipz.diagnosis.measured.from_blows import measure, survey
+from frf_ipz.diagnosis.measured.from_impacts import measure, survey
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity

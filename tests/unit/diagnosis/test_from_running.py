@@ -10,9 +10,9 @@ from frf_ipz.diagnosis.measured.from_running import FINEST, fineness, finer_frfs
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import Structure, respond, write_csv, write_test
 
 STEP_S = 1 / 1024

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosed import beam, measured, observed
-from frf_ipz.diagnosis.judging.gates import check, warn
+from frf_ipz.diagnosis.judging.data_checks import check, warn
 from frf_ipz.diagnosis.measured.source import divide
 
 

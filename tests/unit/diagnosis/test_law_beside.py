@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, bench_of, measured, observed
 from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.judging import law_beside
+from frf_ipz.diagnosis.judging import law_and_linear as law_beside
 from frf_ipz.diagnosis.judging.decision import only_null
-from frf_ipz.diagnosis.judging.law_beside import search_beside_law, search_beside_linear
+from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.measured.cleaned.restored import restore
 from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
 from frf_ipz.diagnosis.physics.attach import with_change

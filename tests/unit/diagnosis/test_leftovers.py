@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.cleaned.leftovers import DECAYS, LARGEST, _group, _whole, without_leftovers
-from frf_ipz.diagnosis.measured.cleaned.quiet_constants import without_quiet_constants
+from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_quiet_constants
+from frf_ipz.diagnosis.measured.cleaned.residual_motion import DECAYS, LARGEST, _group, _whole, without_leftovers
 from frf_ipz.diagnosis.measured.forces import RINGING
-from frf_ipz.diagnosis.measured.from_blows import measure, survey
+from frf_ipz.diagnosis.measured.from_impacts import measure, survey
 from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.dofs import parse_dof

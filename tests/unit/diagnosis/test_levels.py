@@ -9,9 +9,9 @@ from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import HIT, Structure, blow, hammer_campaign, write_csv, write_test
 
 BAND = FitOptions(band_hz=(20.0, 220.0))

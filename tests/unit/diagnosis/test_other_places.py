@@ -10,9 +10,9 @@ from diagnosed import beam, bench_of, labels, measured
 from frf_ipz.diagnosis.catalogue.supports import coupling_spring
 from frf_ipz.diagnosis.judging import decision
 from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.alike import elsewhere
-from frf_ipz.diagnosis.search.far.sketches import Start
-from frf_ipz.diagnosis.search.far.wide import wide_search
+from frf_ipz.diagnosis.search.ambiguity_set import distant_places as elsewhere
+from frf_ipz.diagnosis.search.global_scan.grid_scan import wide_search
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
 from frf_ipz.dofs import Dof

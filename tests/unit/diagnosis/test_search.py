@@ -11,7 +11,7 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
-from frf_ipz.diagnosis.judging.tracing import trace
+from frf_ipz.diagnosis.judging.mismatch_location import trace
 from frf_ipz.diagnosis.judging.verdict import goodness
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs, without_faint
@@ -21,8 +21,9 @@ from frf_ipz.diagnosis.physics.basis import solved
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.response import scatter
-from frf_ipz.diagnosis.search import climb, search
-from frf_ipz.diagnosis.search.far.sketches import Start
+from frf_ipz.diagnosis.search import neighbourhood_search as climb
+from frf_ipz.diagnosis.search import search
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up

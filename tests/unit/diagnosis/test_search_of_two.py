@@ -12,17 +12,17 @@ from frf_ipz.diagnosis import diagnose as diagnosing
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.catalogue.together import build_together
+from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.judging.another_kind import another_kind
 from frf_ipz.diagnosis.judging.decision import decide
+from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
 from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search import pairs
-from frf_ipz.diagnosis.search.close import close_search
-from frf_ipz.diagnosis.search.far.sketches import Start
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
+from frf_ipz.diagnosis.search.local_score_test import close_search
 from frf_ipz.diagnosis.search.pairs import search_second
 from frf_ipz.diagnosis.search.search import (
     CLOSE_EACH,

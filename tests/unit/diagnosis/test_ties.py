@@ -8,8 +8,8 @@ from scipy import linalg
 
 from diagnosed import beam, bench_of, measured
 from frf_ipz.diagnosis.measured.transfer import points_of
-from frf_ipz.diagnosis.search.alike import ties
-from frf_ipz.diagnosis.search.alike.ties import settle_ties
+from frf_ipz.diagnosis.search.ambiguity_set import rescoring as ties
+from frf_ipz.diagnosis.search.ambiguity_set.rescoring import settle_ties
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import with_errors
 from frf_ipz.fe.changes import with_point_masses

@@ -13,9 +13,9 @@ from frf_ipz.identification.fit import fit_modes, fit_residues
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.results.gains import gains_against
 from frf_ipz.identification.results.shapes import mode_shapes
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 
 DEMO = Path(__file__).parents[3] / "data" / "raw" / "cantilever" / "test.toml"
 DEMO_DAMPING = np.array([0.015, 0.0036, 0.0024, 0.0021])  # data/README.md

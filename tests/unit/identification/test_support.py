@@ -9,9 +9,9 @@ from scipy.optimize import linear_sum_assignment
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.root_covariance import pair_blocks
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 from frf_ipz.quantities import FrfQuantity
 from synthetic_frfs import accelerances, frf_set, labels_of, random_modes
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from frf_ipz.errors import InputError
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import hammer_campaign
 
 

@@ -7,9 +7,9 @@ import pytest
 import pyuff
 
 from frf_ipz.errors import InputError
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 from frf_ipz.quantities import FrfQuantity
 from synthetic_campaign import Structure, write_test
 

@@ -5,11 +5,11 @@ import pytest
 
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.dofs import parse_dof
-from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.survey.scan import CELL
-from frf_ipz.ingest.test_file import read_test
+from frf_ipz.ingest.records import read_blows
+from frf_ipz.ingest.survey.file_index import CELL
 from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
 
 EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from frf_ipz.errors import InputError
-from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.records import read_blows
 from frf_ipz.ingest.signals.clipping import is_clipped
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
-from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import Structure, respond, write_csv, write_test
 
 STEP_S = 1 / 1024

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
 
 ALIKE = 2.0  # times: no two blows of a hand are quite alike, so that five of them do not scatter like noise
 

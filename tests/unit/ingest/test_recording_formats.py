@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.formats.text_layout import name_and_unit
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.signals.thinning import thin
-from frf_ipz.ingest.test_file import read_test
 from synthetic_campaign import HIT, Structure, blow, write_csv, write_test
 
 STEP_S = 1 / 2048

@@ -5,10 +5,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from frf_ipz.ingest.blows import read_blows
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
+from frf_ipz.ingest.records import read_blows
 from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
 
 STEP_S = 1 / 2048

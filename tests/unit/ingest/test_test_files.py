@@ -3,11 +3,11 @@
 import pytest
 
 from frf_ipz.dofs import Dof
+from frf_ipz.ingest.campaign_file import read_test, run_labels
 from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.frf_estimate import Recordings, Trace
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.recordings import Recordings, Trace
-from frf_ipz.ingest.survey.choice import is_named
-from frf_ipz.ingest.test_file import read_test, run_labels
+from frf_ipz.ingest.survey.selection import is_named
 from synthetic_campaign import Structure, blow, hammer_campaign, write_csv, write_test
 
 ROVING = """

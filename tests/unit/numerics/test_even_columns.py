@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from frf_ipz.numerics.even_columns import even, solve_columns
+from frf_ipz.numerics.column_scaling import even, solve_columns
 
 SIZES = np.array([1.0, 1e-12, 1e9])
 CUT = 1e-12

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import linalg
 
-from frf_ipz.numerics.prior_factor import factor_with_prior
+from frf_ipz.numerics.regularised_cholesky import factor_with_prior
 
 
 def test_it_is_the_cholesky_factor():

@@ -5,10 +5,10 @@ import pytest
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.errors import FileFormatError
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.test_file import read_test
-from frf_ipz.pipeline.job import read_job
+from frf_ipz.pipeline.inputs import read_job
 from frf_ipz.pipeline.sensors import without_sensors
 from synthetic_campaign import hammer_campaign, write_test
 

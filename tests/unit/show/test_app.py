@@ -6,7 +6,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.job import read_job
+from frf_ipz.pipeline.inputs import read_job
 from frf_ipz.show.app import build_app
 from frf_ipz.show.campaign import Place
 from frf_ipz.show.workbench import Workbench

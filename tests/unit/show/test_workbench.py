@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.job import read_job
+from frf_ipz.pipeline.inputs import read_job
 from frf_ipz.pipeline.run import run_pipeline
 from frf_ipz.show.campaign import Place
 from frf_ipz.show.workbench import Workbench

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.misplacements import misplacements
-from frf_ipz.updating.placing import Misplacement, with_misplacements
+from frf_ipz.updating.position_uncertainty import Misplacement, with_misplacements
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.study import set_up

@@ -30,7 +30,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.diagnosis.physics.change import Change
 

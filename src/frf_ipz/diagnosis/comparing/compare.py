@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.comparing import mass_loss
-from frf_ipz.diagnosis.comparing.learn import error_of_change, learn, nominal_after
-from frf_ipz.diagnosis.comparing.missed import trusted
+from frf_ipz.diagnosis.comparing.learnt_nuisance import error_of_change, learn, nominal_after
 from frf_ipz.diagnosis.comparing.states import CompareOptions, State
+from frf_ipz.diagnosis.comparing.unexplained_change import trusted
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.diagnosis import Diagnosis
 from frf_ipz.diagnosis.judging.decision import CONSISTENT
@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.comparing.learn import Learned
+    from frf_ipz.diagnosis.comparing.learnt_nuisance import Learned
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.progress import Progress
 

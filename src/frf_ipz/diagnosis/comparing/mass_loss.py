@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import StructuralModel
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from frf_ipz.diagnosis.judging.findings import is_significant
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, LIMITS, PARTIAL_NATS, STRONG_NATS, Goodness, goodness
-from frf_ipz.diagnosis.search.alike.elsewhere import look_elsewhere
-from frf_ipz.diagnosis.search.alike.ties import settle_ties
+from frf_ipz.diagnosis.search.ambiguity_set.distant_places import look_elsewhere
+from frf_ipz.diagnosis.search.ambiguity_set.rescoring import settle_ties
+from frf_ipz.diagnosis.search.map_fit import polish
 from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.polish import polish
 from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search_beside
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Fit
+    from frf_ipz.diagnosis.search.inference_problem import Bench
     from frf_ipz.progress import Progress
 
 STRAINED = 0.75  # score of a cause that explains, but may stand for two others: 3 of 89 single ones had more

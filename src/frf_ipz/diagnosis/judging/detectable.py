@@ -9,16 +9,16 @@ from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.numerics.prior_factor import factor_with_prior
+from frf_ipz.numerics.regularised_cholesky import factor_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.search.inference_problem import Bench
 
 PLACES = 2  # of each effect, spread over the structure
 STEPS = 5  # halvings of the range

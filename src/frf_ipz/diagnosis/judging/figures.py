@@ -16,8 +16,8 @@ from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data, Fit
+    from frf_ipz.diagnosis.search.inference_problem import Bench
 
 BANDS = 6  # pieces of the band, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations

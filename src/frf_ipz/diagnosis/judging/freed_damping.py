@@ -18,8 +18,8 @@ from frf_ipz.diagnosis.judging.verdict import goodness
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Fit
+    from frf_ipz.diagnosis.search.inference_problem import Bench
 
 OF_MODES = ("damping_level", "structural_damping")
 ANY = 20.0  # relative tolerance of damping ratios: more than a factor of ten

@@ -14,8 +14,8 @@ from frf_ipz.arrays import IntArray
 from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data, Fit
+    from frf_ipz.diagnosis.search.inference_problem import Bench
 
 FOUND_NATS = 30.0  # evidence over the nominal model's: what a finding needs
 PARTIAL_NATS = 50.0  # evidence of a second finding over the first one's alone, where the two do not explain all

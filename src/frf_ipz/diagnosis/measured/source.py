@@ -9,8 +9,8 @@ import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.forces import is_sweep
-from frf_ipz.diagnosis.measured.from_blows import Survey, forgetting_1_s, like, measure, survey
 from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, search_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_impacts import Survey, forgetting_1_s, like, measure, survey
 from frf_ipz.diagnosis.measured.from_running import finer_frfs
 from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
 from frf_ipz.errors import InputError

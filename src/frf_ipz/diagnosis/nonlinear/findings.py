@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.finding import Estimate, Finding, doubt_of_place
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
 
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Linearised
-from frf_ipz.numerics.even_columns import solve_columns
+from frf_ipz.numerics.column_scaling import solve_columns
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
 
 
 def linearise(fit: LawFit, plant: Plant) -> Linearised:

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Misfit
-from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion
-from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
-from frf_ipz.diagnosis.nonlinear.linear.plant import respond
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
 
 
 def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit, Misfit, Misfit]:

@@ -20,18 +20,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.finding import doubt_of_place
-from frf_ipz.diagnosis.nonlinear.at_work import show_law
-from frf_ipz.diagnosis.nonlinear.beyond import agreement_with
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
-from frf_ipz.diagnosis.nonlinear.fitting.anywhere import MANY_TURNS, AnyForce, find_place, fit_anything, simple_forces
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import TIE
-from frf_ipz.diagnosis.nonlinear.fitting.reweighted import tell_apart
-from frf_ipz.diagnosis.nonlinear.fitting.shoot import gain_of_further
-from frf_ipz.diagnosis.nonlinear.fitting.tracks import FINE, ROUGH, WEAK, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, ROUGH, WEAK, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import TIE
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import gain_of_further
+from frf_ipz.diagnosis.nonlinear.fitting.rescoring import tell_apart
+from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import (
+    MANY_TURNS,
+    AnyForce,
+    find_place,
+    fit_anything,
+    simple_forces,
+)
+from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
+from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import agreement_with
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.dispersion import latest_s
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
@@ -41,12 +47,12 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.diagnosis import LawAtWork, Misfit
     from frf_ipz.diagnosis.finding import Finding
-    from frf_ipz.diagnosis.nonlinear.beyond import Agreement
     from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
+    from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.progress import Progress

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.march import march
-from frf_ipz.diagnosis.nonlinear.linear.place import PlaceInTime
+from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import march
+from frf_ipz.diagnosis.nonlinear.linear.place_in_time import PlaceInTime
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import FINER, Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.segments import FINER, Window, transform
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.fitting.march import March
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.linear.plant import Plant
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import March
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.dofs import Dof
 

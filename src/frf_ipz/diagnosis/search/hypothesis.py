@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.together import build_together, typical_change
+from frf_ipz.diagnosis.catalogue.joint_change import build_together, typical_change
 from frf_ipz.diagnosis.physics.basis import Basis, enrich
 from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.modified import Modified, modify
@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.physics.response import Modes, Response, Rows, respond, r
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
 
 
 REMEMBERED = 4  # sets of values

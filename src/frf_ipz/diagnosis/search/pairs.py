@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.search.bench import Bench, weights_of
-from frf_ipz.diagnosis.search.climb import GAIN, Fits, bar_of, climb_all
-from frf_ipz.diagnosis.search.far.refine import refine
-from frf_ipz.diagnosis.search.far.sketches import Start
-from frf_ipz.diagnosis.search.far.starts import REFINED_ERROR, bring_closer, spread, step_far
-from frf_ipz.diagnosis.search.far.wide import wide_search
 from frf_ipz.diagnosis.search.fit import VERY_NEARLY, Fit
-from frf_ipz.diagnosis.search.polish import polish
+from frf_ipz.diagnosis.search.global_scan.grid_scan import wide_search
+from frf_ipz.diagnosis.search.global_scan.refine import refine
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
+from frf_ipz.diagnosis.search.global_scan.starts import REFINED_ERROR, bring_closer, spread, step_far
+from frf_ipz.diagnosis.search.inference_problem import Bench, weights_of
+from frf_ipz.diagnosis.search.map_fit import polish
+from frf_ipz.diagnosis.search.neighbourhood_search import GAIN, Fits, bar_of, climb_all
 from frf_ipz.diagnosis.search.search import Ranking, by_effect, how_many, ranked, search, search_beside
 
 if TYPE_CHECKING:

@@ -9,14 +9,14 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
-from frf_ipz.numerics.prior_factor import factor_with_prior
+from frf_ipz.numerics.regularised_cholesky import factor_with_prior
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.physics.response import Response
-    from frf_ipz.diagnosis.search.bench import Bench
     from frf_ipz.diagnosis.search.fit import Data, Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.search.inference_problem import Bench
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

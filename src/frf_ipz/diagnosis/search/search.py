@@ -7,8 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.diagnosis.search.bench import Bench
-from frf_ipz.diagnosis.search.climb import (
+from frf_ipz.diagnosis.search.fit import Fit
+from frf_ipz.diagnosis.search.global_scan.grid_scan import search_among_scatter, wide_search
+from frf_ipz.diagnosis.search.global_scan.signatures import Start
+from frf_ipz.diagnosis.search.global_scan.starts import bring_closer, refine_far, spread
+from frf_ipz.diagnosis.search.inference_problem import Bench
+from frf_ipz.diagnosis.search.local_score_test import close_search
+from frf_ipz.diagnosis.search.neighbourhood_search import (
     CLIMBED,
     GAIN,
     HOPELESS,
@@ -18,11 +23,6 @@ from frf_ipz.diagnosis.search.climb import (
     climb_all,
     further_around,
 )
-from frf_ipz.diagnosis.search.close import close_search
-from frf_ipz.diagnosis.search.far.sketches import Start
-from frf_ipz.diagnosis.search.far.starts import bring_closer, refine_far, spread
-from frf_ipz.diagnosis.search.far.wide import search_among_scatter, wide_search
-from frf_ipz.diagnosis.search.fit import Fit
 
 CLOSE_FITTED = 14  # hypotheses that are fitted after the close search
 PROMISING = 5.0  # nats that a linear step promises: with less, a hypothesis is not fitted

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.specimen import Specimen
+from frf_ipz.diagnosis.catalogue.model_context import Specimen
 from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
@@ -15,8 +15,8 @@ from frf_ipz.diagnosis.physics.layout import lay_out
 from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.nuisance import make_nuisance
 from frf_ipz.diagnosis.physics.response import respond, rows_of, scatter
-from frf_ipz.diagnosis.search.bench import Bench
 from frf_ipz.diagnosis.search.fit import Data
+from frf_ipz.diagnosis.search.inference_problem import Bench
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

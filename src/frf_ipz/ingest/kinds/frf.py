@@ -9,10 +9,10 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
+from frf_ipz.ingest.campaign_file import frf_label
 from frf_ipz.ingest.formats.registry import read_frfs
-from frf_ipz.ingest.kinds.table import empty_blow_table
-from frf_ipz.ingest.recordings import Recordings
-from frf_ipz.ingest.test_file import frf_label
+from frf_ipz.ingest.frf_estimate import Recordings
+from frf_ipz.ingest.kinds.record_table import empty_blow_table
 from frf_ipz.ingest.units import frf_factor
 
 if TYPE_CHECKING:
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
+    from frf_ipz.ingest.campaign_file import Test
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.test_file import Test
     from frf_ipz.progress import Progress
 
 SAME_LINE = 0.01  # of the spacing: frequencies that differ by less are one line

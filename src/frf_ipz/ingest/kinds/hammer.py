@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.kinds.recorded import average_recordings
+from frf_ipz.ingest.kinds.averaging import average_recordings
 from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.blows import Blow
+    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.frf_estimate import Recordings
     from frf_ipz.ingest.kinds.averages import RunAverage
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.recordings import Recordings
-    from frf_ipz.ingest.survey.facts import Survey
-    from frf_ipz.ingest.test_file import Test
+    from frf_ipz.ingest.records import Blow
+    from frf_ipz.ingest.survey.record_info import Survey
     from frf_ipz.progress import Progress
 
 

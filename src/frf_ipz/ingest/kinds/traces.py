@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.recordings import Trace
+from frf_ipz.ingest.frf_estimate import Trace
 from frf_ipz.ingest.signals.thinning import thin
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.blows import Blow
-    from frf_ipz.ingest.survey.facts import BlowFacts
+    from frf_ipz.ingest.records import Blow
+    from frf_ipz.ingest.survey.record_info import BlowFacts
 
 N_POINTS = 2000
 MARGIN = 0.5  # of the pulse's stretch that is drawn on each side

@@ -9,15 +9,15 @@ import numpy as np
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
 from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
-from frf_ipz.ingest.survey.facts import BlowFacts
+from frf_ipz.ingest.survey.record_info import BlowFacts
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.campaign_file import Test
     from frf_ipz.ingest.signals.pulses import Pulse
-    from frf_ipz.ingest.survey.scan import FileScan
-    from frf_ipz.ingest.test_file import Test
+    from frf_ipz.ingest.survey.file_index import FileScan
 
 SECOND_PULSE = 0.04  # of the first: smaller ones are no second blow
 CUT_OFF = 1e-3  # share of a mode's amplitude at the end of the record that is worth a window

@@ -10,17 +10,17 @@ import numpy as np
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
 from frf_ipz.ingest.survey.checks import CUT_OFF, FEWEST_BEFORE, check_blow
-from frf_ipz.ingest.survey.choice import blow_name, check_names, choose, is_named
-from frf_ipz.ingest.survey.facts import Survey
-from frf_ipz.ingest.survey.scan import scan_file, split_blows
+from frf_ipz.ingest.survey.file_index import scan_file, split_blows
+from frf_ipz.ingest.survey.record_info import Survey
+from frf_ipz.ingest.survey.selection import blow_name, check_names, choose, is_named
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.survey.facts import BlowFacts
-    from frf_ipz.ingest.survey.scan import FileScan
+    from frf_ipz.ingest.survey.file_index import FileScan
+    from frf_ipz.ingest.survey.record_info import BlowFacts
     from frf_ipz.progress import Progress
 
 LEFT = 3e-4  # share of the slowest mode that an automatic window leaves at the end: below the noise of good recordings

@@ -17,9 +17,9 @@ import numpy as np
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.survey.checks import check_record
-from frf_ipz.ingest.survey.choice import blow_name, check_names, choose
-from frf_ipz.ingest.survey.facts import Survey
-from frf_ipz.ingest.survey.scan import scan_file
+from frf_ipz.ingest.survey.file_index import scan_file
+from frf_ipz.ingest.survey.record_info import Survey
+from frf_ipz.ingest.survey.selection import blow_name, check_names, choose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.survey.facts import BlowFacts
-    from frf_ipz.ingest.survey.scan import FileScan
+    from frf_ipz.ingest.survey.file_index import FileScan
+    from frf_ipz.ingest.survey.record_info import BlowFacts
     from frf_ipz.progress import Progress
 
 QUIET_SAMPLES = 2

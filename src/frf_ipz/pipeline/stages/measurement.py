@@ -18,8 +18,8 @@ from frf_ipz.rational import without_window
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.recordings import Recordings
-    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.pipeline.stage_runner import Desk
 
 
 def ingest(desk: Desk) -> Recordings:

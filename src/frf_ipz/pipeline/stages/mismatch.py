@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.pipeline.stage_runner import Desk
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
-    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.pipeline.stage_runner import Desk
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel

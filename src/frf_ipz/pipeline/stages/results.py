@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.pipeline.desk import Desk
+    from frf_ipz.pipeline.stage_runner import Desk
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import Writers
     from frf_ipz.updating.updated_model import UpdatedModel

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from frf_ipz.ingest.recordings import Recordings
-    from frf_ipz.ingest.recordings import Trace as Recorded
+    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.frf_estimate import Trace as Recorded
     from frf_ipz.report.contents import RunContents
 
 MOST_TRACES = 40  # drawn; more cover each other and make the page large

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.show.changes.of_fit import Band, Leave, Pin, Strike
-from frf_ipz.show.changes.of_model import Point, Retain
-from frf_ipz.show.changes.of_test import Blow, Sensor
+from frf_ipz.show.changes.fit_changes import Band, Leave, Pin, Strike
+from frf_ipz.show.changes.ingest_changes import Blow, Sensor
+from frf_ipz.show.changes.model_changes import Point, Retain
 from frf_ipz.toml_files import to_options
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.fitting.anywhere import simple_forces
+from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import simple_forces
 
 LEFT = 0.015  # of the force; springs that slip at once, whose bend is not smooth, leave 0.12
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
-from frf_ipz.diagnosis.nonlinear.fitting import free_force as module
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import free_force, neighbours, start_at, whereabouts
+from frf_ipz.diagnosis.nonlinear.fitting import force_localisation as module
+from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import free_force, neighbours, start_at, whereabouts
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
-from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
-from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import fit_linear
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.gap_contact import GapContact
-from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 LAWS = {

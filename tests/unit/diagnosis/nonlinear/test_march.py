@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from frf_ipz.diagnosis.nonlinear.fitting.march import Yielding, follow, make_modes, march
+from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import Yielding, follow, make_modes, march
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
 
 OMEGA, RATIO, STEP_S, N_TIMES = 2 * np.pi * 5.0, 0.02, 1e-4, 6000

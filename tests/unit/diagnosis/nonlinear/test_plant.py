@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.testing import assert_allclose
 
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant, no_deviations, respond
 
 EXACT = 1e-9  # relative: all modes are followed, nothing is left out
 

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.fitting import reweighted
+from frf_ipz.diagnosis.nonlinear.fitting import rescoring as reweighted
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import Recordings
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
-from frf_ipz.diagnosis.nonlinear.fitting.reweighted import tell_apart
-from frf_ipz.diagnosis.nonlinear.fitting.tracks import Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.rescoring import tell_apart
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.options import DiagnoseOptions
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.screen import fit_linear
-from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import fit_linear
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 OFF = np.log(1.04)  # frequencies: several widths of a resonance, far beyond what one linear step takes back

@@ -6,12 +6,12 @@ import pytest
 
 from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.judging import law_beside
-from frf_ipz.diagnosis.judging.law_beside import STRAINED
-from frf_ipz.diagnosis.nonlinear.at_work import show_law
-from frf_ipz.diagnosis.nonlinear.beyond import Agreement
+from frf_ipz.diagnosis.judging import law_and_linear as law_beside
+from frf_ipz.diagnosis.judging.law_and_linear import STRAINED
 from frf_ipz.diagnosis.nonlinear.findings import is_told
+from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
+from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate, without_law
 from frf_ipz.diagnosis.options import DiagnoseOptions

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.fitting import shoot as shooting
+from frf_ipz.diagnosis.nonlinear.fitting import output_error_fit as shooting
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
-from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
-from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 K3 = 3e9  # N/m^3: at the strongest blow as stiff as a third of a spring of the chain

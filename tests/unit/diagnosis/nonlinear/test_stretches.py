@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linear.freedom import make_freedom
-from frf_ipz.diagnosis.nonlinear.linear.plant import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.nonlinear.recorded.stretches import Window, transform
+from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 

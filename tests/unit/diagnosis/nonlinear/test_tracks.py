@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear import search
-from frf_ipz.diagnosis.nonlinear.beyond import Agreement
-from frf_ipz.diagnosis.nonlinear.fitting import anywhere, candidates
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts, neighbours
-from frf_ipz.diagnosis.nonlinear.fitting.tracks import FINE, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting import candidates
+from frf_ipz.diagnosis.nonlinear.fitting import simple_laws as anywhere
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import Whereabouts, neighbours
+from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 
 EVERY = tuple(range(10))
 

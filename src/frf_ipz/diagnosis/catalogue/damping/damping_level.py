@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.modified import LEAST_RATIO, modify
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 1e-5, 0.5

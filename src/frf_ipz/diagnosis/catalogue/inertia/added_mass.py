@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 SMALLEST, LARGEST = 1e-5, 2.0  # of the mass of the structure

@@ -12,7 +12,7 @@ from frf_ipz.fe.beams.beam_options import BeamFile
 from frf_ipz.fe.beams.variants import with_formulation
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import StructuralModel
 

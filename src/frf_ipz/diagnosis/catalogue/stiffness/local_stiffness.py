@@ -14,7 +14,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import part_matrices
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import Part
 

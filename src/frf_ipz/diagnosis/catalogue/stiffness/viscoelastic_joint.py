@@ -14,7 +14,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.beam_options import BeamFile
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e2  # of the structure's own stiffness there

@@ -16,7 +16,7 @@ from frf_ipz.fe.beams.beam_options import BeamFile
 from frf_ipz.fe.beams.variants import geometric_stiffness
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 NEARLY_BUCKLED, STRONGEST = 0.97, 10.0  # of the buckling load: compression and tension

@@ -15,7 +15,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.beam_options import BeamFile
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 ROTATION, TRANSLATION = "rotational_stiffness_Nm_rad", "translational_stiffness_N_m"

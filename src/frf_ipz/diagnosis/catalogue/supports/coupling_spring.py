@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.catalogue.supports.grounded_spring import floating, is_fl
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
     from frf_ipz.diagnosis.finding import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion

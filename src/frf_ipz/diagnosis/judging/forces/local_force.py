@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.physics.change import Attachment, Change
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.diagnosis.catalogue.specimen import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import Specimen
 
 
 class LocalForce(ViscoelasticJoint):

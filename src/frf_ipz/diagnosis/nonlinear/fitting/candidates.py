@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.free_force import neighbours, start_at
+from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import neighbours, start_at
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
-from frf_ipz.diagnosis.nonlinear.fitting.screen import LinearFit, linear_motion_of_place, screen
-from frf_ipz.diagnosis.nonlinear.fitting.shoot import shoot
-from frf_ipz.diagnosis.nonlinear.linear.plant import respond
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import LinearFit, linear_motion_of_place, screen
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frf_ipz.diagnosis.nonlinear.fitting.free_force import Whereabouts
+    from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import Whereabouts
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
 
 OF_EACH_LAW = 3  # places that are refined
 OF_ALL = 5

@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
 
 OVERSAMPLING = 4
 FADE = (0.76, 0.86)  # part of the stretch over which the end is faded out: exp(sigma t) blows up errors there

@@ -14,13 +14,13 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
-from frf_ipz.diagnosis.nonlinear.fitting.screen import as_real, linear_motion, linear_motion_of_place
-from frf_ipz.diagnosis.nonlinear.linear.plant import PlantResponse, respond
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion, linear_motion_of_place
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import PlantResponse, respond
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.freedom import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.stretches import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
 
 SETTLED = 1e-3  # relative change of the cost between turns
 DIFFERENCE = 1e-4  # of the shape: its derivative; kinks average out over many samples

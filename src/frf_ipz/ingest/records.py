@@ -1,0 +1,203 @@
+"""Single blows and records as arrays: checked, calibrated, one at a time in constant memory.
+
+The door for whoever needs the recordings themselves: the estimation of FRFs, and the diagnosis, which transforms force
+and responses at any complex frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray, read_only
+from frf_ipz.errors import InputError
+from frf_ipz.frf import FrfLabel
+from frf_ipz.ingest.campaign_file import run_labels
+from frf_ipz.ingest.recording_files import RecordingFiles
+from frf_ipz.ingest.signals.windows import exponential_window, force_window
+from frf_ipz.ingest.survey.hammer import survey_hammer
+from frf_ipz.ingest.survey.random import survey_random
+from frf_ipz.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.survey.record_info import BlowFacts, Survey
+
+SURVEYS = {"hammer": survey_hammer, "random": survey_random}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Blow:
+    """One blow of a hammer, or one record of a shaker.
+
+    Parameters
+    ----------
+    name : str
+        As in the table of blows.
+    labels : tuple of FrfLabel
+        The FRFs that it contributes to, one a row of `responses`: DOFs with their signs, quantities, columns.
+    step_s : float
+        Time step, s; the first sample is at time 0.
+    force : (n_samples,) array
+        N, its constant part taken off, no window applied; the sign is that of the recording.
+    responses : (n_outputs, n_samples) array
+        SI, constant parts taken off where they are significant; the signs are those of the recording.
+    trigger : int
+        Sample at which the force sets in; 0 for records.
+    kept_force : pair of int
+        First sample of the force that is its pulse, and the one after the last; outside there is only noise.
+    rested : bool
+        The structure was at rest at the first sample.
+    recording : str
+        What it was cut from.
+    number : int
+        1 for the first blow of its recording.
+    start_s : float
+        Time of its first sample in its recording, s.
+    marks : tuple of str
+        What is wrong with it.
+    used : bool
+        It enters the FRFs.
+    """
+
+    name: str
+    labels: tuple[FrfLabel, ...]
+    step_s: float
+    force: FloatArray
+    responses: FloatArray
+    trigger: int
+    kept_force: tuple[int, int]
+    rested: bool
+    recording: str
+    number: int
+    start_s: float
+    marks: tuple[str, ...]
+    used: bool
+
+    def __post_init__(self) -> None:
+        for name in ("force", "responses"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return len(self.force)
+
+    def windowed(self, decay_1_s: float, n_samples: int) -> FloatArray:
+        """Give the force within its pulse and the responses, under a window, filled up with zeros to a common length.
+
+        Parameters
+        ----------
+        decay_1_s : float
+            Rate of the exponential window that force and responses share.
+        n_samples : int
+            The length wanted; at least that of the blow.
+
+        Returns
+        -------
+        (1 + n_outputs, n_samples) array
+            The force first.
+        """
+        signals = np.zeros((1 + len(self.responses), n_samples))
+        signals[0, : self.n_samples] = self.force
+        signals[1:, : self.n_samples] = self.responses
+        signals[0] *= force_window(n_samples, *self.kept_force)
+        if decay_1_s:
+            signals *= exponential_window(n_samples, self.step_s, decay_1_s, self.trigger)
+        return signals
+
+
+def survey_blows(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
+    """Look at all blows or records of a test and decide how they are used.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The test's recordings.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Told how far it is.
+
+    Returns
+    -------
+    Survey
+        What is wrong with which, what is used, windows and lengths.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used.
+    """
+    kind = files.test.kind
+    if kind not in SURVEYS:
+        raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no blows to read")
+    return SURVEYS[kind](files, options, progress)
+
+
+def read_blows(
+    test: Test,
+    options: IngestOptions,
+    *,
+    survey: Survey | None = None,
+    files: RecordingFiles | None = None,
+    used_only: bool = True,
+) -> Iterator[Blow]:
+    """Read the blows or records of a test, one at a time.
+
+    Parameters
+    ----------
+    test : Test
+        The test, of kind ``hammer`` or ``random``.
+    options : IngestOptions
+        The user's choice.
+    survey : Survey, optional
+        Where it has been made already.
+    files : RecordingFiles, optional
+        Where they have been opened already.
+    used_only : bool
+        Leave out what does not enter the FRFs.
+
+    Yields
+    ------
+    Blow
+        In the order of the test.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used.
+    """
+    files = files or RecordingFiles(test=test)
+    survey = survey or survey_blows(files, options)
+    wanted = survey.used if used_only else survey.blows
+    for _, group in groupby(wanted, key=lambda blow: blow.path):
+        blows = list(group)
+        stretches = files.stretches(blows[0].run, blows[0].path, [(blow.start, blow.stop) for blow in blows])
+        for blow, signals in zip(blows, stretches, strict=True):
+            yield _calibrated(test, blow, signals)
+
+
+def _calibrated(test: Test, facts: BlowFacts, signals: FloatArray) -> Blow:
+    signals = signals[1:] - np.array(facts.offsets)[:, None]
+    return Blow(
+        name=facts.name,
+        labels=run_labels(test.channels, facts.run),
+        step_s=facts.step_s,
+        force=signals[0],
+        responses=signals[1:],
+        trigger=facts.trigger,
+        kept_force=facts.kept_force,
+        rested=facts.rested,
+        recording=str(facts.path),
+        number=facts.number,
+        start_s=facts.start * facts.step_s,
+        marks=facts.marks,
+        used=facts.used,
+    )

@@ -1,0 +1,156 @@
+"""A file's length, step and blows, found in one pass that keeps an envelope of the force only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.campaign_file import Run
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.recording_files import RecordingFiles
+
+CELL = 64  # samples of the envelope's cells
+BURST = 0.02  # of the highest force of the file: what may be a blow of its own
+QUIET = 5.0  # times the median cell, which is noise or hum: what may be a blow
+NO_BLOW = 3.0  # times the median cell: a highest force below this is no blow at all
+BOUNCE_S = 0.1  # pulses closer than this are one blow that hit twice
+CROWDED = 0.5  # of the longest stretch between pulses: closer ones are one blow that hit twice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FileScan:
+    """What one pass through a file tells.
+
+    Parameters
+    ----------
+    run : Run
+        What the file belongs to.
+    path : Path
+        The file.
+    n_rows : int
+        Samples.
+    step_s : float
+        Mean time step, s.
+    onsets : tuple of int
+        Row, to within a cell, at which each pulse of the force begins.
+    """
+
+    run: Run
+    path: Path
+    n_rows: int
+    step_s: float
+    onsets: tuple[int, ...] = ()
+
+    @property
+    def longest(self) -> int:
+        """Rows from a pulse to the next or to the end, at most."""
+        return int(np.diff([*self.onsets, self.n_rows]).max(initial=0)) if self.onsets else self.n_rows
+
+
+@dataclass(slots=True)
+class _Envelope:
+    """Highest and lowest force of each cell."""
+
+    highest: list[FloatArray] = field(default_factory=list)
+    lowest: list[FloatArray] = field(default_factory=list)
+    left: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def add(self, force: FloatArray) -> None:
+        force = np.concatenate([self.left, force])
+        n_cells = len(force) // CELL
+        cells = force[: n_cells * CELL].reshape(n_cells, CELL)
+        self.highest.append(cells.max(axis=1))
+        self.lowest.append(cells.min(axis=1))
+        self.left = force[n_cells * CELL :].copy()
+
+    def size(self) -> FloatArray:
+        """Give the largest distance from the base in each cell; the last one may be shorter."""
+        rest = [self.left] if self.left.size else []
+        highest = np.concatenate([*self.highest, *[part.max(keepdims=True) for part in rest]])
+        lowest = np.concatenate([*self.lowest, *[part.min(keepdims=True) for part in rest]])
+        base = float(np.median(0.5 * (highest + lowest)))
+        return np.asarray(np.maximum(highest - base, base - lowest))
+
+
+def scan_file(files: RecordingFiles, run: Run, path: Path, *, for_blows: bool) -> FileScan:
+    """Look through a file.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings.
+    run : Run
+        What the file belongs to.
+    path : Path
+        The file.
+    for_blows : bool
+        Look for pulses of the force.
+
+    Returns
+    -------
+    FileScan
+        Length, step and pulses.
+
+    Raises
+    ------
+    FileFormatError
+        If the file cannot be read, or no blow is found.
+    """
+    envelope = _Envelope()
+    n_rows, first, last = 0, 0.0, 0.0
+    for block in files.blocks(run, path):
+        if n_rows == 0:
+            first = float(block[0, 0])
+        last = float(block[-1, 0])
+        n_rows += len(block)
+        envelope.add(block[:, 1])
+    onsets = _onsets(path, files.test.input_channel.column, envelope.size()) if for_blows else ()
+    return FileScan(run=run, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
+
+
+def split_blows(scan: FileScan, usual_length: int) -> tuple[tuple[int, int], ...]:
+    """Split a file at its blows.
+
+    Parameters
+    ----------
+    scan : FileScan
+        The file.
+    usual_length : int
+        Rows from a pulse to the next in this test.
+
+    Returns
+    -------
+    tuple of pairs of int
+        First row and row after the last of each blow. A blow begins a little before its pulse; a file with one blow
+        is one piece. Pulses that follow too soon to be a new blow stay in the piece of the one before.
+    """
+    apart = max(CROWDED * usual_length, BOUNCE_S / scan.step_s)
+    starts = [scan.onsets[0]]
+    for onset in scan.onsets[1:]:
+        if onset - starts[-1] >= apart:
+            starts.append(onset)
+    if len(starts) == 1:
+        return ((0, scan.n_rows),)
+    lead = max(CELL, usual_length // 50)
+    bounds = [max(start - lead, 0) for start in starts] + [scan.n_rows]
+    return tuple(pairwise(bounds))
+
+
+def _onsets(path: Path, column: str, size: FloatArray) -> tuple[int, ...]:
+    top, quiet = float(size.max()), float(np.median(size))
+    if top == 0.0 or (top < NO_BLOW * quiet and len(size) > 3):
+        problem = (
+            f"no blow found: the column '{column}' rises to {top:.3g} N at most over a level of {quiet:.3g} N; "
+            "is it the force, or is the file to be left out by [ingest] drop?"
+        )
+        raise FileFormatError(path, problem)
+    loud = size >= min(max(BURST * top, QUIET * quiet), top)
+    begins = np.flatnonzero(np.diff(loud.astype(np.int8), prepend=0) > 0)
+    return tuple(int(cell) * CELL for cell in begins)

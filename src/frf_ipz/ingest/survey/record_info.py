@@ -1,0 +1,142 @@
+"""What is known about one blow or record, and what was decided for a whole test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from frf_ipz.ingest.campaign_file import Run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlowFacts:
+    """One blow or record: where it is, what was measured, what is wrong with it.
+
+    Parameters
+    ----------
+    name : str
+        Its file, relative to the test, with ``#2`` for the second blow of a file.
+    run : Run
+        What it belongs to.
+    path : Path
+        Its file.
+    start, stop : int
+        Its rows in the file.
+    step_s : float
+        Time step of the file, s.
+    trigger : int
+        Sample, from `start`, at which the force sets in.
+    pulse : pair of int
+        First sample of its pulse, ringing and second pulses included, and the one after the last; from `start`.
+    kept_force : pair of int
+        The stretch of the force that a force window leaves; the whole where there is none.
+    offsets : tuple of float
+        Constant part of the force and of each response that is taken off, SI.
+    peak_force : float
+        Extreme value of the force, N, with its sign.
+    digital_force : bool
+        The force moves in coarse steps, so that equal peaks mean nothing.
+    pulse_s : float
+        Length of the pulse at half of its height, s; NaN for records.
+    force_noise : float
+        Standard deviation of the force outside of its pulse, N.
+    second_pulse : float
+        Height of a second pulse over the first; 0 where there is none.
+    left : float
+        Share of the slowest mode's amplitude that is left at the end.
+    left_hz : float
+        That mode's frequency, Hz.
+    snr_db : float
+        Power of the response over its noise, median of the channels, dB; NaN where the noise is not known.
+    rested : bool
+        The structure was at rest at the first sample.
+    number : int
+        1 for the first blow of its file: what that has left may still move the structure at the next.
+    faults : tuple of str
+        Why it would be left out.
+    remarks : tuple of str
+        What is wrong and can be lived with.
+    used : bool
+        It enters the FRFs.
+    """
+
+    name: str
+    run: Run
+    path: Path
+    start: int
+    stop: int
+    step_s: float
+    trigger: int
+    pulse: tuple[int, int]
+    kept_force: tuple[int, int]
+    offsets: tuple[float, ...]
+    peak_force: float
+    digital_force: bool
+    pulse_s: float
+    force_noise: float
+    second_pulse: float = 0.0
+    left: float = 0.0
+    left_hz: float = 0.0
+    snr_db: float = float("nan")
+    rested: bool = True
+    number: int = 1
+    faults: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    used: bool = True
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return self.stop - self.start
+
+    @property
+    def ringing_s(self) -> float:
+        """Time from the blow to the end, s."""
+        return (self.n_samples - self.trigger) * self.step_s
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """All that is wrong, the reasons for leaving it out first."""
+        return self.faults + self.remarks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """What was found in the recordings of a test, and what was decided.
+
+    Parameters
+    ----------
+    blows : tuple of BlowFacts
+        All blows or records, also those that are left out.
+    step_s : float
+        Time step that those that are used have in common, s.
+    n_samples : int
+        Length of the transforms; shorter blows are filled up with zeros.
+    decay_1_s : float
+        Rate sigma of the exponential window on force and response; 0 for none.
+    segment : int
+        Samples of the segments, under Hann windows, that records are cut into; 0 for none.
+    piece : int
+        Samples of the pieces that records are cut into, their transients taken off; 0 for none.
+    force_window : bool
+        The force outside of its pulse is set to zero.
+    choices : tuple of str
+        What was chosen, and by what.
+    warnings : tuple of str
+        What the user has to know.
+    """
+
+    blows: tuple[BlowFacts, ...]
+    step_s: float
+    n_samples: int
+    decay_1_s: float = 0.0
+    segment: int = 0
+    piece: int = 0
+    force_window: bool = False
+    choices: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def used(self) -> tuple[BlowFacts, ...]:
+        """The blows or records that enter the FRFs."""
+        return tuple(blow for blow in self.blows if blow.used)

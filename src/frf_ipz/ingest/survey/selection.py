@@ -1,0 +1,200 @@
+"""Which blows are used: what checks say, what the user says, and at least one of every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.ingest.signals.clipping import share_a_rail
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.ingest.campaign_file import Run, Test
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.survey.record_info import BlowFacts
+
+SAME_STEP = 1e-3  # relative difference up to which two files have one time step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Blows with what was decided about each.
+
+    Parameters
+    ----------
+    blows : tuple of BlowFacts
+        All of them.
+    step_s : float
+        The step that those that are used have in common, s.
+    warnings : tuple of str
+        What was left out, and what is used although it is bad.
+    """
+
+    blows: tuple[BlowFacts, ...]
+    step_s: float
+    warnings: tuple[str, ...]
+
+
+def blow_name(test: Test, path: Path, number: int, count: int) -> str:
+    """Name a blow after its file.
+
+    Parameters
+    ----------
+    test : Test
+        The test; the name is relative to its folder.
+    path : Path
+        The file.
+    number, count : int
+        Which blow of how many in the file, from 1.
+
+    Returns
+    -------
+    str
+        Such as ``hits/p18_01.csv`` or ``hits/p18.csv#2``.
+    """
+    folder = test.path.parent
+    name = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
+    return f"{name}#{number}" if count > 1 else name
+
+
+def is_named(name: str, wanted: Sequence[str]) -> bool:
+    """Tell whether a blow is among those that the user names.
+
+    Parameters
+    ----------
+    name : str
+        The blow.
+    wanted : sequence of str
+        Files, or ``file#2``; the last parts of a path are enough.
+
+    Returns
+    -------
+    bool
+        True if it is.
+    """
+    file, _, number = name.partition("#")
+    for text in wanted:
+        wanted_file, _, wanted_number = text.partition("#")
+        parts = PurePath(wanted_file).parts
+        if PurePath(file).parts[-len(parts) :] == parts and wanted_number in {"", number}:
+            return True
+    return False
+
+
+def check_names(names: Sequence[str], options: IngestOptions) -> None:
+    """Refuse names in ``keep`` and ``drop`` that are no blow, or in both.
+
+    Parameters
+    ----------
+    names : sequence of str
+        All blows.
+    options : IngestOptions
+        The user's choice.
+
+    Raises
+    ------
+    InputError
+        If a name fits none, or one is both kept and dropped.
+    """
+    for key in ("keep", "drop"):
+        for text in getattr(options, key):
+            if not any(is_named(name, [text]) for name in names):
+                raise InputError(f"[ingest] {key}: there is no blow or file '{text}'; {did_you_mean(text, names)}")
+    for name in names:
+        if is_named(name, options.keep) and is_named(name, options.drop):
+            raise InputError(f"[ingest]: '{name}' is named by both keep and drop; decide for one")
+
+
+def choose(blows: Sequence[BlowFacts], options: IngestOptions) -> Verdict:
+    """Decide which blows are used.
+
+    Parameters
+    ----------
+    blows : sequence of BlowFacts
+        As the checks left them.
+    options : IngestOptions
+        The user's choice, which overrules the checks.
+
+    Returns
+    -------
+    Verdict
+        Blows with all marks and decisions.
+
+    Raises
+    ------
+    InputError
+        If the user drops all blows of a DOF, or all of them have another time step than the rest of the test.
+    """
+    candidates = [blow for blow in blows if not is_named(blow.name, options.drop)]
+    step_s = _usual_step([blow.step_s for blow in candidates or blows])
+    marked = _mark_rails([_mark_step(blow, step_s) for blow in blows])
+    decided = [_decide(blow, options) for blow in marked]
+    warnings = [
+        f"{blow.name} is left out: {'; '.join(blow.faults)}" for blow in decided if not blow.used and blow.faults
+    ]
+    for run in dict.fromkeys(blow.run for blow in blows):
+        if not any(blow.used for blow in decided if blow.run == run):
+            saved = _least_bad(run, decided, options, step_s)
+            decided = [replace(blow, used=True) if blow is saved else blow for blow in decided]
+            warnings = [text for text in warnings if not text.startswith(f"{saved.name} is left out")]
+            reason = "; ".join(saved.faults)
+            warnings.append(f"{saved.name} is used although it is bad ({reason}): no better blow at {run.input_dof}")
+    return Verdict(blows=tuple(decided), step_s=step_s, warnings=tuple(warnings))
+
+
+def _usual_step(steps: Sequence[float]) -> float:
+    """Find the step that most files have; their mean, since each is known to its last digits only."""
+    values = np.array(steps)
+    groups = [values[np.abs(values / step - 1.0) <= SAME_STEP] for step in steps]
+    return float(np.mean(max(groups, key=len)))
+
+
+def _mark_step(blow: BlowFacts, step_s: float) -> BlowFacts:
+    if abs(blow.step_s / step_s - 1.0) <= SAME_STEP:
+        return blow
+    fault = f"wrong sampling step: {blow.step_s:.6g} s where the others have {step_s:.6g} s"
+    return replace(blow, faults=(*blow.faults, fault))
+
+
+def _mark_rails(blows: Sequence[BlowFacts]) -> list[BlowFacts]:
+    """Mark blows whose peaks are equal to the last digit: they met the end of the force's range."""
+    fine = [blow for blow in blows if not blow.digital_force]
+    peaks = np.array([blow.peak_force + blow.offsets[0] for blow in fine])
+    equal = share_a_rail(peaks, np.array([blow.pulse_s for blow in fine]))
+    cut = {blow.name for blow, is_equal in zip(fine, equal, strict=True) if is_equal}
+    return [
+        replace(blow, faults=(*blow.faults, "clipping of the force: its peak equals another blow's to the last digit"))
+        if blow.name in cut and not any(fault.startswith("clipping") for fault in blow.faults)
+        else blow
+        for blow in blows
+    ]
+
+
+def _decide(blow: BlowFacts, options: IngestOptions) -> BlowFacts:
+    if is_named(blow.name, options.drop):
+        return replace(blow, used=False, remarks=(*blow.remarks, "dropped by the user"))
+    if is_named(blow.name, options.keep):
+        kept = ("kept by the user",) if blow.faults else ()
+        return replace(blow, used=True, remarks=(*blow.remarks, *kept))
+    return replace(blow, used=not blow.faults)
+
+
+def _least_bad(run: Run, blows: Sequence[BlowFacts], options: IngestOptions, step_s: float) -> BlowFacts:
+    mine = [blow for blow in blows if blow.run == run and not is_named(blow.name, options.drop)]
+    if not mine:
+        raise InputError(
+            f"[ingest] drop leaves no blow at {run.input_dof}; keep one, or take its entry out of test.toml"
+        )
+    usable = [blow for blow in mine if abs(blow.step_s / step_s - 1.0) <= SAME_STEP]
+    if not usable:
+        raise InputError(
+            f"all blows at {run.input_dof} have the time step {mine[0].step_s:.6g} s, but the others of the test have "
+            f"{step_s:.6g} s; export them with one step, or make a test of their own"
+        )
+    return min(usable, key=lambda blow: (len(blow.faults), blow.second_pulse, -abs(blow.peak_force)))

@@ -1,0 +1,161 @@
+"""What every stage of the chain works with: the job, the run's folder, and the keys of the stages before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+from frf_ipz import __version__
+from frf_ipz.runs.digests import digest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.progress import Progress
+    from frf_ipz.runs.folder import RunFolder, Writers
+
+Result = TypeVar("Result")
+
+# What each stage's result is made from, so that what rests on something older can be marked as stale.
+NEEDS = {
+    "fit": ("ingest",),
+    "diagnose": ("ingest",),
+    "levels": ("ingest", "fit"),
+    "reduce": ("fit",),
+    "pair": ("fit", "reduce"),
+    "update": ("pair",),
+    "predict": ("update",),
+    "export": ("update",),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Desk:
+    """What every stage needs: the job, the folder, and the keys of the stages before it.
+
+    Parameters
+    ----------
+    job : Job
+        What to work on.
+    folder : RunFolder
+        Where results are kept.
+    progress : Progress
+        Told how far the work is.
+    keys : dict of str to str
+        Key of each stage that is done.
+    """
+
+    job: Job
+    folder: RunFolder
+    progress: Progress
+    keys: dict[str, str] = field(default_factory=dict)
+
+    def stage(
+        self,
+        name: str,
+        depends: Mapping[str, object],
+        compute: Callable[[Progress], Result],
+        files: Callable[[Result], Writers] = lambda _: {},
+    ) -> Result:
+        """Run a stage, or take its result from the folder.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+        depends : mapping
+            What the result depends on.
+        compute : callable
+            Gives the result; takes a Progress.
+        files : callable
+            Gives what writes each file that users read, by name.
+
+        Returns
+        -------
+        object
+            The result.
+        """
+        key = self.sign(name, depends)
+        result = self.folder.stage(name, key, lambda: compute(self.listener(name)), files)
+        if name in self.folder.computed:
+            self.folder.mark_stale(dependents(name))
+        return result
+
+    def sign(self, name: str, depends: Mapping[str, object]) -> str:
+        """Make the key of a stage, and keep it for the stages after it.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+        depends : mapping
+            What its result depends on.
+
+        Returns
+        -------
+        str
+            The key.
+        """
+        self.keys[name] = digest({"stage": name, "version": __version__, **depends})
+        return self.keys[name]
+
+    def listener(self, name: str) -> Progress:
+        """Give the progress of one stage, with its name before what it says.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+
+        Returns
+        -------
+        Progress
+            To hand to the stage.
+        """
+
+        def tell(fraction: float, text: str) -> None:
+            self.progress(fraction, f"{name}: {text}" if text else name)
+
+        tell(0.0, "")
+        return tell
+
+    def after(self, *names: str) -> list[str]:
+        """Give the keys of earlier stages.
+
+        Parameters
+        ----------
+        *names : str
+            The stages.
+
+        Returns
+        -------
+        list of str
+            Their keys.
+        """
+        return [self.keys[name] for name in names]
+
+
+def dependents(name: str) -> list[str]:
+    """Give all stages whose results rest on that of a stage.
+
+    Parameters
+    ----------
+    name : str
+        The stage.
+
+    Returns
+    -------
+    list of str
+        In the order of the chain.
+
+    Examples
+    --------
+    >>> dependents("update")
+    ['predict', 'export']
+    """
+    found = {name}
+    for stage, needs in NEEDS.items():
+        if found & set(needs):
+            found.add(stage)
+    return [stage for stage in NEEDS if stage in found - {name}]
