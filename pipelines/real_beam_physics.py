@@ -45,7 +45,7 @@ from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.fit import Fit
-from frf_ipz.diagnosis.search.inference_problem import Bench
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 from frf_ipz.diagnosis.search.set_up import set_up
 
@@ -114,7 +114,7 @@ def with_drift(frfs: frf_ipz.FrfSet, drift: float) -> frf_ipz.FrfSet:
     return replace(frfs, variance=(drift * frfs.frequency_hz[:, None] * slope) ** 2 + noise**2)
 
 
-def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit], Bench]:
+def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit], InferenceProblem]:
     """Add the cause with the largest evidence until the next one brings too little, and print what each leaves."""
     effects = {name: one for name, one in shipped_effects().items() if case.scale == "none" or name != "sensor_gain"}
     source = divide(Observations(kind="frf", blows=(), band_hz=case.band_hz, frfs=frfs))
@@ -136,7 +136,7 @@ def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit
     return fits, bench
 
 
-def add_causes(bench: Bench) -> list[Fit]:
+def add_causes(bench: InferenceProblem) -> list[Fit]:
     """Return the fits with nothing, one cause, two causes and so on, the most probable one more each time."""
     fits = [fit_nothing(bench)]
     for _ in range(MOST_CAUSES):

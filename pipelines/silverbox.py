@@ -15,7 +15,7 @@ import pandas as pd
 
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.diagnosis.nonlinear.search import LawSearch, search_laws
-from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.model_file import read_model
@@ -81,7 +81,7 @@ def main(folder: Path) -> None:
     sensors = (Sensor(channel="V2", dof=dof, quantity=FrfQuantity.RECEPTANCE),)
     cuts = np.array_split(np.arange(len(force)), PIECES)
     blows = tuple(
-        Blow(name=f"piece {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
+        ObservedRecord(name=f"piece {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
              force=force[cut], responses=motion[None, cut], rested=i == 0)
         for i, cut in enumerate(cuts)
     )  # fmt: skip

@@ -110,7 +110,7 @@ def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=B
 
 
 def observed(frfs, band_hz=BAND_HZ):
-    return Observations(kind="frf", blows=(), band_hz=band_hz, frfs=frfs)
+    return Observations(kind="frf", records=(), band_hz=band_hz, frfs=frfs)
 
 
 def bench_of(model, frfs, names):

@@ -104,10 +104,10 @@ def write_csv(path, time, force, acceleration):
     np.savetxt(path, table, delimiter=",", header="time,force,acc", comments="", fmt="%.8g")
 
 
-def write_campaign(folder, *, blows=3, seed=1):
+def write_campaign(folder, *, records=3, seed=1):
     """A whole campaign: recordings, test, model and pipeline."""
     rng = np.random.default_rng(seed)
-    for number in range(1, blows + 1):
+    for number in range(1, records + 1):
         write_csv(folder / "hits" / f"blow_{number}.csv", *blow(rng, level=30.0 + 10 * number))
     for name, text in (("test", TEST), ("model", MODEL), ("pipeline", PIPELINE)):
         (folder / f"{name}.toml").write_text(text)

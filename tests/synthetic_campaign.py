@@ -55,7 +55,7 @@ def pulse(n_samples, step_s, *, height=100.0, at_s=AT_S, length_s=PULSE_S):
     return height * np.exp(-0.5 * ((time - at_s) / length_s) ** 2)
 
 
-def blow(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, force=None, **of_pulse):
+def impact(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, force=None, **of_pulse):
     """Give force and responses of one blow, (1 + n_outputs, n_samples)."""
     force = pulse(n_samples, step_s, **of_pulse) if force is None else force
     signals = np.vstack([force, respond(structure, force, step_s)])
@@ -102,12 +102,12 @@ def write_test(folder, body, *, kind="hammer", n_outputs=2, head="", **of_channe
 HIT = '[[hit]]\ndof = "7:+z"\nfiles = ["hits/*.csv"]\n'
 
 
-def hammer_campaign(folder, *, structure=None, heights=(100.0, 60.0, 150.0), noise=0.0, seed=0, **of_blow):
+def hammer_campaign(folder, *, structure=None, heights=(100.0, 60.0, 150.0), noise=0.0, seed=0, **of_impact):
     """Write a hammer test with one blow a file, and return the path of `test.toml`."""
     structure = structure or Structure()
     rng = np.random.default_rng(seed)
-    step_s = of_blow.setdefault("step_s", 1 / 2048)
+    step_s = of_impact.setdefault("step_s", 1 / 2048)
     for number, height in enumerate(heights, start=1):
-        signals = blow(structure, height=height, noise=noise, rng=rng, **of_blow)
+        signals = impact(structure, height=height, noise=noise, rng=rng, **of_impact)
         write_csv(folder / "hits" / f"p7_{number:02d}.csv", signals, step_s)
     return write_test(folder, HIT, n_outputs=structure.n_outputs)

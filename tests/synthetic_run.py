@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, Diagnosis, Gate, LawAtWork, Misfit
+from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, DataCheck, Diagnosis, LawInTime, Misfit
 from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.dofs import Dof
@@ -18,7 +18,7 @@ from frf_ipz.export.state_space import to_state_space
 from frf_ipz.fe.options import ReduceOptions
 from frf_ipz.fe.reduction import reduce_model
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.frf_estimate import Recordings, Trace
+from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
 from frf_ipz.pairing.assignment import pair
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
@@ -67,8 +67,8 @@ def synthetic_results():
     nominal = random_beam(rng)
     factors, _ = stiffness_errors(nominal, rng)
     free = [dof for dof in nominal.dofs if dof.direction == "z"]
-    sensors, blows, points = (free[-1], free[len(free) // 3]), (free[-3],), (free[len(free) // 2],)
-    case = SimpleNamespace(sensors=sensors, blows=blows)
+    sensors, input_dofs, points = (free[-1], free[len(free) // 3]), (free[-3],), (free[len(free) // 2],)
+    case = SimpleNamespace(sensors=sensors, input_dofs=input_dofs)
     truth = Truth(scaled(nominal, factors), np.full(200, 0.004))
     labels = tuple(replace(label, output_channel=f"acc{label.output_dof.node}") for label in labels_of(case))
     band = band_of(truth, 5)
@@ -78,7 +78,7 @@ def synthetic_results():
     reduced = reduce_model(
         nominal,
         ReduceOptions(),
-        actuators=blows,
+        actuators=input_dofs,
         sensors=sensors,
         points=points,
         band_hz=band,
@@ -96,7 +96,7 @@ def synthetic_results():
         "predict": predict_frfs(updated, points, labels, lines),
         "export": to_state_space(updated, labels, points),
         "model": nominal,
-        "reference": reference_of(truth, points, blows, lines),
+        "reference": reference_of(truth, points, input_dofs, lines),
     }
 
 
@@ -134,9 +134,9 @@ def recordings_of(truth, labels, band, rng):
         averages=np.full(len(labels), 5),
     )
     names = [f"hits/p_{number:02d}.csv" for number in range(5)]
-    blows = pd.DataFrame(
+    records = pd.DataFrame(
         {
-            "blow": names,
+            "record": names,
             "input_dof": [str(labels[0].input_dof)] * 5,
             "peak_force_N": rng.uniform(5, 30, 5),
             "pulse_s": 8e-4,
@@ -152,7 +152,9 @@ def recordings_of(truth, labels, band, rng):
         decay = np.sin(60 * time) * np.exp(-3 * time)
         traces.append(Trace(name=name, channel="force", unit="N", time_s=time[:40], values=force[:40]))
         traces.append(Trace(name=name, channel=labels[0].output_channel, unit="m/s^2", time_s=time, values=decay))
-    return Recordings(frfs=frfs, blows=blows, traces=tuple(traces), warnings=("hits/p_02.csv is left out: double hit",))
+    return FrfEstimate(
+        frfs=frfs, records=records, traces=tuple(traces), warnings=("hits/p_02.csv is left out: double hit",)
+    )
 
 
 def with_tables(fit, frfs):
@@ -202,9 +204,9 @@ def with_tables(fit, frfs):
     )
 
 
-def reference_of(truth, points, blows, lines):
+def reference_of(truth, points, input_dofs, lines):
     """The true FRFs at the points of interest."""
-    labels = tuple(FrfLabel(point, blow, FrfQuantity.RECEPTANCE) for point in points for blow in blows)
+    labels = tuple(FrfLabel(point, struck, FrfQuantity.RECEPTANCE) for point in points for struck in input_dofs)
     values = np.stack([truth.receptance(2j * np.pi * lines, label) for label in labels], 1)
     unknown = np.full(values.shape, np.nan)
     return FrfSet(
@@ -225,15 +227,15 @@ def synthetic_levels(labels, band):
         (
             mode,
             str(labels[0]),
-            f"hits/p_{blow:02d}.csv",
+            f"hits/p_{record:02d}.csv",
             level,
-            100.0 * (1 + mode - 0.01 * mode * blow),
+            100.0 * (1 + mode - 0.01 * mode * record),
             0.01,
             0.004,
             1e-4,
         )
         for mode in range(2)
-        for blow, level in enumerate((2.0, 8.0, 30.0))
+        for record, level in enumerate((2.0, 8.0, 30.0))
     ]
     return LevelDependence(
         frequency_hz=frequency,
@@ -247,7 +249,7 @@ def synthetic_levels(labels, band):
 
 
 def many_frfs(n_frfs, n_lines):
-    """Recordings with very many FRFs of very many lines: sharp peaks and notches that no thinning may lose."""
+    """FrfEstimate with very many FRFs of very many lines: sharp peaks and notches that no thinning may lose."""
     frequency = np.linspace(1.0, 5000.0, n_lines)
     s = 2j * np.pi * frequency[:, None]
     rng = np.random.default_rng(SEED)
@@ -260,7 +262,7 @@ def many_frfs(n_frfs, n_lines):
         FrfLabel(Dof(1 + number // side, "z"), Dof(1 + number % side, "z"), FrfQuantity.ACCELERANCE)
         for number in range(n_frfs)
     )
-    return Recordings(
+    return FrfEstimate(
         frfs=FrfSet(
             frequency_hz=frequency,
             values=values,
@@ -269,7 +271,7 @@ def many_frfs(n_frfs, n_lines):
             coherence=np.full(values.shape, 0.999),
             averages=np.full(n_frfs, 5),
         ),
-        blows=pd.DataFrame(),
+        records=pd.DataFrame(),
     )
 
 
@@ -277,11 +279,11 @@ def synthetic_law():
     """A cubic spring of 1e9 N/m^3 in a blow of 20 Hz that it stiffens; a thousandth of it is left."""
     time = np.linspace(0, 2, 2001)
     motion = 1e-3 * np.exp(-time) * np.sin(2 * np.pi * 20 * time)
-    return LawAtWork(
+    return LawInTime(
         motion_m=motion,
         velocity_m_s=np.gradient(motion, time),
         force_N=1e9 * motion**3,
-        blow="hits/p1_01.csv",
+        record="hits/p1_01.csv",
         is_held_out=True,
         channel="acc_1",
         response="acceleration",
@@ -333,8 +335,8 @@ def synthetic_diagnosis(labels, nodes):
             Ambiguity(effects=("added_mass", "local_stiffness"), separation_nats=4.0, resolve_by="Strike 4:+z."),
         ),
         gates=(
-            Gate(name="homogeneity", value=0.9, limit=1.5, statement="The structure behaves linearly."),
-            Gate(name="reciprocity", value=np.nan, limit=4.0, statement="Reciprocity could not be checked."),
+            DataCheck(name="homogeneity", value=0.9, limit=1.5, statement="The structure behaves linearly."),
+            DataCheck(name="reciprocity", value=np.nan, limit=4.0, statement="Reciprocity could not be checked."),
         ),
         detectability={"added_mass": {"mass_kg": 0.001}},
         statement="What is missing has been found.",

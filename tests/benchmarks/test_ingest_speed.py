@@ -18,35 +18,35 @@ MOST_BYTES = 60e6  # above the data
 
 
 @pytest.fixture(scope="module")
-def blows():
+def records():
     """(n_blows, 1 + n_outputs, n_samples): half sines on eight decaying tones, noise on everything."""
     rng = np.random.default_rng(3)
     time_s = np.arange(N_SAMPLES) / RATE_HZ
     tones = np.exp(-2.0 * time_s) * np.sin(2 * np.pi * np.outer(100.0 + 90.0 * np.arange(N_OUTPUTS), time_s))
     kernels = np.fft.rfft(tones)
-    blows = np.empty((N_BLOWS, 1 + N_OUTPUTS, N_SAMPLES))
-    for blow in blows:
+    records = np.empty((N_BLOWS, 1 + N_OUTPUTS, N_SAMPLES))
+    for blow in records:
         length_s, start_s = 0.8e-3 * (1 + 0.1 * rng.standard_normal()), 0.02 + 0.002 * rng.random()
         inside = (time_s > start_s) & (time_s < start_s + length_s)
         blow[0] = np.where(inside, 100.0 * np.sin(np.pi * (time_s - start_s) / length_s), 0.0)
         blow[1:] = np.fft.irfft(kernels * np.fft.rfft(blow[0]), N_SAMPLES)
         blow[1:] += 0.01 * blow[1:].std(axis=1, keepdims=True) * rng.standard_normal((N_OUTPUTS, N_SAMPLES))
         blow[0] += 0.02 * rng.standard_normal(N_SAMPLES)
-    return blows
+    return records
 
 
-def average(blows):
+def average(records):
     sums = empty_sums(N_SAMPLES // 2 + 1, N_OUTPUTS)
-    for blow in blows:
+    for blow in records:
         sums.add(blow[0], blow[1:])
     return estimate_frf(sums), estimate_coherence(sums)
 
 
-def by_pyfrf(module, blows):
+def by_pyfrf(module, records):
     frf = module.FRF(
         sampling_freq=RATE_HZ,
-        exc=blows[:, 0],
-        resp=blows[:, 1:],
+        exc=records[:, 0],
+        resp=records[:, 1:],
         exc_type="f",
         resp_type="a",
         window="none",
@@ -65,26 +65,26 @@ def median_cpu_seconds(work):
     return float(np.median(times)), result
 
 
-def test_averaging(benchmark, blows):
-    frf, coherence = benchmark.pedantic(lambda: average(blows), rounds=3)
+def test_averaging(benchmark, records):
+    frf, coherence = benchmark.pedantic(lambda: average(records), rounds=3)
     assert np.isfinite(frf).all()
     assert (coherence <= 1.0).all()
 
 
-def test_memory_above_the_data(benchmark, blows):
+def test_memory_above_the_data(benchmark, records):
     tracemalloc.start()
-    benchmark.pedantic(lambda: average(blows), rounds=1)
+    benchmark.pedantic(lambda: average(records), rounds=1)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    print(f"\n  averaging: {peak / 1e6:.0f} MB above the data of {blows.nbytes / 1e6:.0f} MB")
+    print(f"\n  averaging: {peak / 1e6:.0f} MB above the data of {records.nbytes / 1e6:.0f} MB")
     assert peak < MOST_BYTES
 
 
-def test_against_pyfrf(benchmark, blows):
+def test_against_pyfrf(benchmark, records):
     pyfrf = pytest.importorskip("pyFRF", reason="needs pyFRF of the extra 'peers'")
-    theirs = median_cpu_seconds(lambda: by_pyfrf(pyfrf, blows))
-    ours = median_cpu_seconds(lambda: average(blows))
-    benchmark.pedantic(lambda: average(blows), rounds=1)
+    theirs = median_cpu_seconds(lambda: by_pyfrf(pyfrf, records))
+    ours = median_cpu_seconds(lambda: average(records))
+    benchmark.pedantic(lambda: average(records), rounds=1)
     frf, reference = ours[1][0][1:], theirs[1][0][1:]  # pyFRF divides by zero at 0 Hz
     error = np.abs(frf - reference).max() / np.abs(reference).max()
     print(

@@ -148,8 +148,8 @@ def test_a_blow_is_dropped(page, demo):
         "list.dispatchEvent(new Event('change', {bubbles: true}));"
     )
     page.wait_for_results(before)
-    blows = pq.read_table(demo / "out" / "blows.parquet").to_pandas().set_index("blow")
-    assert not blows.loc["hits/p69_02.csv", "used"]
+    records = pq.read_table(demo / "out" / "records.parquet").to_pandas().set_index("record")
+    assert not records.loc["hits/p69_02.csv", "used"]
     assert page.find("[data-blow='hits/p69_02.csv']").get_attribute("value") == "drop"
 
 

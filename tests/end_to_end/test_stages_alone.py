@@ -15,7 +15,7 @@ from frf_ipz.runs.folder import read_run
 from small_campaign import write_campaign
 
 FILES = {
-    "ingest": {"frf.parquet", "blows.parquet"},
+    "ingest": {"frf.parquet", "records.parquet"},
     "fit": {"poles.parquet", "zeros.parquet", "fit.parquet", "modes.parquet"},
     "pair": {"pairs.parquet"},
     "update": {"parameters.parquet", "updated_model.npz"},

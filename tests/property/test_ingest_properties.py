@@ -115,7 +115,7 @@ def test_every_blow_of_a_file_is_found(gaps, heights, sign):
         write_csv(Path(folder) / "hits" / "1.csv", blow(Structure(), force=force, step_s=STEP_S), STEP_S)
         result = estimate_frfs(read_test(write_test(Path(folder), HIT)), IngestOptions())
     expected = sign * np.array(heights[: len(at_s)])
-    np.testing.assert_allclose(result.blows.peak_force_N, expected, rtol=0.05)  # samples beside the top
+    np.testing.assert_allclose(result.records.peak_force_N, expected, rtol=0.05)  # samples beside the top
 
 
 pulses = st.builds(
@@ -177,12 +177,12 @@ def test_exponential_windows_are_1_at_the_blow(decay, origin):
     np.testing.assert_allclose(window[1:] / window[:-1], np.exp(-0.01 * decay), rtol=ROUNDING)
 
 
-@given(blows=st.integers(2, 6), outputs=st.integers(1, 3), seed=st.integers(0, 2**16), gain=st.floats(1e-6, 1e6))
+@given(records=st.integers(2, 6), outputs=st.integers(1, 3), seed=st.integers(0, 2**16), gain=st.floats(1e-6, 1e6))
 @settings(max_examples=50, deadline=None)
-def test_estimates_scale_with_the_signals(blows, outputs, seed, gain):
+def test_estimates_scale_with_the_signals(records, outputs, seed, gain):
     rng = np.random.default_rng(seed)
     one, other = empty_sums(65, outputs), empty_sums(65, outputs)
-    for _ in range(blows):
+    for _ in range(records):
         force, responses = rng.standard_normal(128), rng.standard_normal((outputs, 128))
         one.add(force, responses)
         other.add(force, gain * responses)

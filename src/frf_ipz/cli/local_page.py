@@ -12,7 +12,7 @@ from frf_ipz.show.server import serve
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder
 
@@ -50,11 +50,11 @@ def _run(path: Path, out: Path, *, progress: Progress) -> RunFolder:
     return run_pipeline(path, out, progress=progress)
 
 
-def _read(path: Path) -> Job:
+def _read(path: Path) -> PipelineInputs:
     """Read a pipeline; what reads tests and models is imported with the first page that needs it."""
-    from frf_ipz.pipeline.inputs import read_job
+    from frf_ipz.pipeline.inputs import read_inputs
 
-    return read_job(path)
+    return read_inputs(path)
 
 
 def _has_desktop() -> bool:

@@ -44,7 +44,7 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, n
 
 HELP = {
     "run": "Run the whole chain: FRFs, poles and zeros, updated model, prediction, state space, report.",
-    "ingest": "Recordings into FRFs with their variance: frf.parquet, blows.parquet.",
+    "ingest": "Recordings into FRFs with their variance: frf.parquet, records.parquet.",
     "fit": "FRFs into poles, zeros and mode shapes: poles.parquet, zeros.parquet, fit.parquet, modes.parquet.",
     "diagnose": "Locate a mismatch of model and recordings, and say what was left out: diagnosis.json, report.html.",
     "pair": "Measured poles and zeros against those of the reduced FE model: pairs.parquet.",
@@ -91,9 +91,9 @@ for _stage in HELP:
 def check(pipeline: PipelineArgument) -> None:
     """Validate test, model and pipeline, draw the set-up, run nothing."""
     from frf_ipz.pipeline.check import describe_setup
-    from frf_ipz.pipeline.inputs import read_job
+    from frf_ipz.pipeline.inputs import read_inputs
 
-    print(describe_setup(read_job(pipeline)))
+    print(describe_setup(read_inputs(pipeline)))
 
 
 @app.command()

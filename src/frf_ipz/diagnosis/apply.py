@@ -11,7 +11,7 @@ from scipy import sparse
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
-from frf_ipz.diagnosis.catalogue.model_context import Specimen
+from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import make_basis
@@ -101,12 +101,12 @@ def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
     )
 
 
-def _specimen(model: StructuralModel, curves: Curves) -> Specimen:
+def _specimen(model: StructuralModel, curves: Curves) -> ModelContext:
     """Gather what effects may know, as it was when they were searched for."""
     layout = lay_out(curves.labels)
     places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     highest = float(curves.s.imag.max())
-    return Specimen(
+    return ModelContext(
         basis=make_basis(model, highest, places),
         layout=layout,
         band_hz=(float(curves.s.imag.min()) / (2 * np.pi), highest / (2 * np.pi)),

@@ -34,9 +34,9 @@ from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_b
 from frf_ipz.diagnosis.judging.mismatch_location import trace
 from frf_ipz.diagnosis.judging.next_sensor import best_sensor
 from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
-from frf_ipz.diagnosis.judging.unnamed_force import describe_another, find_another
-from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_quiet_constants
-from frf_ipz.diagnosis.measured.cleaned.residual_motion import without_leftovers
+from frf_ipz.diagnosis.judging.unnamed_force import describe_unnamed_force, find_unnamed_force
+from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_dc_offset
+from frf_ipz.diagnosis.measured.cleaned.residual_motion import without_residual_motion
 from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Gate
+    from frf_ipz.diagnosis.diagnosis import DataCheck
     from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.judging.figures import Proof
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.fit import Data
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
@@ -140,13 +140,13 @@ def _diagnose(
 
 
 def _decide(
-    bench: Bench,
-    at_bench: Callable[[DiagnoseOptions], Bench],
+    bench: InferenceProblem,
+    at_bench: Callable[[DiagnoseOptions], InferenceProblem],
     options: DiagnoseOptions,
     progress: Progress,
     *,
     is_certain: bool,
-) -> tuple[Bench, Decision, str]:
+) -> tuple[InferenceProblem, Decision, str]:
     """Decide what is missing, unless a law is; where damping alone has no explanation, once more with damping free."""
     is_searched = bool(bench.effects) and not is_certain
     found = decide(bench, progress) if is_searched else only_null(bench)
@@ -155,15 +155,15 @@ def _decide(
         again = decide(freed, progress)
         if again.good.is_good:
             return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
-    another = find_another(bench, found) if found.final.is_nearly_all else None
+    another = find_unnamed_force(bench, found) if found.final.is_nearly_all else None
     if another is not None:
-        return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_another(another)
+        return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_unnamed_force(another)
     if found.verdict == EXPLAINED and (rather := another_kind(found.final)):
         return bench, replace(found, verdict=UNEXPLAINED), rather
     return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
 
 
-def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
+def _proven(bench: InferenceProblem, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
     """Prove, and leave out what explains a part only and makes worse what was not fitted."""
     proof = prove(bench, held_out, found.null, found.final)
     while found.verdict == UNEXPLAINED and proof.after.held_out > proof.before.held_out:
@@ -175,7 +175,9 @@ def _proven(bench: Bench, held_out: Data, found: Decision) -> tuple[Decision, Pr
     return found, proof
 
 
-def _linear(bench: Bench, found: Decision, proof: Proof, gates: tuple[Gate, ...], *, held: str) -> Diagnosis:
+def _linear(
+    bench: InferenceProblem, found: Decision, proof: Proof, gates: tuple[DataCheck, ...], *, held: str
+) -> Diagnosis:
     """Gather what a linear model explains; it is not said yet."""
     where = disagreement(bench, found.null, proof.curves)
     weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
@@ -205,17 +207,17 @@ def _without_constants(observations: Observations) -> tuple[Observations, Linear
 
     Constants are read from what blows of one linear system do not share, or, where they are of none, at rest.
     """
-    linear = without_leftovers(observations)
+    linear = without_residual_motion(observations)
     linearity = _linearity(linear)
     if linearity is None or not linearity.is_nonlinear:
         return linear, linearity
-    quiet = without_quiet_constants(observations)
+    quiet = without_dc_offset(observations)
     return quiet, _linearity(quiet)
 
 
 def _linearity(observations: Observations) -> Linearity | None:
     """Compare blows of several levels; None where no place has two."""
-    counts = [len(blows) for blows in same_places(observations)]
+    counts = [len(records) for records in same_places(observations)]
     return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
 
 
@@ -230,15 +232,15 @@ def _set_up_again(
     effects: Mapping[str, Effect],
     free_gains: str,
     observations: Observations,
-) -> Bench:
+) -> InferenceProblem:
     """Bring the model and changed recordings together."""
     return set_up(model, divide(observations), observations.band_hz, options, effects, free_gains=free_gains)
 
 
 def _nonlinear(
     linear: Diagnosis,
-    bench: Bench,
-    bench_of: Callable[[Observations], Bench],
+    bench: InferenceProblem,
+    bench_of: Callable[[Observations], InferenceProblem],
     decision: Decision,
     model: StructuralModel,
     observations: Observations,
@@ -293,7 +295,7 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     )
 
 
-def _mismatch_location(bench: Bench, found: Decision, findings: tuple[Finding, ...]) -> Mapping[str, object]:
+def _mismatch_location(bench: InferenceProblem, found: Decision, findings: tuple[Finding, ...]) -> Mapping[str, object]:
     """Give the place of what was found, or of what remains unexplained."""
     if found.another is not None:
         return found.another.hypothesis.causes[-1].place.location
@@ -307,7 +309,7 @@ def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
     return effects if scale == "none" else {name: one for name, one in effects.items() if name != "sensor_gain"}
 
 
-def _findings(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
+def _findings(bench: InferenceProblem, found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
     causes = found.final.hypothesis.causes
     scale = max(1.0, found.good.misfit)
     if not causes:
@@ -338,7 +340,7 @@ def _alternatives(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...
     return tuple(finding_of(one, gain_over(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
 
 
-def _ambiguity(bench: Bench, found: Decision, weighed: list[Weighed]) -> tuple[Ambiguity, ...]:
+def _ambiguity(bench: InferenceProblem, found: Decision, weighed: list[Weighed]) -> tuple[Ambiguity, ...]:
     """Effects that explain the same nearly as well."""
     if found.final is found.null or len(found.final.hypothesis.causes) > 1:
         return ()

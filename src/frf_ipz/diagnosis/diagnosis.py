@@ -16,7 +16,7 @@ from frf_ipz.frf import FrfLabel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Gate:
+class DataCheck:
     """A check of the measurement that needs no model.
 
     Parameters
@@ -145,14 +145,14 @@ class Linearised:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LawAtWork:
+class LawInTime:
     """A force law at its place in time, to be drawn.
 
     Parameters
     ----------
     motion_m, velocity_m_s, force_N : (n_times,) array
         Of the place in the blow that moves it most, as far as the law was fitted to it, and of the law there.
-    blow : str
+    record : str
         Whose response is shown; empty where all blows start in motion, which is not simulated.
     is_held_out : bool
         That blow was not shown to the fit.
@@ -167,7 +167,7 @@ class LawAtWork:
     motion_m: FloatArray
     velocity_m_s: FloatArray
     force_N: FloatArray  # noqa: N815  a unit
-    blow: str = ""
+    record: str = ""
     is_held_out: bool = False
     channel: str = ""
     response: str = ""
@@ -202,10 +202,10 @@ class Diagnosis:
     before, updated, after : Misfit
         Of the model as it is, with what its tolerances allow, and with the findings.
     held : str
-        What was not shown to the fit: ``blows`` or ``lines``.
+        What was not shown to the fit: ``records`` or ``lines``.
     ambiguity : tuple of Ambiguity
         What cannot be told apart.
-    gates : tuple of Gate
+    gates : tuple of DataCheck
         Checks of the measurement alone.
     detectability : mapping of str to mapping
         Smallest detectable size of each effect, by parameter, where it shows best.
@@ -221,7 +221,7 @@ class Diagnosis:
         What the user has to know.
     linearised : Linearised, optional
         The force law among the findings, for linear models.
-    at_work : LawAtWork, optional
+    at_work : LawInTime, optional
         The same in time, to be drawn.
     """
 
@@ -237,7 +237,7 @@ class Diagnosis:
     held: str
     mismatch_location: Mapping[str, object] = field(default_factory=dict)
     ambiguity: tuple[Ambiguity, ...] = ()
-    gates: tuple[Gate, ...] = ()
+    gates: tuple[DataCheck, ...] = ()
     detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     statement: str = ""
     remains: str = ""
@@ -245,7 +245,7 @@ class Diagnosis:
     numbers: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     linearised: Linearised | None = None
-    at_work: LawAtWork | None = None
+    at_work: LawInTime | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.

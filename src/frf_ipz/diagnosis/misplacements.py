@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.physics.layout import extents, shift_rows
 from frf_ipz.diagnosis.physics.nuisance import UNIFORM
-from frf_ipz.updating.position_uncertainty import Misplacement
+from frf_ipz.updating.position_uncertainty import PositionUncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def misplacements(
     model: StructuralModel, reduced: ReducedModel, labels: Sequence[FrfLabel], tolerance_m_per_m: float
-) -> tuple[Misplacement, ...]:
+) -> tuple[PositionUncertainty, ...]:
     """Turn a tolerance of places into rows of the reduced model.
 
     Parameters
@@ -36,13 +36,13 @@ def misplacements(
 
     Returns
     -------
-    tuple of Misplacement
+    tuple of PositionUncertainty
         Of each sensor and each blow along each axis; none for lumped models, whose masses have no places.
     """
     spans = extents(model)
     ends = dict.fromkeys(end for label in labels for end in ((label.output_dof, True), (label.input_dof, False)))
     return tuple(
-        Misplacement(
+        PositionUncertainty(
             dof=dof, is_output=is_output, row=tolerance_m_per_m * UNIFORM * spans[axis] * _inside(model, reduced, row)
         )
         for dof, is_output in ends

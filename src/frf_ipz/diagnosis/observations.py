@@ -35,7 +35,7 @@ class Sensor:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Blow:
+class ObservedRecord:
     """One blow of a hammer, or one record of a shaker.
 
     Parameters
@@ -114,7 +114,7 @@ class Observations:
     ----------
     kind : str
         ``hammer``, ``random`` or ``frf``; with the last there are no blows.
-    blows : tuple of Blow
+    records : tuple of ObservedRecord
         In the order of the test.
     band_hz : pair of float
         Band that is looked at, Hz.
@@ -125,7 +125,7 @@ class Observations:
     """
 
     kind: str
-    blows: tuple[Blow, ...]
+    records: tuple[ObservedRecord, ...]
     band_hz: tuple[float, float]
     frfs: FrfSet | None = None
     exclude_hz: tuple[tuple[float, float], ...] = ()
@@ -133,12 +133,12 @@ class Observations:
     @property
     def input_dofs(self) -> tuple[Dof, ...]:
         """Struck DOFs, each once."""
-        return tuple(dict.fromkeys(blow.input_dof for blow in self.blows))
+        return tuple(dict.fromkeys(record.input_dof for record in self.records))
 
     @property
     def are_from_rest(self) -> bool:
         """There are blows or records, and the structure was at rest at the beginning of each."""
-        return bool(self.blows) and all(blow.rested for blow in self.blows)
+        return bool(self.records) and all(record.rested for record in self.records)
 
     def looks_at(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
         """Say which frequencies are in the band, and not in or next to a stretch that is left out.
@@ -160,7 +160,7 @@ class Observations:
             kept &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
         return np.asarray(kept)
 
-    def at(self, input_dof: Dof) -> tuple[Blow, ...]:
+    def at(self, input_dof: Dof) -> tuple[ObservedRecord, ...]:
         """Give the blows at one DOF, the strongest first.
 
         Parameters
@@ -170,14 +170,14 @@ class Observations:
 
         Returns
         -------
-        tuple of Blow
+        tuple of ObservedRecord
             Its blows.
         """
-        mine = [blow for blow in self.blows if blow.input_dof == input_dof]
-        return tuple(sorted(mine, key=lambda blow: -blow.level))
+        mine = [record for record in self.records if record.input_dof == input_dof]
+        return tuple(sorted(mine, key=lambda record: -record.level))
 
 
-def spectra(blows: Sequence[Blow], s: ComplexArray) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
+def spectra(records: Sequence[ObservedRecord], s: ComplexArray) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
     """Transform force and responses of blows at any complex frequency, ``sum x(t) exp(-s t) dt``.
 
     For a structure at rest before the blow the ratio of the two is exactly its transfer function at s, but for what is
@@ -185,7 +185,7 @@ def spectra(blows: Sequence[Blow], s: ComplexArray) -> tuple[tuple[ComplexArray,
 
     Parameters
     ----------
-    blows : sequence of Blow
+    records : sequence of ObservedRecord
         Of any length and step.
     s : (n_lines,) complex array
         rad/s, with a real part that is not negative.
@@ -195,17 +195,17 @@ def spectra(blows: Sequence[Blow], s: ComplexArray) -> tuple[tuple[ComplexArray,
     tuple of pairs
         Of each blow the force, (n_lines,) complex array, N s, and the responses, (n_lines, n_sensors).
     """
-    return tuple(_transform(blow, s) for blow in blows)
+    return tuple(_transform(record, s) for record in records)
 
 
-def _transform(blow: Blow, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+def _transform(record: ObservedRecord, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Sum in two steps, within blocks and over blocks: fewer exponentials than points times samples."""
-    signals = np.vstack([blow.force, blow.responses])
-    n_blocks = -(-blow.n_samples // BLOCK)
+    signals = np.vstack([record.force, record.responses])
+    n_blocks = -(-record.n_samples // BLOCK)
     padded = np.zeros((len(signals), n_blocks * BLOCK))
-    padded[:, : blow.n_samples] = signals
-    within = np.exp(-np.outer(s, np.arange(BLOCK) * blow.step_s)) * blow.step_s
-    over = np.exp(-np.outer(s, np.arange(n_blocks) * BLOCK * blow.step_s))
+    padded[:, : record.n_samples] = signals
+    within = np.exp(-np.outer(s, np.arange(BLOCK) * record.step_s)) * record.step_s
+    over = np.exp(-np.outer(s, np.arange(n_blocks) * BLOCK * record.step_s))
     blocks = padded.reshape(len(signals) * n_blocks, BLOCK).T
     inner = (within.real @ blocks + 1j * (within.imag @ blocks)).reshape(len(s), len(signals), n_blocks)
     total = np.einsum("kca,ka->kc", inner, over)

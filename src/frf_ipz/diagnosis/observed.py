@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.identification.lines.measured import measured_lines
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.ingest.records import read_blows
+from frf_ipz.ingest.records import read_records
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest import records as recorded
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
 
 
-def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None) -> Observations:
+def observe(
+    test: VibrationTest, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None
+) -> Observations:
     """Gather what a diagnosis looks at.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     options : IngestOptions
         How its recordings are used.
@@ -43,29 +45,31 @@ def observe(test: Test, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions
     """
     chosen = fit or FitOptions()
     band = measured_lines(frfs, chosen).band_hz
-    blows: tuple[Blow, ...] = ()
+    records: tuple[ObservedRecord, ...] = ()
     if test.kind != "frf" and frfs.unknown_scale == "none":
-        blows = tuple(_blow(blow, test) for blow in read_blows(test, options) if set(blow.labels) & set(test.labels))
-    kind = test.kind if blows else "frf"
-    return Observations(kind=kind, blows=blows, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
+        records = tuple(
+            _record(record, test) for record in read_records(test, options) if set(record.labels) & set(test.labels)
+        )
+    kind = test.kind if records else "frf"
+    return Observations(kind=kind, records=records, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
 
 
-def _blow(blow: recorded.Blow, test: Test) -> Blow:
+def _record(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
     """Take of a blow what the FRFs of the test were estimated from: the user may have hidden a sensor."""
-    rows = [row for row, label in enumerate(blow.labels) if label in test.labels]
-    labels = [blow.labels[row] for row in rows]
-    return Blow(
-        name=blow.name,
+    rows = [row for row, label in enumerate(record.labels) if label in test.labels]
+    labels = [record.labels[row] for row in rows]
+    return ObservedRecord(
+        name=record.name,
         input_channel=test.input_channel.column,
         input_dof=labels[0].input_dof,
         sensors=tuple(
             Sensor(channel=label.output_channel, dof=label.output_dof, quantity=label.quantity) for label in labels
         ),
-        step_s=blow.step_s,
-        force=blow.force,
-        responses=blow.responses[rows],
-        rested=blow.rested,
-        recording=blow.recording,
-        number=blow.number,
-        start_s=blow.start_s,
+        step_s=record.step_s,
+        force=record.force,
+        responses=record.responses[rows],
+        rested=record.rested,
+        recording=record.recording,
+        number=record.number,
+        start_s=record.start_s,
     )

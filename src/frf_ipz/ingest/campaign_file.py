@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign_keys import ChannelKeys, FrfKeys, RunKeys, TestFileKeys
+from frf_ipz.ingest.campaign_keys import CampaignFileKeys, ChannelKeys, FrfKeys, SetupKeys
 from frf_ipz.ingest.file_patterns import expand_pattern
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.registry import read_frfs
@@ -60,7 +60,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class TestSetup:
     """Recordings with the force at one DOF and the sensors in one place.
 
     Parameters
@@ -79,7 +79,7 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Test:
+class VibrationTest:
     """A test: what was measured, where, and in which files.
 
     Parameters
@@ -96,7 +96,7 @@ class Test:
         ``none``, ``common`` or ``per_channel``.
     channels : tuple of Channel
         The input first; none of kind ``frf``.
-    runs : tuple of Run
+    runs : tuple of TestSetup
         One a struck DOF and layout of sensors; none of kind ``frf``.
     frf_sources : tuple of FrfSource
         Files with FRFs, of kind ``frf``.
@@ -110,7 +110,7 @@ class Test:
     nominal_damping_ratio: float | None
     unknown_scale: str
     channels: tuple[Channel, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[TestSetup, ...]
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
 
@@ -162,9 +162,9 @@ class Test:
         dict of int to float
             Node and mass, kg.
         """
-        return self._masses([run for run in self.runs if label in run_labels(self.channels, run)])
+        return self._masses([run for run in self.runs if label in setup_labels(self.channels, run)])
 
-    def _masses(self, runs: Iterable[Run]) -> dict[int, float]:
+    def _masses(self, runs: Iterable[TestSetup]) -> dict[int, float]:
         runs = list(runs)
         n_files = sum(len(run.files) for run in runs)
         masses: Counter[int] = Counter()
@@ -175,7 +175,7 @@ class Test:
         return dict(masses)
 
 
-def read_test(path: Path) -> Test:
+def read_test(path: Path) -> VibrationTest:
     """Read a test.
 
     Parameters
@@ -185,7 +185,7 @@ def read_test(path: Path) -> Test:
 
     Returns
     -------
-    Test
+    VibrationTest
         Checked, with all globs expanded; the recordings are not read yet.
 
     Raises
@@ -196,7 +196,7 @@ def read_test(path: Path) -> Test:
         If a unit is none of its quantity.
     """
     path = path.resolve()
-    keys = read_toml(path, TestFileKeys, required="test")
+    keys = read_toml(path, CampaignFileKeys, required="test")
     _check_sections(path, keys)
     channels = _read_channels(path, keys)
     entries = keys.hit or keys.record
@@ -204,9 +204,9 @@ def read_test(path: Path) -> Test:
     _check_units(path, channels, runs)
     _check_files_once(path, runs)
     sources = tuple(_read_source(path, entry) for entry in keys.frf)
-    labels = [label for run in runs for label in run_labels(channels, run)]
+    labels = [label for run in runs for label in setup_labels(channels, run)]
     labels += [label for source in sources for label in _labels_of_source(source)]
-    return Test(
+    return VibrationTest(
         path=path,
         name=keys.test.name or path.parent.name,
         kind=keys.test.kind,
@@ -219,14 +219,14 @@ def read_test(path: Path) -> Test:
     )
 
 
-def run_labels(channels: tuple[Channel, ...], run: Run) -> tuple[FrfLabel, ...]:
+def setup_labels(channels: tuple[Channel, ...], run: TestSetup) -> tuple[FrfLabel, ...]:
     """Name the FRFs that a run gives.
 
     Parameters
     ----------
     channels : tuple of Channel
         The input first.
-    run : Run
+    run : TestSetup
         The run.
 
     Returns
@@ -264,7 +264,7 @@ def _labels_of_source(source: FrfSource) -> list[FrfLabel]:
     return [frf_label(frf.output_dof, frf.input_dof, source.quantity) for frf in read_frfs(source)]
 
 
-def _check_sections(path: Path, keys: TestFileKeys) -> None:
+def _check_sections(path: Path, keys: CampaignFileKeys) -> None:
     kind = keys.test.kind
     wanted = ENTRIES[kind]
     given = [name for name in ("hit", "record", "frf") if getattr(keys, name)]
@@ -282,7 +282,7 @@ def _check_sections(path: Path, keys: TestFileKeys) -> None:
         raise FileFormatError(path, problem, where="key 'test.nominal_damping_ratio'")
 
 
-def _read_channels(path: Path, keys: TestFileKeys) -> tuple[Channel, ...]:
+def _read_channels(path: Path, keys: CampaignFileKeys) -> tuple[Channel, ...]:
     if keys.test.kind == "frf":
         return ()
     channels = [_read_channel(path, entry) for entry in keys.channel]
@@ -320,7 +320,7 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
     )
 
 
-def _check_units(path: Path, channels: tuple[Channel, ...], runs: tuple[Run, ...]) -> None:
+def _check_units(path: Path, channels: tuple[Channel, ...], runs: tuple[TestSetup, ...]) -> None:
     """Refuse units that cannot be right before anything is read; a moment or a rotation has its own."""
     for run in runs:
         for channel, dof in zip(channels, (run.input_dof, *run.output_dofs), strict=True):
@@ -333,7 +333,7 @@ def _check_units(path: Path, channels: tuple[Channel, ...], runs: tuple[Run, ...
                 raise QuantityError(f"{path}, [[channel]] '{channel.column}' at {dof}: {error}") from None
 
 
-def _read_run(path: Path, keys: RunKeys, channels: tuple[Channel, ...], where: str) -> Run:
+def _read_run(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], where: str) -> TestSetup:
     outputs = {channel.column: channel.dof for channel in channels[1:]}
     for column, text in keys.output_dofs.items():
         if column not in outputs:
@@ -348,7 +348,7 @@ def _read_run(path: Path, keys: RunKeys, channels: tuple[Channel, ...], where: s
     files = [file for pattern in keys.files for file in expand_pattern(path, pattern, where=where)]
     if not files:
         raise FileFormatError(path, "'files' is empty; name at least one recording", where=where)
-    return Run(
+    return TestSetup(
         input_dof=_dof(path, keys.dof, where),
         output_dofs=tuple(dof for dof in outputs.values() if dof is not None),
         files=tuple(dict.fromkeys(files)),
@@ -365,8 +365,8 @@ def _check_places(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...
             raise FileFormatError(path, f"{problem}; correct a 'dof', or take one channel out", where=where)
 
 
-def _check_files_once(path: Path, runs: tuple[Run, ...]) -> None:
-    owners: dict[Path, Run] = {}
+def _check_files_once(path: Path, runs: tuple[TestSetup, ...]) -> None:
+    owners: dict[Path, TestSetup] = {}
     for run in runs:
         for file in run.files:
             other = owners.setdefault(file, run)

@@ -66,7 +66,7 @@ class ChannelKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunKeys:
+class SetupKeys:
     """One ``[[hit]]`` or ``[[record]]``.
 
     Parameters
@@ -118,7 +118,7 @@ class FrfKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TestFileKeys:
+class CampaignFileKeys:
     """The whole file.
 
     Parameters
@@ -127,7 +127,7 @@ class TestFileKeys:
         ``[test]``.
     channel : tuple of ChannelKeys
         ``[[channel]]``.
-    hit, record : tuple of RunKeys
+    hit, record : tuple of SetupKeys
         ``[[hit]]`` of kind ``hammer``, ``[[record]]`` of kind ``random``.
     frf : tuple of FrfKeys
         ``[[frf]]`` of kind ``frf``.
@@ -137,6 +137,6 @@ class TestFileKeys:
 
     test: TestKeys
     channel: tuple[ChannelKeys, ...] = ()
-    hit: tuple[RunKeys, ...] = ()
-    record: tuple[RunKeys, ...] = ()
+    hit: tuple[SetupKeys, ...] = ()
+    record: tuple[SetupKeys, ...] = ()
     frf: tuple[FrfKeys, ...] = ()

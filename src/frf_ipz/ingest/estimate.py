@@ -10,19 +10,19 @@ from frf_ipz.ingest.kinds.random import estimate_random
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.campaign_file import Test
-    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
 
 KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
 
 
-def estimate_frfs(test: Test, options: IngestOptions, *, progress: Progress = silent) -> Recordings:
+def estimate_frfs(test: VibrationTest, options: IngestOptions, *, progress: Progress = silent) -> FrfEstimate:
     """Estimate the FRFs of a test.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         What was measured, from `read_test`.
     options : IngestOptions
         The user's choice.
@@ -31,7 +31,7 @@ def estimate_frfs(test: Test, options: IngestOptions, *, progress: Progress = si
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs in SI with variance and coherence, the table of blows, what was chosen, what has to be known.
 
     Raises

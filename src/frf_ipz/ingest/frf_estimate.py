@@ -34,15 +34,15 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Recordings:
+class FrfEstimate:
     """FRFs and the quality of what they were made from.
 
     Parameters
     ----------
     frfs : FrfSet
         The estimated FRFs.
-    blows : DataFrame
-        One row a blow or record: ``blow`` (file, or file#number), ``input_dof``, ``peak_force_N``, ``pulse_s``,
+    records : DataFrame
+        One row a blow or record: ``record`` (file, or file#number), ``input_dof``, ``peak_force_N``, ``pulse_s``,
         ``used`` (bool), ``weight``, ``marks`` (what is wrong, joined by "; "), and what was measured to say so.
         Further: ``second_pulse`` (height over the first), ``left_at_end`` and ``left_at_hz`` (what the slowest mode
         still has at the end), ``snr_db``, ``force_noise_N``, ``step_s``, ``samples``, ``trigger_s``. Empty for FRFs
@@ -56,7 +56,7 @@ class Recordings:
     """
 
     frfs: FrfSet
-    blows: pd.DataFrame
+    records: pd.DataFrame
     traces: tuple[Trace, ...] = ()
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
-    from frf_ipz.ingest.campaign_file import Channel, Run, Test
+    from frf_ipz.ingest.campaign_file import Channel, TestSetup, VibrationTest
     from frf_ipz.ingest.formats.recording import RawRecording
 
 BUDGET = 64_000_000  # bytes of recordings that are kept
@@ -35,20 +35,20 @@ class RecordingFiles:
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         Which columns are wanted, and their units.
     """
 
-    test: Test
+    test: VibrationTest
     _kept: dict[Path, FloatArray] = field(default_factory=dict)
     _bytes: int = 0
 
-    def blocks(self, run: Run, path: Path) -> Iterator[FloatArray]:
+    def blocks(self, run: TestSetup, path: Path) -> Iterator[FloatArray]:
         """Give a recording block by block.
 
         Parameters
         ----------
-        run : Run
+        run : TestSetup
             The run that the file belongs to.
         path : Path
             The file.
@@ -80,12 +80,12 @@ class RecordingFiles:
             self._kept[path] = np.concatenate(kept)
             self._bytes += self._kept[path].nbytes
 
-    def stretches(self, run: Run, path: Path, bounds: Sequence[tuple[int, int]]) -> Iterator[FloatArray]:
+    def stretches(self, run: TestSetup, path: Path, bounds: Sequence[tuple[int, int]]) -> Iterator[FloatArray]:
         """Give stretches of a recording.
 
         Parameters
         ----------
-        run : Run
+        run : TestSetup
             The run that the file belongs to.
         path : Path
             The file.
@@ -111,7 +111,7 @@ class RecordingFiles:
                 parts = []
             done += len(block)
 
-    def _read(self, run: Run, path: Path) -> Iterator[FloatArray]:
+    def _read(self, run: TestSetup, path: Path) -> Iterator[FloatArray]:
         channels = self.test.channels
         recording = open_recording(path, [channel.column for channel in channels])
         dofs = (run.input_dof, *run.output_dofs)

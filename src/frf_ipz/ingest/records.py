@@ -15,7 +15,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign_file import run_labels
+from frf_ipz.ingest.campaign_file import setup_labels
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 from frf_ipz.ingest.survey.hammer import survey_hammer
@@ -25,15 +25,15 @@ from frf_ipz.progress import Progress, silent
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.survey.record_info import BlowFacts, Survey
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
 
 SURVEYS = {"hammer": survey_hammer, "random": survey_random}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Blow:
+class Record:
     """One blow of a hammer, or one record of a shaker.
 
     Parameters
@@ -113,7 +113,7 @@ class Blow:
         return signals
 
 
-def survey_blows(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
+def survey_records(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
     """Look at all blows or records of a test and decide how they are used.
 
     Parameters
@@ -141,19 +141,19 @@ def survey_blows(files: RecordingFiles, options: IngestOptions, progress: Progre
     return SURVEYS[kind](files, options, progress)
 
 
-def read_blows(
-    test: Test,
+def read_records(
+    test: VibrationTest,
     options: IngestOptions,
     *,
     survey: Survey | None = None,
     files: RecordingFiles | None = None,
     used_only: bool = True,
-) -> Iterator[Blow]:
+) -> Iterator[Record]:
     """Read the blows or records of a test, one at a time.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test, of kind ``hammer`` or ``random``.
     options : IngestOptions
         The user's choice.
@@ -166,7 +166,7 @@ def read_blows(
 
     Yields
     ------
-    Blow
+    Record
         In the order of the test.
 
     Raises
@@ -175,20 +175,22 @@ def read_blows(
         If a recording cannot be used.
     """
     files = files or RecordingFiles(test=test)
-    survey = survey or survey_blows(files, options)
-    wanted = survey.used if used_only else survey.blows
-    for _, group in groupby(wanted, key=lambda blow: blow.path):
-        blows = list(group)
-        stretches = files.stretches(blows[0].run, blows[0].path, [(blow.start, blow.stop) for blow in blows])
-        for blow, signals in zip(blows, stretches, strict=True):
-            yield _calibrated(test, blow, signals)
+    survey = survey or survey_records(files, options)
+    wanted = survey.used if used_only else survey.records
+    for _, group in groupby(wanted, key=lambda record: record.path):
+        records = list(group)
+        stretches = files.stretches(
+            records[0].run, records[0].path, [(record.start, record.stop) for record in records]
+        )
+        for record, signals in zip(records, stretches, strict=True):
+            yield _calibrated(test, record, signals)
 
 
-def _calibrated(test: Test, facts: BlowFacts, signals: FloatArray) -> Blow:
+def _calibrated(test: VibrationTest, facts: RecordInfo, signals: FloatArray) -> Record:
     signals = signals[1:] - np.array(facts.offsets)[:, None]
-    return Blow(
+    return Record(
         name=facts.name,
-        labels=run_labels(test.channels, facts.run),
+        labels=setup_labels(test.channels, facts.run),
         step_s=facts.step_s,
         force=signals[0],
         responses=signals[1:],

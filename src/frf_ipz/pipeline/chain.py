@@ -8,25 +8,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.pipeline.stage_runner import Desk
+from frf_ipz.pipeline.stage_runner import StageRunner
 from frf_ipz.pipeline.stages import measurement, mismatch, modelling, results
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder
 
 STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
 
 
-def chain(job: Job, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress) -> Iterator[str]:
+def chain(job: PipelineInputs, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress) -> Iterator[str]:
     """Run the stages one after another.
 
     Parameters
     ----------
-    job : Job
+    job : PipelineInputs
         What to work on.
     folder : RunFolder
         Where results are kept.
@@ -42,7 +42,7 @@ def chain(job: Job, folder: RunFolder, *, until: str, diagnosing: bool, progress
     str
         The name of each stage when it is done.
     """
-    desk = Desk(job=job, folder=folder, progress=progress)
+    desk = StageRunner(job=job, folder=folder, progress=progress)
     recordings = measurement.ingest(desk)
     yield "ingest"
     frfs, model = recordings.frfs, job.model

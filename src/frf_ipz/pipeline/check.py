@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.structure import Geometry
 
 WIDTH = 72
@@ -20,12 +20,12 @@ MARKS = {"node": "-", "support": "#", "sensor": "S", "blow": "B", "both": "X", "
 FLAT = 1e-6  # of the largest extent: a structure thinner than this is a line
 
 
-def describe_setup(job: Job) -> str:
+def describe_setup(job: PipelineInputs) -> str:
     """Describe what a pipeline would work on.
 
     Parameters
     ----------
-    job : Job
+    job : PipelineInputs
         The pipeline with its test and model.
 
     Returns
@@ -49,7 +49,7 @@ def describe_setup(job: Job) -> str:
     return "\n".join(lines)
 
 
-def draw(geometry: Geometry, sensors: Iterable[Dof], blows: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
+def draw(geometry: Geometry, sensors: Iterable[Dof], records: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
     """Draw a structure in characters.
 
     Parameters
@@ -67,7 +67,7 @@ def draw(geometry: Geometry, sensors: Iterable[Dof], blows: Iterable[Dof], point
     columns, rows = _places(geometry.coordinates_m)
     canvas = [[" "] * WIDTH for _ in range(int(rows.max()) + 1)]
     place = {int(node): index for index, node in enumerate(geometry.nodes)}
-    struck, sensed = {dof.node for dof in blows}, {dof.node for dof in sensors}
+    struck, sensed = {dof.node for dof in records}, {dof.node for dof in sensors}
     marks = dict.fromkeys(place, MARKS["node"]) | {
         node: MARKS["support"] for node in geometry.supports if node in place
     }

@@ -9,7 +9,7 @@ from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
-from frf_ipz.ingest.campaign_file import Test, read_test
+from frf_ipz.ingest.campaign_file import VibrationTest, read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
 from frf_ipz.pipeline.reference import read_reference
 from frf_ipz.pipeline.sensors import without_sensors
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Job:
+class PipelineInputs:
     """A pipeline with its test and model.
 
     Parameters
     ----------
     pipeline : Pipeline
         The pipeline file.
-    test : Test
+    test : VibrationTest
         The test.
     model : StructuralModel, optional
         The FE model with the sensors' known masses; None where the run ends with the fit.
@@ -46,7 +46,7 @@ class Job:
     """
 
     pipeline: Pipeline
-    test: Test
+    test: VibrationTest
     model: StructuralModel | None
     points: tuple[Dof, ...]
     inputs: Mapping[str, str]
@@ -60,7 +60,7 @@ class Job:
         return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
 
 
-def read_job(path: Path) -> Job:
+def read_inputs(path: Path) -> PipelineInputs:
     """Read a pipeline file and all that it names.
 
     Parameters
@@ -70,7 +70,7 @@ def read_job(path: Path) -> Job:
 
     Returns
     -------
-    Job
+    PipelineInputs
         Ready to run.
 
     Raises
@@ -92,7 +92,7 @@ def read_job(path: Path) -> Job:
     aside = pipeline.reference_path
     reference = None if aside is None else read_reference(aside, test.labels[0].quantity)
     files = [pipeline.path, pipeline.test_path, *test.files, *of_model, *([] if aside is None else [aside])]
-    return Job(
+    return PipelineInputs(
         pipeline=pipeline,
         test=test,
         model=model,
@@ -103,7 +103,7 @@ def read_job(path: Path) -> Job:
     )
 
 
-def _test(pipeline: Pipeline) -> Test:
+def _test(pipeline: Pipeline) -> VibrationTest:
     test = read_test(pipeline.test_path)
     try:
         return without_sensors(test, pipeline.file.ingest.hide)
@@ -118,7 +118,7 @@ def _points(pipeline: Pipeline) -> tuple[Dof, ...]:
         raise FileFormatError(pipeline.path, str(error), where="key 'predict.points'") from None
 
 
-def _model(path: Path, test: Test, points: tuple[Dof, ...]) -> StructuralModel:
+def _model(path: Path, test: VibrationTest, points: tuple[Dof, ...]) -> StructuralModel:
     model = read_model(path)
     for dof in (*test.output_dofs, *test.input_dofs, *points):
         try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frf_ipz import __version__
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.pipeline.chain import STAGES, chain
-from frf_ipz.pipeline.inputs import Job, read_job
+from frf_ipz.pipeline.inputs import PipelineInputs, read_inputs
 from frf_ipz.progress import Progress, silent
 from frf_ipz.runs.digests import plain
 from frf_ipz.runs.folder import RunFolder, open_run, read_run
@@ -51,7 +51,7 @@ def run_pipeline(
     """
     if until not in STAGES:
         raise InputError(f"there is no stage '{until}'; {did_you_mean(until, STAGES)}")
-    job = read_job(path)
+    job = read_inputs(path)
     wanted = job.pipeline.file.diagnose is not None if diagnosing is None else diagnosing
     if job.model is None and until not in {"ingest", "fit", "report"}:
         raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
@@ -63,7 +63,7 @@ def run_pipeline(
     return read_run(out)
 
 
-def _provenance(job: Job) -> dict[str, Any]:
+def _provenance(job: PipelineInputs) -> dict[str, Any]:
     return {
         "frf_ipz": __version__,
         "python": platform.python_version(),

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
 
 
-def unweighed_sensors(test: Test, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
+def unweighed_sensors(test: VibrationTest, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
     """Name the accelerometers that sat on the structure during the whole test and whose mass is not stated.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         States masses of sensors.
     labels : sequence of FrfLabel
         What was measured.
@@ -41,19 +41,19 @@ def unweighed_sensors(test: Test, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]
     return tuple({dof.node: dof.unsigned for dof in outputs if dof.node not in weighed}.values())
 
 
-def without_sensors(test: Test, hidden: Sequence[str]) -> Test:
+def without_sensors(test: VibrationTest, hidden: Sequence[str]) -> VibrationTest:
     """Leave the FRFs of some sensors out of a test; their recordings and known masses stay.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     hidden : sequence of str
         DOFs of the sensors, of whatever sign.
 
     Returns
     -------
-    Test
+    VibrationTest
         With the labels that are left.
 
     Raises

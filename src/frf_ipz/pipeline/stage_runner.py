@@ -11,7 +11,7 @@ from frf_ipz.runs.digests import digest
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder, Writers
 
@@ -31,12 +31,12 @@ NEEDS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Desk:
+class StageRunner:
     """What every stage needs: the job, the folder, and the keys of the stages before it.
 
     Parameters
     ----------
-    job : Job
+    job : PipelineInputs
         What to work on.
     folder : RunFolder
         Where results are kept.
@@ -46,7 +46,7 @@ class Desk:
         Key of each stage that is done.
     """
 
-    job: Job
+    job: PipelineInputs
     folder: RunFolder
     progress: Progress
     keys: dict[str, str] = field(default_factory=dict)

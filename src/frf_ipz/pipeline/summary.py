@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
@@ -59,12 +59,12 @@ def summarise(run: RunFolder) -> str:
     return "\n".join(lines)
 
 
-def recordings_lines(recordings: Recordings) -> list[tuple[str, str]]:
+def recordings_lines(recordings: FrfEstimate) -> list[tuple[str, str]]:
     """Sum up recordings and FRFs.
 
     Parameters
     ----------
-    recordings : Recordings
+    recordings : FrfEstimate
         The result of ingest.
 
     Returns
@@ -72,13 +72,13 @@ def recordings_lines(recordings: Recordings) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    blows, frfs = recordings.blows, recordings.frfs
+    records, frfs = recordings.records, recordings.frfs
     lines = []
-    if len(blows):
-        left_out = blows[~blows["used"].astype(bool)]
-        text = f"{len(blows)} blows or records, {len(blows) - len(left_out)} used"
+    if len(records):
+        left_out = records[~records["used"].astype(bool)]
+        text = f"{len(records)} blows or records, {len(records) - len(left_out)} used"
         lines.append(("recordings", text))
-        lines += [("", f"left out: {row.blow} ({row.marks})") for row in left_out.itertuples()]
+        lines += [("", f"left out: {row.record} ({row.marks})") for row in left_out.itertuples()]
     coherence = frfs.coherence[np.isfinite(frfs.coherence)]
     quality = f", median coherence {np.median(coherence):.4f}" if coherence.size else ""
     span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz{quality}"

@@ -12,7 +12,7 @@ from frf_ipz.plotting.style import FAINT, MEASURED, UPDATED, axes_or_new, colour
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis, LawAtWork
+    from frf_ipz.diagnosis.diagnosis import Diagnosis, LawInTime
     from frf_ipz.diagnosis.measured.levels import LevelDependence
 
 MOST_RANKED = 12
@@ -108,12 +108,12 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     return label_axes(ax, "", "Normalised FRF error, %")
 
 
-def plot_law(law: LawAtWork, *, ax: Axes | None = None) -> Axes:
+def plot_law(law: LawInTime, *, ax: Axes | None = None) -> Axes:
     """Draw a blow as measured, with a force law and without it; the law's force, where no blow was simulated.
 
     Parameters
     ----------
-    law : LawAtWork
+    law : LawInTime
         Of a diagnosis.
     ax : Axes, optional
         Where to draw.
@@ -124,10 +124,10 @@ def plot_law(law: LawAtWork, *, ax: Axes | None = None) -> Axes:
         Responses over time, or the force over the motion of its place.
     """
     ax = axes_or_new(ax)
-    if not law.blow:
+    if not law.record:
         ax.plot(law.motion_m, law.force_N, color=UPDATED, linewidth=0.8)
         return label_axes(ax, "Motion of the place, m", "Force of the law, N", legend=False)
-    ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.blow}")
+    ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.record}")
     ax.plot(law.time_s, law.without, color=FAINT, linestyle="--", linewidth=0.8, label="without the law")
     ax.plot(law.time_s, law.simulated, color=UPDATED, linewidth=0.8, label="with the law")
     return label_axes(ax, "Time, s", f"{law.response.capitalize()}, {law.unit}")

@@ -1,4 +1,4 @@
-"""Recordings and the structure that they were made on."""
+"""FrfEstimate and the structure that they were made on."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.structure import Geometry
 
-MARKS = {"sensor": ("s", CYCLE[0]), "blow": ("v", CYCLE[1]), "point of interest": ("*", CYCLE[2])}
+MARKS = {"sensor": ("s", CYCLE[0]), "excitation": ("v", CYCLE[1]), "point of interest": ("*", CYCLE[2])}
 
 
-def plot_blows(recordings: Recordings, *, ax: Axes | None = None) -> Axes:
+def plot_records(recordings: FrfEstimate, *, ax: Axes | None = None) -> Axes:
     """Draw the forces of all blows; those left out are dotted.
 
     Parameters
     ----------
-    recordings : Recordings
+    recordings : FrfEstimate
         The result of ingest.
     ax : Axes, optional
         Where to draw.
@@ -37,7 +37,7 @@ def plot_blows(recordings: Recordings, *, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     ax = axes_or_new(ax)
-    used = dict(zip(recordings.blows["blow"], recordings.blows["used"].astype(bool), strict=True))
+    used = dict(zip(recordings.records["record"], recordings.records["used"].astype(bool), strict=True))
     channel = recordings.traces[0].channel if recordings.traces else ""
     forces = [trace for trace in recordings.traces if trace.channel == channel]
     for place, trace in enumerate(forces):
@@ -51,7 +51,7 @@ def plot_structure(
     geometry: Geometry,
     *,
     sensors: Sequence[Dof] = (),
-    blows: Sequence[Dof] = (),
+    records: Sequence[Dof] = (),
     points: Sequence[Dof] = (),
     ax: Axes | None = None,
 ) -> Axes:
@@ -82,7 +82,7 @@ def plot_structure(
     ax.plot(
         positions[held, 0], positions[held, 1], "X", color=MEASURED, markersize=8, label="support" if held else None
     )
-    for (name, (mark, edge)), dofs in zip(MARKS.items(), (sensors, blows, points), strict=True):
+    for (name, (mark, edge)), dofs in zip(MARKS.items(), (sensors, records, points), strict=True):
         rows = [place[dof.node] for dof in dofs if dof.node in place]
         if rows:
             ax.plot(positions[rows, 0], positions[rows, 1], mark, color=edge, markersize=8, label=name, zorder=3)

@@ -11,7 +11,7 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.plotting.diagnosis import plot_law, plot_levels, plot_mismatch, plot_proof, plot_ranking
 from frf_ipz.plotting.frfs import plot_coherence, plot_fit, plot_frfs, plot_misfit, plot_phases
 from frf_ipz.plotting.poles import plot_pairs, plot_pole_zero_map, plot_stabilization
-from frf_ipz.plotting.recordings import plot_blows, plot_structure
+from frf_ipz.plotting.recordings import plot_records, plot_structure
 from frf_ipz.plotting.style import WIDTH_IN
 from frf_ipz.plotting.targets import target_rows
 from frf_ipz.plotting.updating import plot_convergence, plot_prediction, plot_stiffness_change, plot_targets
@@ -40,7 +40,7 @@ class _Entry:
 
 
 PICTURES: dict[str, _Entry] = {
-    "blows": _Entry(("ingest",), plot_blows),
+    "records": _Entry(("ingest",), plot_records),
     "frfs": _Entry(("ingest",), lambda recordings: plot_frfs(recordings.frfs)),
     "phases": _Entry(("ingest",), lambda recordings: plot_phases(recordings.frfs)),
     "coherence": _Entry(("ingest",), lambda recordings: plot_coherence(recordings.frfs)),
@@ -138,4 +138,4 @@ def _levels(levels: LevelDependence) -> Axes:
 
 def _structure(model: Any, recordings: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them
     geometry = getattr(model, "geometry", model)
-    return plot_structure(geometry, sensors=recordings.frfs.output_dofs, blows=recordings.frfs.input_dofs)
+    return plot_structure(geometry, sensors=recordings.frfs.output_dofs, records=recordings.frfs.input_dofs)

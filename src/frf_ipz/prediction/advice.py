@@ -173,14 +173,14 @@ def _modes(members: Members) -> int:
 
 def _candidates(model: ReducedModel, measured: Sequence[FrfLabel], predicted: FrfLabel) -> list[tuple[str, Dof, Dof]]:
     sensors = list(dict.fromkeys(label.output_dof.unsigned for label in measured))
-    blows = list(dict.fromkeys(label.input_dof.unsigned for label in measured))
-    directions = {dof.direction for dof in (*sensors, *blows)}
+    records = list(dict.fromkeys(label.input_dof.unsigned for label in measured))
+    directions = {dof.direction for dof in (*sensors, *records)}
     places = [
         dof for dof in model.expanded_dofs if dof.direction in directions and dof != predicted.output_dof.unsigned
     ]
     places = [places[index] for index in np.unique(np.linspace(0, len(places) - 1, MOST_PLACES).astype(int))]
     taken = {(label.output_dof.unsigned, label.input_dof.unsigned) for label in measured}
-    further = [(f"a sensor at {dof.name}", dof, blows[0]) for dof in places]
+    further = [(f"a sensor at {dof.name}", dof, records[0]) for dof in places]
     further += [(f"a blow at {dof.name}", sensors[0], dof) for dof in places]
     return [(text, output, force) for text, output, force in further if (output, force) not in taken]
 

@@ -57,8 +57,8 @@ def predict_frfs(
     """
     if not labels:
         raise InputError("a prediction needs at least one measured FRF: it says where the structure is struck")
-    blows = tuple(dict.fromkeys(label.input_dof for label in labels))
-    wanted = tuple(FrfLabel(point, blow, labels[0].quantity) for point in points for blow in blows)
+    records = tuple(dict.fromkeys(label.input_dof for label in labels))
+    wanted = tuple(FrfLabel(point, blow, labels[0].quantity) for point in points for blow in records)
     s = 2j * np.pi * np.asarray(frequency_hz, float)
     band = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
@@ -55,7 +55,7 @@ class RunContents:
     """
 
     record: Mapping[str, Any]
-    recordings: Recordings | None = None
+    recordings: FrfEstimate | None = None
     fit: ModalFit | None = None
     reduced: ReducedModel | None = None
     pairs: Pairs | None = None

@@ -42,7 +42,7 @@ class Marks:
     """
 
     sensors: Sequence[Dof] = ()
-    blows: Sequence[Dof] = ()
+    records: Sequence[Dof] = ()
     points: Sequence[Dof] = ()
     missing: Mapping[int, str] = field(default_factory=dict)
     mismatch: Mapping[int, str] = field(default_factory=dict)
@@ -72,7 +72,7 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
     traces = [_body(positions, lines, place), _nodes(nodes, positions)]
     traces += _supports(geometry, positions, place)
     traces += _dofs("sensor", marks.sensors, positions, place, is_line=is_line)
-    traces += _dofs("blow", marks.blows, positions, place, is_line=is_line)
+    traces += _dofs("blow", marks.records, positions, place, is_line=is_line)
     traces += _dofs("point", marks.points, positions, place, is_line=is_line)
     traces += _rings("missing in the model", marks.missing, positions, place)
     traces += _rings("place of the mismatch", marks.mismatch, positions, place)
@@ -91,7 +91,7 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
 def _plan(geometry: Geometry | None, marks: Marks) -> tuple[IntArray, FloatArray, IntArray]:
     """Nodes, their positions on the drawing, and lines as pairs of nodes."""
     if geometry is None:
-        dofs = (*marks.sensors, *marks.blows, *marks.points)
+        dofs = (*marks.sensors, *marks.records, *marks.points)
         nodes = np.array(sorted({dof.node for dof in dofs if dof.node > 0}), int)
         positions = np.stack([nodes, np.zeros(len(nodes))], 1).astype(float)
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
@@ -221,7 +221,7 @@ def _in_words(geometry: Geometry | None, marks: Marks) -> str:
         extent = " by ".join(f"{number(value, 3)} m" for value in np.ptp(geometry.coordinates_m, axis=0) if value > 0)
         parts.append(f"{len(geometry.nodes)} nodes over {extent}")
         parts += [f"node {node} {how}" for node, how in list(geometry.supports.items())[:4]]
-    for name, dofs in (("sensors", marks.sensors), ("blows", marks.blows), ("points of interest", marks.points)):
+    for name, dofs in (("sensors", marks.sensors), ("blows", marks.records), ("points of interest", marks.points)):
         parts += [f"{name} at {listed([str(dof) for dof in dofs])}"] if dofs else []
     parts += [f"{text} at node {node}" for node, text in list(marks.missing.items())[:4]]
     parts += [f"{text} (node {node})" for node, text in list(marks.mismatch.items())[:4]]

@@ -138,10 +138,12 @@ def blow_controls(run: RunContents, choices: PipelineFile) -> str:
         HTML; empty where there are no blows.
     """
     recordings = run.recordings
-    if recordings is None or not len(recordings.blows):
+    if recordings is None or not len(recordings.records):
         return ""
     rows = ""
-    for name, used in zip(recordings.blows["blow"].astype(str), recordings.blows["used"].astype(bool), strict=True):
+    for name, used in zip(
+        recordings.records["record"].astype(str), recordings.records["used"].astype(bool), strict=True
+    ):
         kept, dropped = is_named(name, choices.ingest.keep), is_named(name, choices.ingest.drop)
         chosen = "drop" if dropped else "keep" if kept else "checks"
         options = "".join(
@@ -211,14 +213,14 @@ def shape_controls(run: RunContents) -> str:
     """
     fit = run.fit
     modes = "" if fit is None else _mode_options(fit)
-    blows = "".join(f"<option>{dof}</option>" for dof in run.frfs.input_dofs) if run.frfs is not None else ""
+    records = "".join(f"<option>{dof}</option>" for dof in run.frfs.input_dofs) if run.frfs is not None else ""
     lines = np.zeros(1) if run.frfs is None else run.frfs.frequency_hz
     return (
         '<div class="work"><form id="shape-form"><p>'
         f'<label>Mode <select name="mode">{modes}<option value="">at a frequency …</option></select></label> '
         '<span id="operating" hidden><label>at <input name="hz" type="number" step="any" '
         f'min="{lines[0]:g}" max="{lines[-1]:g}" value="{np.mean(run.band_hz):.5g}"> Hz</label> '
-        f'<label>for a force at <select name="input">{blows}</select></label></span> '
+        f'<label>for a force at <select name="input">{records}</select></label></span> '
         '<button type="button" id="play" aria-pressed="false">Play</button> '
         '<label>phase <input id="phase" type="range" min="0" max="360" value="0"></label></p></form></div>'
         '<figure id="shape"><figcaption id="shape-title">Shape</figcaption><div id="shape-drawing"></div>'
@@ -258,7 +260,7 @@ def _fit_entries(choices: PipelineFile) -> list[tuple[str, dict[str, object]]]:
 
 def _other_entries(choices: PipelineFile) -> list[tuple[str, dict[str, object]]]:
     entries: list[tuple[str, dict[str, object]]] = [
-        (f"{name} {word}", {"kind": "blow", "name": name, "use": "checks"})
+        (f"{name} {word}", {"kind": "record", "name": name, "use": "checks"})
         for word, names in (("kept", choices.ingest.keep), ("dropped", choices.ingest.drop))
         for name in names
     ]

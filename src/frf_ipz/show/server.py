@@ -17,14 +17,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.show.workbench import Run
 
 ADDRESS = "127.0.0.1"
 TOKEN_BYTES = 24
 
 
-def serve(folder: Path, run: Run, read: Callable[[Path], Job], *, port: int, announce: Callable[[str], None]) -> None:
+def serve(
+    folder: Path, run: Run, read: Callable[[Path], PipelineInputs], *, port: int, announce: Callable[[str], None]
+) -> None:
     """Serve the page of a run, or of a campaign, until the process is interrupted.
 
     Parameters

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
 
 
-def read_setup(pipeline: Path, read: Callable[[Path], Job]) -> tuple[RunContents, Section]:
+def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[RunContents, Section]:
     """Read a pipeline that has not been run yet.
 
     Parameters
@@ -45,14 +45,14 @@ def read_setup(pipeline: Path, read: Callable[[Path], Job]) -> tuple[RunContents
         empty = RunContents(record={"name": pipeline.stem})
         return empty, Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
     run = RunContents(record={"name": job.pipeline.name}, geometry=None if job.model is None else job.model.geometry)
-    marks = Marks(sensors=job.test.output_dofs, blows=job.test.input_dofs, points=job.points)
+    marks = Marks(sensors=job.test.output_dofs, records=job.test.input_dofs, points=job.points)
     drawing = draw_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
     blocks: list[Block] = [_what_was_read(job)] if drawing is None else [drawing, _what_was_read(job)]
     return run, Section(anchor=anchor, title=title, lead=lead, blocks=tuple(blocks))
 
 
-def _what_was_read(job: Job) -> Table:
+def _what_was_read(job: PipelineInputs) -> Table:
     test, model = job.test, job.model
     found = "none: the run ends with the fit"
     if model is not None:

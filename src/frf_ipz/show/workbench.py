@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.pipeline.config import PipelineFile
-    from frf_ipz.pipeline.inputs import Job
+    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.show.campaign import Place
     from frf_ipz.show.worker import Status
@@ -64,7 +64,7 @@ class Workbench:
         Reads a pipeline file and all that it names, as `pipeline.job.read_job` does.
     """
 
-    def __init__(self, place: Place, run: Run, read: Callable[[Path], Job]) -> None:
+    def __init__(self, place: Place, run: Run, read: Callable[[Path], PipelineInputs]) -> None:
         self.folder = place.folder.resolve()
         self.pipeline = place.pipeline
         self.read = read

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Misplacement:
+class PositionUncertainty:
     """A place that is not known exactly, along one axis.
 
     Parameters
@@ -37,14 +37,14 @@ class Misplacement:
     row: FloatArray
 
 
-def with_misplacements(problem: UpdateProblem, misplacements: tuple[Misplacement, ...]) -> FloatArray:
+def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[PositionUncertainty, ...]) -> FloatArray:
     """Add what misplaced sensors and blows do to the covariance of the targets.
 
     Parameters
     ----------
     problem : UpdateProblem
         Model and targets.
-    misplacements : tuple of Misplacement
+    misplacements : tuple of PositionUncertainty
         Independent of each other.
 
     Returns
@@ -61,7 +61,7 @@ def with_misplacements(problem: UpdateProblem, misplacements: tuple[Misplacement
     return np.asarray(problem.covariance + parts @ parts.T)
 
 
-def _moved(problem: UpdateProblem, target: int, misplacements: tuple[Misplacement, ...]) -> ComplexArray:
+def _moved(problem: UpdateProblem, target: int, misplacements: tuple[PositionUncertainty, ...]) -> ComplexArray:
     """How far a zero moves with each misplacement, rad/s."""
     model, zero, frf = problem.model, complex(problem.computed[target]), int(problem.frf[target])
     label = problem.labels[frf]

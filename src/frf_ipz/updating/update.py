@@ -15,7 +15,7 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.progress import silent
 from frf_ipz.updating import methods
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.position_uncertainty import with_misplacements
+from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.parameters import ParameterBasis
-    from frf_ipz.updating.position_uncertainty import Misplacement
+    from frf_ipz.updating.position_uncertainty import PositionUncertainty
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
@@ -57,7 +57,7 @@ def update_model(
     options: UpdateOptions | None = None,
     *,
     basis: ParameterBasis | None = None,
-    misplacements: tuple[Misplacement, ...] = (),
+    misplacements: tuple[PositionUncertainty, ...] = (),
     progress: Progress = silent,
 ) -> UpdatedModel:
     """Bring a reduced model to the measured poles and zeros.
@@ -75,7 +75,7 @@ def update_model(
     basis : ParameterBasis, optional
         What may change, and how likely: the parts of the FE model (`updating.parameters.structural_basis`) or what a
         diagnosis has chosen. Without it the method uses its own generic parameters.
-    misplacements : tuple of Misplacement
+    misplacements : tuple of PositionUncertainty
         How far sensors and blows may be from their places: zeros count that much less.
     progress : Progress
         Told how far the work is.
@@ -98,7 +98,7 @@ def update_model(
         raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, known)}")
     module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
     problem = make_problem(model, fit, pairs, basis)
-    problem = replace(problem, covariance=with_misplacements(problem, misplacements))
+    problem = replace(problem, covariance=with_position_uncertainty(problem, misplacements))
     return cast("Method", module).update(problem, chosen, progress)
 
 

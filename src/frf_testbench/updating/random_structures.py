@@ -29,7 +29,7 @@ class Case:
     name: str
     nominal: StructuralModel
     truth: StructuralModel
-    blows: tuple[Dof, ...]
+    input_dofs: tuple[Dof, ...]
     sensors: tuple[Dof, ...]
     points: tuple[Dof, ...]
     n_modes: int
@@ -43,18 +43,18 @@ def random_case(seed: int) -> Case:
     nominal = {"beam": random_beam, "frame": random_frame, "plate": random_plate}[kind](rng)
     factors, where = stiffness_errors(nominal, rng)
     n_frfs = int(rng.integers(1, 5))
-    n_blows = 2 if n_frfs in {2, 4} and rng.random() < 0.5 else 1
+    n_inputs = 2 if n_frfs in {2, 4} and rng.random() < 0.5 else 1
     free = [dof for dof in nominal.dofs if len(dof.direction) == 1 and dof.direction == transverse(nominal, dof)]
     chosen = [free[index] for index in rng.permutation(len(free))]
-    blows = chosen[:n_blows]
-    sensors = chosen[n_blows : n_blows + n_frfs // n_blows]
+    input_dofs = chosen[:n_inputs]
+    sensors = chosen[n_inputs : n_inputs + n_frfs // n_inputs]
     if rng.random() < 0.3:
-        sensors[0] = blows[0]
+        sensors[0] = input_dofs[0]
     return Case(
         name=f"{kind} {seed}, {where}",
         nominal=nominal,
         truth=scaled(nominal, factors),
-        blows=tuple(blows),
+        input_dofs=tuple(input_dofs),
         sensors=tuple(sensors),
         points=tuple(chosen[-3:]),
         n_modes=int(rng.integers(4, 7)),

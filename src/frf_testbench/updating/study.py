@@ -109,7 +109,7 @@ def set_up(seed: int) -> Bench:
     truth, labels = Truth(case.truth, case.damping), labels_of(case)
     band = band_of(truth, case.n_modes)
     fit = synthetic_fit(truth, labels, band, noise=NOISE, rng=np.random.default_rng(seed + 7))
-    ends = {"actuators": case.blows, "sensors": case.sensors, "points": case.points}
+    ends = {"actuators": case.input_dofs, "sensors": case.sensors, "points": case.points}
     reduced = reduce_model(case.nominal, ReduceOptions(), band_hz=band, **ends)
     return Bench(case=case, truth=truth, labels=labels, fit=fit, reduced=reduced, pairs=pair(fit, reduced))
 
@@ -130,7 +130,7 @@ def judge(bench: Bench, updated: UpdatedModel, models: dict[str, ReducedModel | 
     predicted = predict_frfs(updated, bench.case.points, bench.labels, lines)
     rows = []
     for number, label in enumerate(predicted.labels):
-        if label.input_dof != bench.case.blows[0]:
+        if label.input_dof != bench.case.input_dofs[0]:
             continue
         s = 2j * np.pi * lines
         truth = bench.truth.receptance(s, label)[:, None]

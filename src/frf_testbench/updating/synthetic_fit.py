@@ -295,4 +295,6 @@ def linear_slopes(model: PoleResidueModel, s: ComplexArray) -> ComplexArray:
 
 def labels_of(case: Case) -> tuple[FrfLabel, ...]:
     """Name every blow with every sensor, as receptances."""
-    return tuple(FrfLabel(sensor, blow, FrfQuantity.RECEPTANCE) for blow in case.blows for sensor in case.sensors)
+    return tuple(
+        FrfLabel(sensor, struck, FrfQuantity.RECEPTANCE) for struck in case.input_dofs for sensor in case.sensors
+    )

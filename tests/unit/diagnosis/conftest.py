@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.quantities import FrfQuantity
@@ -90,8 +90,8 @@ def strike(chain):
             Sensor(channel=f"acc_{node}", dof=parse_dof(f"{node}:+x"), quantity=FrfQuantity.ACCELERANCE)
             for node in (2, 4)
         )
-        blows = tuple(
-            Blow(
+        records = tuple(
+            ObservedRecord(
                 name=f"blow {peak:g} N",
                 input_channel="force",
                 input_dof=parse_dof("1:+x"),
@@ -102,7 +102,7 @@ def strike(chain):
             )
             for peak, shown in zip(LEVELS_N, accelerations, strict=True)
         )
-        return Observations(kind="hammer", blows=blows, band_hz=BAND_HZ)
+        return Observations(kind="hammer", records=records, band_hz=BAND_HZ)
 
     return run
 
@@ -112,11 +112,11 @@ def random_records():
     def make(observations, loud_s):
         """Turn blows into records of a shaker from rest, thirty times as strong about a time."""
         records = []
-        for seed, blow in enumerate(observations.blows[:2]):
-            time = blow.step_s * np.arange(blow.n_samples)
+        for seed, record in enumerate(observations.records[:2]):
+            time = record.step_s * np.arange(record.n_samples)
             noise = np.convolve(np.random.default_rng(seed).standard_normal(len(time)), np.ones(8) / 8, "same")
             force = noise * np.clip(20 * time / time[-1], 0, 1) * (1 + 29 * np.exp(-(((time - loud_s) / 0.05) ** 2)))
-            records.append(replace(blow, force=force, responses=np.tile(force, (len(blow.sensors), 1))))
-        return replace(observations, kind="random", blows=tuple(records))
+            records.append(replace(record, force=force, responses=np.tile(force, (len(record.sensors), 1))))
+        return replace(observations, kind="random", records=tuple(records))
 
     return make

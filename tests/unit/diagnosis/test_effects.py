@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, labels, lumped
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.catalogue.model_context import Specimen
+from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import make_basis
@@ -39,7 +39,7 @@ def specimen_of(model, names):
     layout = lay_out(names)
     places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     options = DiagnoseOptions()
-    return Specimen(
+    return ModelContext(
         basis=make_basis(model, 2 * np.pi * BAND_HZ[1], places),
         layout=layout,
         band_hz=BAND_HZ,

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, is_sweep, isolate_pulse
-from frf_ipz.diagnosis.observations import Blow, Sensor
+from frf_ipz.diagnosis.observations import ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
 
@@ -13,8 +13,8 @@ SAMPLES, TOP, PULSE = 20_000, 30, 7  # the pulse begins soon after the record
 PEAK_N, NOISE_N = 77.0, 0.23
 
 
-def blow(force):
-    return Blow(
+def record(force):
+    return ObservedRecord(
         name="b",
         input_channel="force",
         input_dof=parse_dof("5:+z"),
@@ -35,16 +35,16 @@ def a_force(drawn, *starts):
 def test_noise_of_a_long_record_is_no_part_of_a_weak_blow():
     """A few samples before the blow, by chance quiet ones, do not say how far noise reaches in thousands."""
     longest = PULSE + 2 * (RINGING + TAPER)
-    pulses = [isolate_pulse(blow(a_force(drawn, TOP))) for drawn in range(300)]
+    pulses = [isolate_pulse(record(a_force(drawn, TOP))) for drawn in range(300)]
     assert max(pulse.stop - pulse.start for pulse in pulses) <= longest
 
 
 @pytest.mark.parametrize("second", [60, 400, 12_000, 19_000])
 def test_a_second_touch_is_kept(second):
     force = a_force(0, TOP, second)
-    pulse = isolate_pulse(blow(force))
-    np.testing.assert_array_equal(pulse.blow.force[TOP - 3 : second + PULSE + 3], force[TOP - 3 : second + PULSE + 3])
-    assert np.abs(pulse.blow.force[second + PULSE + 2 * (RINGING + TAPER) :]).max() < 1e-12
+    pulse = isolate_pulse(record(force))
+    np.testing.assert_array_equal(pulse.record.force[TOP - 3 : second + PULSE + 3], force[TOP - 3 : second + PULSE + 3])
+    assert np.abs(pulse.record.force[second + PULSE + 2 * (RINGING + TAPER) :]).max() < 1e-12
 
 
 @pytest.mark.parametrize(("samples", "starts"), [(1000, (100, 700)), (2000, (30, 1200, 1500))])
@@ -52,7 +52,7 @@ def test_late_touches_of_short_records_are_no_noise(samples, starts):
     force = 0.01 * np.random.default_rng(1).standard_normal(SAMPLES)[:samples]
     for part, start in zip((1.0, 0.8, 0.12), starts, strict=False):
         force[start : start + 20] += 100.0 * part * np.sin(np.pi * (np.arange(20) + 0.5) / 20)
-    kept = isolate_pulse(blow(force)).blow.force
+    kept = isolate_pulse(record(force)).record.force
     np.testing.assert_array_equal(kept[starts[0] : starts[-1] + 20], force[starts[0] : starts[-1] + 20])
 
 
@@ -60,14 +60,14 @@ def test_late_touches_of_short_records_are_no_noise(samples, starts):
 def test_a_blow_that_noise_hides_is_kept_where_it_is_largest(level):
     force = level * a_force(3)
     top = int(np.argmax(np.abs(force)))
-    assert isolate_pulse(blow(force)).blow.force[top] == force[top]
+    assert isolate_pulse(record(force)).record.force[top] == force[top]
 
 
 @pytest.mark.parametrize(("start", "rings"), [(4, True), (RINGING + TAPER + 5, False)])
 def test_a_record_that_begins_within_the_ringing_of_its_filter_lacks_some(start, rings):
     force = a_force(5, start)
     force[max(start - 4, 0) : start] += PEAK_N / 50 * np.array([-1.0, 1.0, -1.0, 1.0])
-    one = blow(force)
+    one = record(force)
     sizes = cut_off(isolate_pulse(one), np.full((1, SAMPLES), 0.25))
     if rings:
         np.testing.assert_allclose(sizes, [PEAK_N / 50, 0.25], rtol=0.2)
@@ -87,7 +87,7 @@ def test_drift_is_no_part_of_the_impulse_of_a_weak_blow():
     for _ in range(40):
         weak = np.zeros(SAMPLES)
         weak[200 : 200 + PULSE] = 0.3 * PEAK_N * np.sin(np.pi * (np.arange(PULSE) + 0.5) / PULSE)
-        wrong.append(isolate_pulse(blow(weak + drifting(rng))).blow.force.sum() / weak.sum() - 1)
+        wrong.append(isolate_pulse(record(weak + drifting(rng))).record.force.sum() / weak.sum() - 1)
     assert np.sqrt(np.mean(np.square(wrong))) < 0.03
 
 
@@ -96,11 +96,11 @@ def test_ringing_is_kept_as_far_as_it_is_heard():
     taps = signal.firwin(161, 0.9, window=("kaiser", 10.0))
     rung = np.convolve(clean, taps, mode="same")
     rng = np.random.default_rng(7)
-    quiet, loud = (isolate_pulse(blow(rung + std * rng.standard_normal(SAMPLES))) for std in (1e-5, 1.0))
+    quiet, loud = (isolate_pulse(record(rung + std * rng.standard_normal(SAMPLES))) for std in (1e-5, 1.0))
     assert quiet.start <= 300 - RINGING
     assert quiet.stop >= 300 + PULSE + RINGING
     assert loud.stop - loud.start < PULSE + 2 * (RINGING - 10)
-    assert abs(loud.blow.force.sum() / clean.sum() - 1) < 0.05
+    assert abs(loud.record.force.sum() / clean.sum() - 1) < 0.05
 
 
 def test_a_sweep_comes_to_a_part_of_the_band_too_late_noise_and_bursts_do_not():
@@ -110,7 +110,7 @@ def test_a_sweep_comes_to_a_part_of_the_band_too_late_noise_and_bursts_do_not():
     sweep = np.sin(2 * np.pi * (20 * time + (300 - 20) * time**2 / (2 * time[-1])))
     burst = rng.standard_normal(n) * (time < 0.3 * time[-1])
     for force, expected in ((sweep, True), (rng.standard_normal(n), False), (burst, False)):
-        assert is_sweep(blow(force), band, 8 / time[-1]) is expected
+        assert is_sweep(record(force), band, 8 / time[-1]) is expected
 
 
 @pytest.mark.parametrize(("part", "is_kept"), [(0.0025, True), (0.0, False)])
@@ -119,9 +119,9 @@ def test_what_a_high_pass_leaves_behind_a_pulse_is_a_part_of_it(part, is_kept):
     end = TOP + PULSE
     force = (a_force(5, TOP) - a_force(5)) + 0.05 * a_force(5)
     force[end:] -= part * PEAK_N * np.exp(-np.arange(SAMPLES - end) / 150)
-    found = isolate_pulse(blow(force))
+    found = isolate_pulse(record(force))
     if is_kept:
-        assert found.blow.force.sum() == pytest.approx(force[: found.stop].sum(), rel=0.01)
+        assert found.record.force.sum() == pytest.approx(force[: found.stop].sum(), rel=0.01)
         assert found.stop > end + 400
     else:
         assert found.stop < end + 2 * (RINGING + TAPER)

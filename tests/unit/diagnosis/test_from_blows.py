@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from frf_ipz.diagnosis.measured.from_impacts import measure, survey
-from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
 
@@ -19,13 +19,13 @@ LEAD = 100  # samples before a shaker begins
 AS_READ = 0.3  # of the noise's density, which is read from three records
 
 
-def blow(name, place, level, shown):
+def impact(name, place, level, shown):
     """A short pulse and a motion that dies out, as a recorder with coarse steps shows it."""
     time = np.arange(SAMPLES) / RATE_HZ
     force = np.where((time > 0.1) & (time < 0.103), level, 0.0)
     after = np.maximum(time - 0.1, 0.0)
     motion = shown * level * np.exp(-8 * after) * np.sin(2 * np.pi * 60 * after)
-    return Blow(
+    return ObservedRecord(
         name=name,
         input_channel="force",
         input_dof=parse_dof(place),
@@ -39,9 +39,9 @@ def blow(name, place, level, shown):
 @pytest.mark.parametrize("shown", [0.0, 0.1])
 def test_a_recorder_has_at_least_the_noise_of_its_steps(shown):
     """A channel on its node shows exact zeros for some blows: that is no measure of its noise."""
-    blows = [blow(f"a{'x' * n}", "5:+z", level, 0.1) for n, level in enumerate((10.0, 17.0))]
-    blows += [blow(f"b{'y' * n}", "7:+z", level, shown) for n, level in enumerate((11.0, 23.0, 35.0))]
-    found = survey(Observations(kind="hammer", blows=tuple(blows), band_hz=(20.0, 200.0)))
+    records = [impact(f"a{'x' * n}", "5:+z", level, 0.1) for n, level in enumerate((10.0, 17.0))]
+    records += [impact(f"b{'y' * n}", "7:+z", level, shown) for n, level in enumerate((11.0, 23.0, 35.0))]
+    found = survey(Observations(kind="hammer", records=tuple(records), band_hz=(20.0, 200.0)))
     assert found.responses["acc"].white >= STEP**2 / 12 / RATE_HZ * (1 - 1e-9)
 
 
@@ -52,7 +52,7 @@ def record(name, drawn, noise_n):
     frequency = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
     force = np.fft.irfft(np.where(frequency < HALF_HZ, 1.0, HARDLY) * lines, SAMPLES)
     shown = force + noise_n * rng.standard_normal(SAMPLES)
-    return Blow(
+    return ObservedRecord(
         name=name,
         input_channel="force",
         input_dof=parse_dof("5:+z"),
@@ -69,8 +69,8 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
     s = 3.0 + 2j * np.pi * frequency
     errors, stated = [], []
     for trial in range(trials):
-        blows = tuple(record(f"r{k}", (trial, k), noise_n) for k in range(3))
-        found = survey(Observations(kind="random", blows=blows, band_hz=(30.0, 390.0)))
+        records = tuple(record(f"r{k}", (trial, k), noise_n) for k in range(3))
+        found = survey(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
         measured = measure(found, s)
         errors.append(np.abs(measured.values[:, 0] * np.polyval(RESONANCE[::-1], np.exp(-s / RATE_HZ)) - 1) ** 2)
         stated.append(np.sum(np.abs(measured.common[0]) ** 2, 1))
@@ -88,7 +88,7 @@ def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of
     frequency = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
     density = white + pink / np.maximum(frequency, frequency[1])
     for trial in range(8):
-        blows = []
+        records = []
         for k in range(3):
             rng = np.random.default_rng((trial, k))
             one = record(f"r{k}", (trial, k), 0.0)
@@ -97,8 +97,8 @@ def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of
             force[:LEAD] = 0.0
             shown = lfilter([1.0], two, force)[None]
             shown += 1e-4 * np.abs(shown).max() * rng.standard_normal(shown.shape)
-            blows.append(replace(one, force=force + noise, responses=shown))
-        survey_ = survey(Observations(kind="random", blows=tuple(blows), band_hz=(10.0, 390.0)))
+            records.append(replace(one, force=force + noise, responses=shown))
+        survey_ = survey(Observations(kind="random", records=tuple(records), band_hz=(10.0, 390.0)))
         found.append(survey_.force.density(np.array([19.0, 255.0])))
     ratio = np.median(found, axis=0) / (white + pink / np.array([19.0, 255.0]))
     assert np.all((ratio > 0.5) & (ratio < 2.0))
@@ -110,12 +110,12 @@ def test_records_that_end_in_motion_say_what_they_lack():
     s = 2.0 + 2j * np.pi * np.arange(30.0, 70.0, 2.5)
     errors, stated = [], []
     for trial in range(40):
-        blows = []
+        records = []
         for k in range(3):
             one = record(f"r{k}", (trial, k), 0.0)
             force = np.where(np.arange(SAMPLES) > LEAD, one.force, 0.0)
-            blows.append(replace(one, force=force, responses=lfilter([1.0], slow, force)[None]))
-        found = survey(Observations(kind="random", blows=tuple(blows), band_hz=(20.0, 190.0)))
+            records.append(replace(one, force=force, responses=lfilter([1.0], slow, force)[None]))
+        found = survey(Observations(kind="random", records=tuple(records), band_hz=(20.0, 190.0)))
         measured = measure(found, s)
         true = 1 / np.polyval(slow[::-1], np.exp(-s / RATE_HZ))
         errors.append(np.abs((measured.values[:, 0] - true) / true) ** 2)
@@ -132,7 +132,7 @@ def test_what_lies_before_a_blow_does_not_blur_its_frfs(lead_s):
     place, shown, drawn = "5:+z", 0.1, np.random.default_rng(1)
 
     def late(name, level):
-        one = blow(name, place, level, shown)
+        one = impact(name, place, level, shown)
         lead = round((lead_s - 0.05) * RATE_HZ)
         quiet = 1e-3 * drawn.standard_normal((1, lead))
         hum = 1e-4 * drawn.standard_normal((1, lead + SAMPLES - 50))
@@ -140,8 +140,8 @@ def test_what_lies_before_a_blow_does_not_blur_its_frfs(lead_s):
         responses = np.concatenate([quiet, shown * level * _decaying(SAMPLES - 50)[None]], axis=1) + hum
         return replace(one, force=force, responses=responses)
 
-    blows = tuple(late(f"a{'x' * n}", level) for n, level in enumerate((10.0, 17.0, 30.0)))
-    found = survey(Observations(kind="hammer", blows=blows, band_hz=(20.0, 200.0)))
+    records = tuple(late(f"a{'x' * n}", level) for n, level in enumerate((10.0, 17.0, 30.0)))
+    found = survey(Observations(kind="hammer", records=records, band_hz=(20.0, 200.0)))
     s = np.array([12.0 + 2j * np.pi * 120.0])
     measured = measure(found, s)
     pulse = np.where((np.arange(SAMPLES) > 100) & (np.arange(SAMPLES) < 103), 1.0, 0.0)[50:]

@@ -119,8 +119,8 @@ def test_sweeps_from_rest_are_read_as_running_records_and_random_ones_are_not(se
     sweep = np.sin(2 * np.pi * (5 * time + (300 - 5) * time**2 / (2 * time[-1]))) * np.minimum(time / 0.1, 1.0)
     noise = np.random.default_rng(6).standard_normal(n) * np.minimum(time / 0.1, 1.0)
     for force, kind in ((sweep, "running"), (noise, "random")):
-        blows = tuple(
-            replace(blow, force=size * force, responses=respond(LIGHT, size * force, STEP_S), rested=True)
-            for size, blow in zip((1.0, 0.5, 0.3), seen.blows, strict=True)
+        records = tuple(
+            replace(record, force=size * force, responses=respond(LIGHT, size * force, STEP_S), rested=True)
+            for size, record in zip((1.0, 0.5, 0.3), seen.records, strict=True)
         )
-        assert divide(replace(seen, blows=blows)).kind == kind
+        assert divide(replace(seen, records=records)).kind == kind

@@ -34,12 +34,12 @@ def test_a_gate_that_failed_is_said(source):
 @pytest.mark.parametrize(("dropped", "is_late"), [(0, False), (76, True)])
 def test_records_that_begin_within_the_ringing_of_a_blow_are_named(strike, dropped, is_late):
     """The blow comes after 80 samples; the filter of the force rings as if it had no end."""
-    blows = []
-    for blow in strike().blows:
-        force = blow.force.copy()
-        force[70:80] += 1e-3 * blow.level * (-1.0) ** np.arange(10)
-        blows.append(replace(blow, force=force[dropped:], responses=blow.responses[:, dropped:]))
-    source = divide(replace(strike(), blows=tuple(blows)))
+    records = []
+    for record in strike().records:
+        force = record.force.copy()
+        force[70:80] += 1e-3 * record.level * (-1.0) ** np.arange(10)
+        records.append(replace(record, force=force[dropped:], responses=record.responses[:, dropped:]))
+    source = divide(replace(strike(), records=tuple(records)))
     said = [text for text in warn(source, check(source, None)) if "ringing" in text]
     assert len(said) == is_late
     assert all(text.startswith("blow 100 N, ") for text in said)

@@ -14,7 +14,7 @@ from frf_ipz.diagnosis.judging import law_and_linear as law_beside
 from frf_ipz.diagnosis.judging.decision import only_null
 from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.measured.cleaned.restored import restore
-from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.diagnosis.search.search import search
@@ -192,7 +192,7 @@ def pulse(shift_s):
 
 @pytest.mark.parametrize("left", [np.inf, np.nan, 1e30])
 def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkeypatch, left):
-    blow = Blow(
+    record = ObservedRecord(
         name="a",
         input_channel="force",
         input_dof=parse_dof("5:+z"),
@@ -201,8 +201,8 @@ def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkey
         responses=np.ones((1, SAMPLES)),
         sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
     )
-    observations = Observations(kind="hammer", blows=(blow,), band_hz=(10.0, 500.0))
-    gone = replace(observations, blows=(replace(blow, responses=np.full((1, SAMPLES), left)),))
+    observations = Observations(kind="hammer", records=(record,), band_hz=(10.0, 500.0))
+    gone = replace(observations, records=(replace(record, responses=np.full((1, SAMPLES), left)),))
     monkeypatch.setattr(law_beside, "without_law", lambda *_: gone)
     law = SimpleNamespace(
         verdict="explained", strain=99.0, fit=object(), freedom=SimpleNamespace(moving=()), dispersion_rad=0.0
@@ -215,7 +215,7 @@ def test_recordings_are_restored():
         Sensor(channel=name, dof=parse_dof(dof), quantity=FrfQuantity.ACCELERANCE)
         for name, dof in (("acc_1", "9:+z"), ("acc_2", "5:-z"))
     )
-    blow = Blow(
+    record = ObservedRecord(
         name="a",
         input_channel="force",
         input_dof=parse_dof("3:+z"),
@@ -231,14 +231,14 @@ def test_recordings_are_restored():
         },
         moved={"acc_2": 6},
     )
-    (found,) = restore(Observations(kind="hammer", blows=(blow,), band_hz=(10.0, 200.0)), change).blows
+    (found,) = restore(Observations(kind="hammer", records=(record,), band_hz=(10.0, 200.0)), change).records
     assert_allclose(found.force, pulse(0.0), rtol=0, atol=WRAPPED)
     assert_allclose(found.responses[0], pulse(0.0), rtol=0, atol=WRAPPED)
-    assert np.array_equal(found.responses[1], blow.responses[1])
+    assert np.array_equal(found.responses[1], record.responses[1])
     assert [sensor.dof.name for sensor in found.sensors] == ["9:z", "6:z"]
     assert found.sensors[1].dof.sign == -1
 
 
 def test_a_faultless_chain_is_left_alone():
-    seen = Observations(kind="hammer", blows=(), band_hz=(10.0, 200.0))
+    seen = Observations(kind="hammer", records=(), band_hz=(10.0, 200.0))
     assert restore(seen, Change()) is seen

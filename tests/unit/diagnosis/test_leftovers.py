@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_quiet_constants
-from frf_ipz.diagnosis.measured.cleaned.residual_motion import DECAYS, LARGEST, _group, _whole, without_leftovers
+from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_dc_offset
+from frf_ipz.diagnosis.measured.cleaned.residual_motion import DECAYS, LARGEST, _group, _whole, without_residual_motion
 from frf_ipz.diagnosis.measured.forces import RINGING
 from frf_ipz.diagnosis.measured.from_impacts import measure, survey
 from frf_ipz.diagnosis.measured.lines import same_places
@@ -26,19 +26,19 @@ def cubic(w, _):
 
 def largest(observations):
     """(n_sensors, 1) array."""
-    return np.max([np.abs(blow.responses).max(1) for blow in observations.blows], 0)[:, None]
+    return np.max([np.abs(record.responses).max(1) for record in observations.records], 0)[:, None]
 
 
 def shifted(observations, constants):
     return replace(
         observations,
-        blows=tuple(replace(blow, responses=blow.responses + constants) for blow in observations.blows),
+        records=tuple(replace(record, responses=record.responses + constants) for record in observations.records),
     )
 
 
 def taken_off(before, after):
     """(n_blows, n_sensors, n_samples) array."""
-    return np.array([a.responses - b.responses for a, b in zip(before.blows, after.blows, strict=True)])
+    return np.array([a.responses - b.responses for a, b in zip(before.records, after.records, strict=True)])
 
 
 def accelerations(chain, rows):
@@ -54,25 +54,25 @@ def test_constants_of_a_linear_system_are_told_by_blows_of_several_levels(strike
     constants = PARTS[:, None] * largest(strike())
     spoilt = shifted(strike(), constants)
     assert assess_linearity(spoilt).is_nonlinear
-    restored = without_leftovers(spoilt)
+    restored = without_residual_motion(spoilt)
     assert not assess_linearity(restored).is_nonlinear
     off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
-    stds = np.array([blow.constant_std for blow in restored.blows])
+    stds = np.array([record.constant_std for record in restored.records])
     assert np.all(np.abs(off) < 4 * stds + 1e-4 * largest(strike())[:, 0])
     assert np.all(stds < 1e-3 * largest(strike())[:, 0])
 
 
 def test_where_there_are_no_constants_little_changes(strike):
-    off = taken_off(strike(), without_leftovers(strike()))
+    off = taken_off(strike(), without_residual_motion(strike()))
     assert np.all(np.abs(off) < 2e-4 * largest(strike()))
 
 
 def test_blows_of_one_level_tell_no_constant(strike):
     """It may as well be their response: it stays, and makes FRFs uncertain at the bottom of the band."""
-    one, rng = strike().blows[0], np.random.default_rng(2)
+    one, rng = strike().records[0], np.random.default_rng(2)
     noise = 1e-5 * largest(strike())
     late = 76  # samples: the blow comes with the fifth after that
-    blows = [
+    records = [
         replace(
             one,
             name=f"blow {n}",
@@ -81,14 +81,14 @@ def test_blows_of_one_level_tell_no_constant(strike):
         )
         for n in range(3)
     ]
-    alike = replace(strike(), blows=tuple(blows))
+    alike = replace(strike(), records=tuple(records))
     constants = PARTS[:, None] * largest(alike)
-    restored = without_leftovers(shifted(alike, constants))
-    stds = np.array([blow.constant_std for blow in restored.blows])
+    restored = without_residual_motion(shifted(alike, constants))
+    stds = np.array([record.constant_std for record in restored.records])
     assert np.all(stds > 0.05 * LARGEST * largest(alike)[:, 0])
     s = np.array([2.0 + 2j * np.pi * 4.5, 2.0 + 2j * np.pi * 70.0])
     plain = measure(survey(alike), s)
-    with_stds = measure(survey(replace(alike, blows=restored.blows)), s)
+    with_stds = measure(survey(replace(alike, records=restored.records)), s)
     grown = np.array(
         [
             np.abs(np.diag(one)) / np.abs(np.diag(other))
@@ -102,19 +102,19 @@ def test_blows_of_one_level_tell_no_constant(strike):
 def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
     values, shapes = np.linalg.eigh(chain.K)
     omega, damped = np.sqrt(values), np.sqrt(values * (1 - 1e-4))
-    time = strike().blows[0].step_s * np.arange(strike().blows[0].n_samples)
+    time = strike().records[0].step_s * np.arange(strike().records[0].n_samples)
     rng = np.random.default_rng(3)
-    blows, added = [strike().blows[0]], [0.0]
-    for blow in strike().blows[1:]:
+    records, added = [strike().records[0]], [0.0]
+    for record in strike().records[1:]:
         phase = rng.uniform(0, 2 * np.pi, len(omega))
         decaying = np.exp(-0.01 * np.outer(omega, time)) * np.cos(np.outer(damped, time) + phase[:, None])
         moving = shapes[[1, 3]] @ (rng.standard_normal(len(omega))[:, None] * decaying)
         moving *= LEFT * largest(strike()) / np.abs(moving).max()
-        blows.append(replace(blow, responses=blow.responses + moving, number=9))
+        records.append(replace(record, responses=record.responses + moving, number=9))
         added.append(moving)
-    spoilt = replace(strike(), blows=tuple(blows))
+    spoilt = replace(strike(), records=tuple(records))
     assert assess_linearity(spoilt).is_nonlinear
-    restored = without_leftovers(spoilt)
+    restored = without_residual_motion(spoilt)
     assert not assess_linearity(restored).is_nonlinear
     off = taken_off(spoilt, restored)
     for found, moving in zip(off[1:], added[1:], strict=True):
@@ -126,35 +126,35 @@ def test_ringing_that_recordings_lack_before_a_blow_is_no_constant(strike):
     late = (75, 76, 77, 76)  # samples: the blow comes with the fifth or so after that
     rng = np.random.default_rng(4)
     lacking = 0.02 * largest(strike()) * rng.standard_normal((4, 2, 2))
-    blows = []
-    for blow, start, lacks in zip(strike().blows, late, lacking, strict=True):
-        responses = blow.responses[:, start:].copy()
+    records = []
+    for record, start, lacks in zip(strike().records, late, lacking, strict=True):
+        responses = record.responses[:, start:].copy()
         responses[:, :2] += lacks
-        blows.append(replace(blow, force=blow.force[start:], responses=responses))
-    spoilt = replace(strike(), blows=tuple(blows))
-    for before, after in zip(blows, without_leftovers(spoilt).blows, strict=True):
+        records.append(replace(record, force=record.force[start:], responses=responses))
+    spoilt = replace(strike(), records=tuple(records))
+    for before, after in zip(records, without_residual_motion(spoilt).records, strict=True):
         assert np.all(np.abs((before.responses - after.responses)[:, -1:]) < 3e-3 * largest(strike()))
 
 
 @pytest.fixture
 def struck_on(strike, chain):
     """Give blows of one recording, each before the one before has rung out, and what each would be from rest."""
-    single = strike().blows
+    single = strike().records
     system = accelerations(chain, [1, 3])
 
     def run(pause, number_of):
         step, rng = single[0].step_s, np.random.default_rng(7)
-        force = np.concatenate([blow.force[:pause] for blow in single])
+        force = np.concatenate([record.force[:pause] for record in single])
         whole = lsim(system, force, step * np.arange(len(force)))[1].T
         noise = 1e-5 * np.abs(whole).max()
-        blows, alone = [], []
-        for number, blow in enumerate(single):
+        records, alone = [], []
+        for number, record in enumerate(single):
             here = slice(number * pause, (number + 1) * pause)
             responses = whole[:, here] + noise * rng.standard_normal((2, pause))
             at = {"recording": "all", "number": number_of(number), "start_s": number * pause * step}
-            blows.append(replace(blow, force=blow.force[:pause], responses=responses, **at))
-            alone.append(lsim(system, blow.force[:pause], step * np.arange(pause))[1].T)
-        return replace(strike(), blows=tuple(blows)), np.array(alone)
+            records.append(replace(record, force=record.force[:pause], responses=responses, **at))
+            alone.append(lsim(system, record.force[:pause], step * np.arange(pause))[1].T)
+        return replace(strike(), records=tuple(records)), np.array(alone)
 
     return run
 
@@ -162,25 +162,25 @@ def struck_on(strike, chain):
 @pytest.mark.parametrize("lacking", [0, 5])
 def test_motion_left_by_blows_before_is_taken_off_where_one_of_them_was_left_out_too(struck_on, lacking):
     spoilt, alone = struck_on(600, lambda number: number + 1 + lacking * (number > 0))
-    left = np.array([blow.responses for blow in spoilt.blows]) - alone
+    left = np.array([record.responses for record in spoilt.records]) - alone
     assert np.abs(left).max() > 0.05 * np.abs(alone).max()
-    restored = np.array([blow.responses for blow in without_leftovers(spoilt).blows])
+    restored = np.array([record.responses for record in without_residual_motion(spoilt).records])
     assert np.linalg.norm(restored - alone) < 0.02 * np.linalg.norm(left)
 
 
 def test_what_forces_before_have_left_of_each_mode_is_known_from_all_of_them(struck_on):
     observations, _ = struck_on(600, lambda number: number + 1)
-    ordered = observations.blows
+    ordered = observations.records
     group = _group(same_places(observations)[0], observations, DECAYS / ordered[0].duration_s)
-    step, force = ordered[0].step_s, np.concatenate([blow.force for blow in ordered])
+    step, force = ordered[0].step_s, np.concatenate([record.force for record in ordered])
     assert group.kicks(ordered[0]) is None
-    for number, blow in enumerate(ordered[1:], start=1):
-        left, error = group.kicks(blow)
+    for number, record in enumerate(ordered[1:], start=1):
+        left, error = group.kicks(record)
         later = step * (600 * number - np.arange(600 * number))
         whole = step * np.exp(np.outer(group.poles, later)) @ force[: 600 * number]
         np.testing.assert_allclose(left, whole, rtol=1e-2)  # forces are cut where nothing touches
         assert np.all(error > 0.009 * np.abs(left))
-    without_one = replace(observations, blows=(ordered[0], *ordered[2:]))
+    without_one = replace(observations, records=(ordered[0], *ordered[2:]))
     group = _group(same_places(without_one)[0], without_one, DECAYS / ordered[0].duration_s)
     assert group.kicks(ordered[2]) is None
 
@@ -188,29 +188,29 @@ def test_what_forces_before_have_left_of_each_mode_is_known_from_all_of_them(str
 def test_constants_of_a_nonlinear_structure_are_read_where_it_has_come_to_rest(strike):
     constants = PARTS[:, None] * largest(strike(cubic))
     spoilt = shifted(strike(cubic), constants)
-    off = taken_off(spoilt, without_quiet_constants(spoilt))[:, :, 0]
+    off = taken_off(spoilt, without_dc_offset(spoilt))[:, :, 0]
     np.testing.assert_allclose(off, np.tile(constants[:, 0], (len(off), 1)), rtol=0.02)
 
 
 def test_a_displacement_may_have_a_mean(strike):
-    blow = strike().blows[0]
-    sensors = tuple(replace(sensor, quantity=FrfQuantity.RECEPTANCE) for sensor in blow.sensors)
-    shown = replace(strike(), blows=(replace(blow, sensors=sensors, responses=blow.responses + 1.0),))
-    assert not taken_off(shown, without_quiet_constants(shown)).any()
+    record = strike().records[0]
+    sensors = tuple(replace(sensor, quantity=FrfQuantity.RECEPTANCE) for sensor in record.sensors)
+    shown = replace(strike(), records=(replace(record, sensors=sensors, responses=record.responses + 1.0),))
+    assert not taken_off(shown, without_dc_offset(shown)).any()
 
 
 @pytest.fixture
 def shaken(strike, chain):
     """Three records of a shaker that starts at rest, at node 1, with noise."""
     system = accelerations(chain, [0, 2])
-    one, rng = strike().blows[0], np.random.default_rng(5)
+    one, rng = strike().records[0], np.random.default_rng(5)
     records = []
     for number in range(3):
         force = np.concatenate([[0.0], rng.standard_normal(N_SAMPLES - 1)])
         responses = lsim(system, force, one.step_s * np.arange(N_SAMPLES))[1].T
         responses += 1e-3 * responses.std() * rng.standard_normal(responses.shape)
         records.append(replace(one, name=f"record {number}", force=force, responses=responses))
-    return replace(strike(), kind="random", blows=tuple(records))
+    return replace(strike(), kind="random", records=tuple(records))
 
 
 @pytest.mark.parametrize("lead", [0, 200])
@@ -218,32 +218,32 @@ def test_records_of_a_shaker_tell_constants_though_the_structure_moves_all_the_t
     rests = ((0, 0), (lead, 0))
     shaken = replace(
         shaken,
-        blows=tuple(
-            replace(blow, force=np.pad(blow.force, (lead, 0)), responses=np.pad(blow.responses, rests))
-            for blow in shaken.blows
+        records=tuple(
+            replace(record, force=np.pad(record.force, (lead, 0)), responses=np.pad(record.responses, rests))
+            for record in shaken.records
         ),
     )
-    assert all(_whole(blow).start == pytest.approx(max(lead - RINGING, 0), abs=5) for blow in shaken.blows)
+    assert all(_whole(record).start == pytest.approx(max(lead - RINGING, 0), abs=5) for record in shaken.records)
     constants = PARTS[:, None] * largest(shaken)
     spoilt = shifted(shaken, constants)
-    restored = without_leftovers(spoilt)
+    restored = without_residual_motion(spoilt)
     off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
-    stds = np.array([blow.constant_std for blow in restored.blows])
+    stds = np.array([record.constant_std for record in restored.records])
     assert np.all(np.abs(off) < 4 * stds)
     assert np.all(stds < 1e-3 * largest(shaken)[:, 0])
 
 
 def test_one_record_of_a_shaker_tells_no_constant(shaken):
-    alone = replace(shaken, blows=shaken.blows[:1])
-    assert without_leftovers(alone) is alone
+    alone = replace(shaken, records=shaken.records[:1])
+    assert without_residual_motion(alone) is alone
 
 
 @pytest.mark.parametrize("is_rested", [True, False])
 def test_what_does_not_start_at_rest_is_left_alone(strike, is_rested):
     observations = shifted(strike(), largest(strike()) * PARTS[:, None])
-    other = replace(observations, blows=tuple(replace(blow, rested=is_rested) for blow in observations.blows))
-    assert (without_leftovers(other) is other) == (not is_rested)
-    assert (without_quiet_constants(other) is other) == (not is_rested)
+    other = replace(observations, records=tuple(replace(record, rested=is_rested) for record in observations.records))
+    assert (without_residual_motion(other) is other) == (not is_rested)
+    assert (without_dc_offset(other) is other) == (not is_rested)
 
 
 @pytest.mark.filterwarnings("error")
@@ -251,11 +251,11 @@ def test_what_does_not_start_at_rest_is_left_alone(strike, is_rested):
 def test_a_channel_that_shows_nothing_does_no_harm(strike, everywhere):
     """Converters store zeros for what is smaller than their steps."""
     seen = strike()
-    here = tuple(replace(blow, responses=blow.responses * np.array([[1.0], [0.0]])) for blow in seen.blows)
+    here = tuple(replace(record, responses=record.responses * np.array([[1.0], [0.0]])) for record in seen.records)
     elsewhere = parse_dof("3:+x")
-    there = tuple(replace(blow, name=f"{blow.name} there", input_dof=elsewhere) for blow in seen.blows)
-    together = replace(seen, blows=here if everywhere else here + there)
-    off = taken_off(together, without_leftovers(together))
+    there = tuple(replace(record, name=f"{record.name} there", input_dof=elsewhere) for record in seen.records)
+    together = replace(seen, records=here if everywhere else here + there)
+    off = taken_off(together, without_residual_motion(together))
     assert np.all(np.abs(off[: len(here), 1]) < 1e-6 * largest(seen)[1])
-    plain = taken_off(seen, without_leftovers(seen))
-    assert off[: len(here), 0] == pytest.approx(plain[:, 0], abs=1e-3 * float(np.abs(seen.blows[0].responses).max()))
+    plain = taken_off(seen, without_residual_motion(seen))
+    assert off[: len(here), 0] == pytest.approx(plain[:, 0], abs=1e-3 * float(np.abs(seen.records[0].responses).max()))

@@ -12,7 +12,7 @@ from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from synthetic_campaign import HIT, Structure, blow, hammer_campaign, write_csv, write_test
+from synthetic_campaign import HIT, Structure, hammer_campaign, impact, write_csv, write_test
 
 BAND = FitOptions(band_hz=(20.0, 220.0))
 HEIGHTS = (10.0, 30.0, 100.0, 200.0)
@@ -47,7 +47,7 @@ def softening(tmp_path_factory, linear):
     for number, height in enumerate(HEIGHTS):
         factor = 1 - SOFTENING * number / (len(HEIGHTS) - 1)
         structure = replace(true, frequency_hz=tuple(factor * hertz for hertz in true.frequency_hz))
-        write_csv(folder / "hits" / f"p_{number}.csv", blow(structure, height=height), 1 / 2048)
+        write_csv(folder / "hits" / f"p_{number}.csv", impact(structure, height=height), 1 / 2048)
     return observed(write_test(folder, HIT)), linear[1]
 
 
@@ -91,10 +91,10 @@ def test_records_of_a_shaker_are_compared_too(linear):
     records = []
     for number, size in enumerate((1.0, 5.0)):
         force = size * rng.standard_normal(8 * 4096)
-        signals = blow(Structure(), n_samples=len(force), force=force)
-        one = observations.blows[0]
+        signals = impact(Structure(), n_samples=len(force), force=force)
+        one = observations.records[0]
         records.append(replace(one, name=f"r{number}", force=force, responses=signals[1:], rested=False))
-    levels = compare_levels(replace(observations, kind="random", blows=tuple(records)), fit)
+    levels = compare_levels(replace(observations, kind="random", records=tuple(records)), fit)
     assert levels.weak_N[0] < 0.3 * levels.strong_N[0]
     assert np.linalg.norm(levels.weak - levels.strong) < 1e-4 * np.linalg.norm(levels.strong)  # other forces
     assert set(levels.modes["mode"]) <= {0, 1, 2}

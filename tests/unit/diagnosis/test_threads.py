@@ -20,7 +20,7 @@ def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(stage, "divide", look)
-    nothing = Observations(kind="frf", blows=(), band_hz=(1.0, 2.0))
+    nothing = Observations(kind="frf", records=(), band_hz=(1.0, 2.0))
     with threadpool_limits(limits=2, user_api="blas"):
         before = threads()
         with pytest.raises(KeyboardInterrupt):

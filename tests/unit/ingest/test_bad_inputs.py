@@ -157,7 +157,7 @@ def test_files_that_are_no_recordings(path, content, says):
 
 def test_a_recording_that_is_a_folder_is_no_recording(path):
     (path.parent / "hits" / "p7_04.csv").mkdir()
-    assert len(estimate_frfs(read_test(path), IngestOptions()).blows) == 3
+    assert len(estimate_frfs(read_test(path), IngestOptions()).records) == 3
 
 
 def test_recordings_of_unequal_length(path):

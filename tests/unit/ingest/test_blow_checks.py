@@ -7,8 +7,8 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.records import read_blows
-from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
+from frf_ipz.ingest.records import read_records
+from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
 STEP_S = 1 / 2048
 N_SAMPLES = 4096
@@ -19,8 +19,8 @@ def estimate(path, **options):
     return estimate_frfs(read_test(path), IngestOptions(**options))
 
 
-def noisy(rng, **of_blow):
-    return blow(Structure(), noise=NOISE, rng=rng, **of_blow)
+def noisy(rng, **of_record):
+    return impact(Structure(), noise=NOISE, rng=rng, **of_record)
 
 
 def twice(rng):
@@ -43,7 +43,7 @@ def overloaded(rng):
 
 def cut_off(rng):
     ringing = Structure(damping_ratio=(0.004, 0.02, 0.012))
-    return blow(ringing, noise=NOISE, rng=rng)
+    return impact(ringing, noise=NOISE, rng=rng)
 
 
 def weak(rng):
@@ -51,7 +51,7 @@ def weak(rng):
 
 
 def unheard(rng):
-    signals = blow(Structure(), height=30.0)
+    signals = impact(Structure(), height=30.0)
     signals[1:] += np.abs(signals[1:]).max() * rng.standard_normal(signals[1:].shape)
     return signals
 
@@ -87,11 +87,11 @@ def campaign(folder, third, *, step_s=STEP_S, others=2):
 )
 def test_bad_blows_are_left_out_and_said(tmp_path, third, mark):
     result = estimate(campaign(tmp_path, third))
-    assert list(result.blows.used) == [True, True, False]
-    assert mark in result.blows.marks[2]
-    assert list(result.blows.marks[:2]) == ["", ""]
+    assert list(result.records.used) == [True, True, False]
+    assert mark in result.records.marks[2]
+    assert list(result.records.marks[:2]) == ["", ""]
     assert list(result.frfs.averages) == [2, 2]
-    assert list(result.blows.weight[2:]) == [0.0]
+    assert list(result.records.weight[2:]) == [0.0]
     assert any("hits/p7_bad.csv is left out" in text and mark in text for text in result.warnings)
 
 
@@ -106,49 +106,49 @@ def test_bad_blows_are_left_out_and_said(tmp_path, third, mark):
 )
 def test_blows_that_can_be_lived_with_are_marked_and_stay(tmp_path, third, mark):
     result = estimate(campaign(tmp_path, third))
-    assert mark in result.blows.marks[2]
-    assert list(result.blows.marks[:2]) == ["", ""]
-    assert result.blows.used.all()
+    assert mark in result.records.marks[2]
+    assert list(result.records.marks[:2]) == ["", ""]
+    assert result.records.used.all()
     assert list(result.frfs.averages) == [3, 3]
 
 
 def test_a_weak_blow_hardly_counts(tmp_path):
-    weights = estimate(campaign(tmp_path, weak)).blows.weight
+    weights = estimate(campaign(tmp_path, weak)).records.weight
     assert weights.sum() == pytest.approx(1.0)
     assert weights[2] < 0.01 * weights[0]
 
 
 def test_a_blow_with_nothing_wrong_has_no_mark(tmp_path):
     result = estimate(campaign(tmp_path, fine))
-    assert list(result.blows.marks) == ["", "", ""]
+    assert list(result.records.marks) == ["", "", ""]
     assert result.warnings == ()
 
 
 def test_weak_means_below_the_noise_and_not_weaker_than_others(tmp_path):
     result = estimate(campaign(tmp_path, lambda rng: noisy(rng, height=4.0)))
-    assert result.blows.marks[2] == ""
+    assert result.records.marks[2] == ""
 
 
 def test_a_little_motion_before_a_blow_is_no_fault(tmp_path):
     result = estimate(campaign(tmp_path, lambda rng: restless(rng, share=0.015)))
-    assert result.blows.marks[2] == ""
+    assert result.records.marks[2] == ""
 
 
 def test_a_wrong_time_step_is_left_out_and_said(tmp_path):
     result = estimate(campaign(tmp_path, fine, step_s=1.3 * STEP_S))
-    assert list(result.blows.used) == [True, True, False]
-    assert "wrong sampling step: 0.000634766 s where the others have 0.000488281 s" in result.blows.marks[2]
+    assert list(result.records.used) == [True, True, False]
+    assert "wrong sampling step: 0.000634766 s where the others have 0.000488281 s" in result.records.marks[2]
 
 
 def test_steps_that_differ_in_their_last_digits_are_one_step(tmp_path):
     result = estimate(campaign(tmp_path, fine, step_s=STEP_S * (1 + 1e-5)))
-    assert result.blows.used.all()
+    assert result.records.used.all()
 
 
 @pytest.mark.parametrize("only", [twice, clipped, overloaded])
 def test_the_last_blow_of_a_dof_is_used_with_a_warning(tmp_path, only):
     result = estimate(campaign(tmp_path, only, others=0))
-    assert list(result.blows.used) == [True]
+    assert list(result.records.used) == [True]
     assert any("is used although it is bad" in text and "7:+z" in text for text in result.warnings)
     assert not any("is left out" in text for text in result.warnings)
 
@@ -162,7 +162,7 @@ def test_of_bad_blows_only_the_least_bad_is_used(tmp_path):
     both[0] = np.minimum(both[0], 70.0)
     write_csv(tmp_path / "hits" / "3.csv", both, STEP_S)
     result = estimate(write_test(tmp_path, HIT))
-    assert list(result.blows.used) == [False, True, False]
+    assert list(result.records.used) == [False, True, False]
 
 
 def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
@@ -171,7 +171,7 @@ def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
         write_csv(tmp_path / f"{name}.csv", make(rng), STEP_S)
     body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "8:+z"\nfiles = ["b/*.csv"]\n'
     result = estimate(write_test(tmp_path, body))
-    assert list(result.blows.groupby("input_dof").used.sum()) == [1, 1]
+    assert list(result.records.groupby("input_dof").used.sum()) == [1, 1]
     assert list(result.frfs.averages) == [1, 1, 1, 1]
 
 
@@ -187,21 +187,21 @@ def test_a_double_hit_that_is_kept_gives_the_right_frf(tmp_path, force_window_s)
 def test_the_user_overrules_the_checks(tmp_path):
     path = campaign(tmp_path, twice)
     kept = estimate(path, keep=("p7_bad.csv",))
-    assert kept.blows.used.all()
-    assert kept.blows.marks[2].endswith("kept by the user")
+    assert kept.records.used.all()
+    assert kept.records.marks[2].endswith("kept by the user")
     assert kept.warnings == ()
     dropped = estimate(path, drop=("hits/p7_1.csv",))
-    assert list(dropped.blows.used) == [False, True, False]
-    assert dropped.blows.marks[0] == "dropped by the user"
+    assert list(dropped.records.used) == [False, True, False]
+    assert dropped.records.marks[0] == "dropped by the user"
 
 
 def test_one_blow_of_a_file_may_be_dropped(tmp_path):
     force = np.zeros(3 * N_SAMPLES)
     for start, height in ((300, 100.0), (4400, 80.0), (8500, 110.0)):
         force += pulse(len(force), STEP_S, height=height, at_s=start * STEP_S)
-    write_csv(tmp_path / "hits" / "all.csv", blow(Structure(), force=force), STEP_S)
+    write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=force), STEP_S)
     result = estimate(write_test(tmp_path, HIT), drop=("hits/all.csv#2",))
-    assert list(result.blows.used) == [True, False, True]
+    assert list(result.records.used) == [True, False, True]
 
 
 def test_a_file_that_cannot_be_read_may_be_dropped(tmp_path):
@@ -229,7 +229,7 @@ def test_choices_that_make_no_sense_are_refused(tmp_path, options, says):
 
 
 def test_copies_of_one_blow_are_not_taken_for_clipped_ones(tmp_path):
-    assert list(estimate(hammer_campaign(tmp_path, heights=(100.0, 100.0))).blows.marks) == ["", ""]
+    assert list(estimate(hammer_campaign(tmp_path, heights=(100.0, 100.0))).records.marks) == ["", ""]
 
 
 def test_pulses_that_all_end_at_one_force_are_clipped(tmp_path):
@@ -242,8 +242,8 @@ def test_pulses_that_all_end_at_one_force_are_clipped(tmp_path):
         write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
     write_csv(tmp_path / "hits" / "9.csv", noisy(rng, height=80.0), STEP_S)
     result = estimate(write_test(tmp_path, HIT))
-    assert list(result.blows.used) == [False, False, False, True]
-    assert "equals another blow's to the last digit" in result.blows.marks[0]
+    assert list(result.records.used) == [False, False, False, True]
+    assert "equals another blow's to the last digit" in result.records.marks[0]
 
 
 @pytest.mark.parametrize("step_N", [0.5, 8.0])
@@ -254,13 +254,13 @@ def test_forces_in_coarse_digital_steps_are_not_clipped(tmp_path, step_N):
         signals[0] = step_N * np.round(signals[0] / step_N)
         write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
     result = estimate(write_test(tmp_path, HIT))
-    assert result.blows.used.all()
+    assert result.records.used.all()
 
 
 def test_all_blows_can_be_read_the_bad_ones_flagged(tmp_path):
     test = read_test(campaign(tmp_path, clipped))
-    every = list(read_blows(test, IngestOptions(), used_only=False))
-    used = list(read_blows(test, IngestOptions()))
+    every = list(read_records(test, IngestOptions(), used_only=False))
+    used = list(read_records(test, IngestOptions()))
     assert [one.used for one in every] == [True, True, False]
     assert [one.name for one in used] == [one.name for one in every[:2]]
     assert "clipping" in every[2].marks[0]
@@ -277,4 +277,4 @@ def test_frfs_of_others_have_no_blows(tmp_path):
     )
     path = write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
     with pytest.raises(InputError, match="has no recordings"):
-        list(read_blows(read_test(path), IngestOptions()))
+        list(read_records(read_test(path), IngestOptions()))

@@ -79,7 +79,7 @@ def test_long_csv(tmp_path):
     assert np.isnan(frfs.variance).all()
     assert np.isnan(frfs.coherence).all()
     assert list(frfs.averages) == [0, 0]
-    assert result.blows.empty
+    assert result.records.empty
 
 
 def test_coherence_and_variance_come_along(tmp_path):

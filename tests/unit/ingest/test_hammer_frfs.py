@@ -8,9 +8,9 @@ from frf_ipz.dofs import parse_dof
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.records import read_blows
+from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.survey.file_index import CELL
-from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
+from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
 EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle
 RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode is left after 2 s
@@ -52,9 +52,9 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     result = estimate(path)
     truncated = estimate(path, exponential_window_s=0.0)
     left = np.exp(-0.0006 * 2 * np.pi * 31.0 * (4096 / 2048 - 0.03))
-    assert result.blows.left_at_end.max() == pytest.approx(left, rel=0.05)
-    assert result.blows.marks.str.contains("cut-off decay").all()
-    assert result.blows.used.all()
+    assert result.records.left_at_end.max() == pytest.approx(left, rel=0.05)
+    assert result.records.marks.str.contains("cut-off decay").all()
+    assert result.records.used.all()
     assert errors(truncated, RINGING).max() > 0.5
     assert errors(result, RINGING).max() < 1e-3  # 0.03 % of the slowest mode remain, spread over a wider peak
     assert "exponential window" in result.choices[0]
@@ -73,14 +73,14 @@ def test_a_recording_that_starts_long_before_the_blow_is_cut_to_it(tmp_path):
     path = hammer_campaign(tmp_path, structure=structure, at_s=0.7, n_samples=8192)
     result = estimate(path)
     assert errors(result, structure).max() < EXACT
-    assert result.blows.trigger_s.max() < 0.3
-    assert result.blows.samples.max() < 8192
+    assert result.records.trigger_s.max() < 0.3
+    assert result.records.samples.max() < 8192
 
 
 def test_the_force_window_takes_out_the_noise_of_the_force(tmp_path):
     structure, rng = Structure(), np.random.default_rng(3)
     for number in range(6):
-        signals = blow(structure)
+        signals = impact(structure)
         signals[0] += 0.05 * rng.standard_normal(4096)
         write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
     path = write_test(tmp_path, HIT)
@@ -106,10 +106,10 @@ def test_several_blows_in_a_file_are_found_by_their_pulses(tmp_path):
     heights = np.zeros(5 * 4096)
     for start, height in zip((300, 4500, 8600, 12800, 17000), (100, 8.0, 70, 120, 90), strict=True):
         heights += pulse(len(heights), step_s, height=height, at_s=start * step_s)
-    write_csv(tmp_path / "hits" / "all.csv", blow(structure, force=heights), step_s)
+    write_csv(tmp_path / "hits" / "all.csv", impact(structure, force=heights), step_s)
     result = estimate(write_test(tmp_path, HIT))
-    assert list(result.blows.blow) == [f"hits/all.csv#{number}" for number in range(1, 6)]
-    assert result.blows.peak_force_N.to_numpy() == pytest.approx([100, 8, 70, 120, 90], rel=1e-3)
+    assert list(result.records.record) == [f"hits/all.csv#{number}" for number in range(1, 6)]
+    assert result.records.peak_force_N.to_numpy() == pytest.approx([100, 8, 70, 120, 90], rel=1e-3)
     assert list(result.frfs.averages) == [5, 5]
     assert errors(result, structure).max() < 2e-3  # what is left of the blow before
 
@@ -119,13 +119,13 @@ def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_th
     heights = np.zeros(3 * 4096)
     for start in (40, 4240, 8440):
         heights += pulse(len(heights), step_s, at_s=start * step_s)
-    write_csv(tmp_path / "hits" / "all.csv", blow(Structure(), force=heights), step_s)
+    write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=heights), step_s)
     test = read_test(write_test(tmp_path, HIT))
     result = estimate_frfs(test, IngestOptions())
-    first, *others = result.blows.trigger_s
+    first, *others = result.records.trigger_s
     assert first < 40 * step_s
     assert min(others) > 0.9 * CELL * step_s
-    observed = observe(test, IngestOptions(), result.frfs).blows
+    observed = observe(test, IngestOptions(), result.frfs).records
     assert [one.number for one in observed] == [1, 2, 3]
     assert [one.follows for one in observed] == [False, True, True]
     pulses = [one.start_s + one.step_s * np.argmax(one.force) for one in observed]
@@ -135,29 +135,29 @@ def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_th
 
 def test_a_short_blow_is_filled_up_with_zeros(tmp_path):
     path = hammer_campaign(tmp_path, structure=RINGING)
-    short = blow(RINGING, n_samples=2500)
+    short = impact(RINGING, n_samples=2500)
     write_csv(tmp_path / "hits" / "p7_02.csv", short, 1 / 2048)
     result = estimate(path, keep=("p7_02.csv",))
-    assert list(result.blows.samples) == [4096, 2500, 4096]
+    assert list(result.records.samples) == [4096, 2500, 4096]
     assert errors(result, RINGING).max() < 1e-3
 
 
 def test_recordings_whose_lengths_differ_by_a_little_are_used(tmp_path):
     path = hammer_campaign(tmp_path)
-    write_csv(tmp_path / "hits" / "p7_02.csv", blow(Structure(), n_samples=4090), 1 / 2048)
+    write_csv(tmp_path / "hits" / "p7_02.csv", impact(Structure(), n_samples=4090), 1 / 2048)
     assert errors(estimate(path), Structure()).max() < 1e-5
 
 
 def test_offsets_are_taken_off(tmp_path):
     structure = Structure()
     for number in range(3):
-        signals = blow(structure, height=100.0 + 20 * number)
+        signals = impact(structure, height=100.0 + 20 * number)
         signals += np.array([[2.0], [5.0], [-3.0]])
         write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
     result = estimate(write_test(tmp_path, HIT), exponential_window_s=0.3)
     assert errors(result, structure).max() < EXACT
-    assert "DC offset of acc_1: 5 m/s^2, taken off" in result.blows.marks[0]
-    assert "DC offset of force: 2 N" in result.blows.marks[0]
+    assert "DC offset of acc_1: 5 m/s^2, taken off" in result.records.marks[0]
+    assert "DC offset of force: 2 N" in result.records.marks[0]
 
 
 def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
@@ -166,9 +166,9 @@ def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
     heights = np.zeros(3 * 8192)
     for start in (400, 8592, 16784):
         heights += pulse(len(heights), step_s, at_s=start * step_s)
-    signals = blow(RINGING, force=heights, step_s=step_s)
+    signals = impact(RINGING, force=heights, step_s=step_s)
     write_csv(tmp_path / "hits" / "all.csv", signals + offsets, step_s)
-    recorded = list(read_blows(read_test(write_test(tmp_path, HIT)), IngestOptions()))
+    recorded = list(read_records(read_test(write_test(tmp_path, HIT)), IngestOptions()))
     assert len(recorded) == 3
     begins = len(heights) - sum(one.n_samples for one in recorded)
     for one in recorded:
@@ -180,7 +180,7 @@ def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
 def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):
     structure = Structure()
     for number in range(2):
-        write_csv(tmp_path / "hits" / f"p_{number}.csv", -blow(structure), 1 / 2048)
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", -impact(structure), 1 / 2048)
     path = write_test(tmp_path, HIT.replace("7:+z", "7:-z"))
     frfs = estimate(path).frfs
     assert frfs.labels[0].input_dof == parse_dof("7:-z")
@@ -190,8 +190,8 @@ def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):
 
 def test_a_roving_hammer_gives_a_column_for_every_struck_dof(tmp_path):
     structure, other = Structure(), Structure(shapes=((0.2, 0.4, 0.8), (0.9, -0.3, 0.1)))
-    write_csv(tmp_path / "a" / "1.csv", blow(structure), 1 / 2048)
-    write_csv(tmp_path / "b" / "1.csv", blow(other), 1 / 2048)
+    write_csv(tmp_path / "a" / "1.csv", impact(structure), 1 / 2048)
+    write_csv(tmp_path / "b" / "1.csv", impact(other), 1 / 2048)
     body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "9:-x"\nfiles = ["b/*.csv"]\n'
     result = estimate(write_test(tmp_path, body))
     values, measured = result.frfs.matrix()
@@ -206,7 +206,7 @@ def test_a_roving_sensor_gives_its_frfs_and_the_reference_one(tmp_path):
     first, second = Structure(), Structure(shapes=((1.0, 0.7, -0.5), (0.2, 0.9, 0.4)))
     for folder, structure in (("a", first), ("b", second)):
         for number in range(2):
-            write_csv(tmp_path / folder / f"{number}.csv", blow(structure, height=80.0 + 9 * number), 1 / 2048)
+            write_csv(tmp_path / folder / f"{number}.csv", impact(structure, height=80.0 + 9 * number), 1 / 2048)
     body = (
         '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n'
         '[[hit]]\ndof = "7:+z"\nfiles = ["b/*.csv"]\noutput_dofs = { acc_2 = "5:+z" }\n'
@@ -223,7 +223,7 @@ def test_a_roving_sensor_gives_its_frfs_and_the_reference_one(tmp_path):
 def test_units_and_sensitivities_are_brought_to_si(tmp_path):
     structure = Structure()
     for number in range(2):
-        signals = blow(structure)
+        signals = impact(structure)
         signals[0] /= 4.4482216152605  # in pounds-force
         signals[1:] *= 10.2 / 9.80665  # in mV of a sensor of 10.2 mV/g
         write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
@@ -288,7 +288,7 @@ def test_the_scatter_between_blows_is_what_the_variance_says(tmp_path):
 def test_a_response_may_be_a_rotation(tmp_path):
     structure = Structure()
     for number in range(2):
-        signals = blow(structure, height=90.0 + number)
+        signals = impact(structure, height=90.0 + number)
         signals[2] *= 1e3  # in mrad/s^2
         write_csv(tmp_path / "hits" / f"{number}.csv", signals, 1 / 2048)
     path = write_test(tmp_path, HIT)

@@ -7,7 +7,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.records import read_blows
+from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.signals.clipping import is_clipped
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 from synthetic_campaign import Structure, respond, write_csv, write_test
@@ -100,7 +100,7 @@ def test_records_from_rest_give_exact_frfs(tmp_path):
     assert result.frfs.window_decay_1_s == 0.0
     assert list(result.frfs.averages) == [4, 4]
     assert errors(result.frfs, light).max() < 1e-4
-    assert result.blows.used.all()
+    assert result.records.used.all()
 
 
 def test_an_exponential_window_may_be_asked_for(tmp_path):
@@ -161,8 +161,8 @@ def test_overload_of_a_record_is_left_out(tmp_path):
     limit = 0.4 * np.abs(records[1][1]).max()
     records[1][1] = np.clip(records[1][1], -limit, limit)
     result = estimate(write(tmp_path, records))
-    assert list(result.blows.used) == [True, False, True]
-    assert result.blows.marks[1] == "overload of acc_1"
+    assert list(result.records.used) == [True, False, True]
+    assert result.records.marks[1] == "overload of acc_1"
 
 
 @pytest.mark.parametrize("segment_s", [1e-3, 1e3])
@@ -174,7 +174,7 @@ def test_segments_that_cannot_be_are_refused(tmp_path, segment_s):
 
 def test_records_can_be_read_whole(tmp_path):
     signals = from_rest(np.random.default_rng(9), 8192)
-    (record,) = read_blows(read_test(write(tmp_path, [signals])), IngestOptions())
+    (record,) = read_records(read_test(write(tmp_path, [signals])), IngestOptions())
     assert record.rested
     np.testing.assert_allclose(record.force, signals[0], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(record.responses, signals[1:], rtol=1e-12, atol=1e-12)
@@ -210,7 +210,7 @@ def test_what_a_sweep_does_near_its_ends_counts_little(tmp_path):
     rng = np.random.default_rng(21)
     records = [sweep(rng, 8192), sweep(rng, 8192, band_hz=(10.0, 330.0)), sweep(rng, 8192)]
     result = estimate(write(tmp_path, records))
-    assert result.blows.used.all()
+    assert result.records.used.all()
     band = result.frfs.in_band(BAND_HZ)
     later = result.frfs.frequency_hz[band] > 60.0
     wrong = errors(result.frfs)

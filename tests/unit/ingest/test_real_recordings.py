@@ -25,20 +25,20 @@ def test_five_hammer_blows_are_coherent(recordings):
     result = estimate(recordings / "raw_hammer" / "test.toml")
     band = result.frfs.in_band((200.0, 1000.0))
     assert np.median(result.frfs.coherence[band]) >= 0.999
-    assert result.blows.used.all()
-    assert result.blows.peak_force_N.abs().between(68, 90).all()
-    assert result.blows.pulse_s.between(0.15e-3, 0.35e-3).all()
-    assert result.blows.second_pulse.max() == 0.0
+    assert result.records.used.all()
+    assert result.records.peak_force_N.abs().between(68, 90).all()
+    assert result.records.pulse_s.between(0.15e-3, 0.35e-3).all()
+    assert result.records.second_pulse.max() == 0.0
     assert list(result.frfs.averages) == [5]
 
 
 def test_the_variance_of_four_blows_foretells_the_fifth(recordings):
     """Each blow alone differs from the mean of the other four by as much as the variance and its weight say."""
     path = recordings / "raw_hammer" / "test.toml"
-    blows = estimate(path).blows
+    records = estimate(path).records
     ratios = []
-    for name, weight in zip(blows.blow, blows.weight, strict=True):
-        others = tuple(other for other in blows.blow if other != name)
+    for name, weight in zip(records.record, records.weight, strict=True):
+        others = tuple(other for other in records.record if other != name)
         windows = {"exponential_window_s": 0.1}
         alone, rest = estimate(path, drop=others, **windows).frfs, estimate(path, drop=(name,), **windows).frfs
         band = alone.in_band((200.0, 6000.0))

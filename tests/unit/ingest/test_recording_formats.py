@@ -8,10 +8,10 @@ from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.formats.text_layout import name_and_unit
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.signals.thinning import thin
-from synthetic_campaign import HIT, Structure, blow, write_csv, write_test
+from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
 
 STEP_S = 1 / 2048
-SIGNALS = blow(Structure(), n_samples=512)
+SIGNALS = impact(Structure(), n_samples=512)
 DIGITS = 1e-14  # relative: the numbers are written with all of their digits
 
 

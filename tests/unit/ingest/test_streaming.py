@@ -8,17 +8,17 @@ import pytest
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.records import read_blows
-from synthetic_campaign import HIT, Structure, blow, hammer_campaign, pulse, write_csv, write_test
+from frf_ipz.ingest.records import read_records
+from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
 STEP_S = 1 / 2048
 N_SAMPLES = 2048
 BYTES_OF_A_BLOW = 4 * 8 * N_SAMPLES
 
 
-def campaign(folder, blows):
-    signals = blow(Structure(), n_samples=N_SAMPLES)
-    for number in range(blows):
+def campaign(folder, records):
+    signals = impact(Structure(), n_samples=N_SAMPLES)
+    for number in range(records):
         write_csv(folder / "hits" / f"{number:03d}.csv", (1 + 0.01 * number) * signals, STEP_S)
     return read_test(write_test(folder, HIT))
 
@@ -43,12 +43,12 @@ def test_blows_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
     force = np.zeros(20 * 2048)
     for start in range(500, len(force), 2048):
         force += pulse(len(force), STEP_S, at_s=start * STEP_S)
-    write_csv(tmp_path / "hits" / "all.csv", blow(Structure(), force=force), STEP_S)
+    write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=force), STEP_S)
     test = read_test(write_test(tmp_path, HIT))
-    blows = read_blows(test, IngestOptions())
-    first = next(blows)
+    records = read_records(test, IngestOptions())
+    first = next(records)
     assert (first.name, first.n_samples) == ("hits/all.csv#1", pytest.approx(2048, abs=64))
-    assert sum(1 for _ in blows) == 19
+    assert sum(1 for _ in records) == 19
 
 
 def test_progress_rises_to_the_end(tmp_path):

@@ -3,12 +3,12 @@
 import pytest
 
 from frf_ipz.dofs import Dof
-from frf_ipz.ingest.campaign_file import read_test, run_labels
+from frf_ipz.ingest.campaign_file import read_test, setup_labels
 from frf_ipz.ingest.estimate import estimate_frfs
-from frf_ipz.ingest.frf_estimate import Recordings, Trace
+from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.survey.selection import is_named
-from synthetic_campaign import Structure, blow, hammer_campaign, write_csv, write_test
+from synthetic_campaign import Structure, hammer_campaign, impact, write_csv, write_test
 
 ROVING = """
 [[hit]]
@@ -23,7 +23,7 @@ output_dofs = { acc_2 = "5:-y" }
 
 @pytest.fixture
 def roving(tmp_path):
-    signals = blow(Structure(), n_samples=256)
+    signals = impact(Structure(), n_samples=256)
     for name in ("a/1", "b/1", "b/2", "b/3"):
         write_csv(tmp_path / f"{name}.csv", signals, 1 / 2048)
     path = write_test(
@@ -53,7 +53,7 @@ def test_a_test_without_a_name_is_called_after_its_folder(tmp_path):
 
 def test_a_roving_sensor_gives_its_own_labels(roving):
     test = read_test(roving)
-    assert [str(label) for label in run_labels(test.channels, test.runs[1])] == ["1:+z / 7:+z", "5:-y / 7:+z"]
+    assert [str(label) for label in setup_labels(test.channels, test.runs[1])] == ["1:+z / 7:+z", "5:-y / 7:+z"]
     assert [str(label) for label in test.labels] == ["1:+z / 7:+z", "2:+z / 7:+z", "5:-y / 7:+z"]
     assert test.labels[2].sign == -1
 
@@ -80,11 +80,11 @@ def test_tests_that_say_the_same_have_the_same_text(roving):
 
 def test_traces_are_drawn_of_every_force_and_some_responses(roving):
     result = estimate_frfs(read_test(roving), IngestOptions())
-    assert isinstance(result, Recordings)
+    assert isinstance(result, FrfEstimate)
     assert all(isinstance(trace, Trace) for trace in result.traces)
     forces = [trace for trace in result.traces if trace.unit == "N"]
     responses = [trace for trace in result.traces if trace.unit == "m/s^2"]
-    assert [trace.name for trace in forces] == list(result.blows.blow)
+    assert [trace.name for trace in forces] == list(result.records.record)
     assert {trace.channel for trace in responses} == {"acc_1", "acc_2"}
     assert max(trace.values.max() for trace in forces) == pytest.approx(100.0, rel=0.05)
 

@@ -8,7 +8,7 @@ from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.pipeline.inputs import read_job
+from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.sensors import without_sensors
 from synthetic_campaign import hammer_campaign, write_test
 
@@ -34,7 +34,7 @@ def sensors(frfs):
 def test_the_frfs_of_the_others_stay_as_they_were(campaign):
     test = read_test(campaign / "test.toml")
     both = estimate_frfs(test, OPTIONS).frfs
-    left = estimate_frfs(read_job(hiding(campaign, "1:z")).test, OPTIONS).frfs
+    left = estimate_frfs(read_inputs(hiding(campaign, "1:z")).test, OPTIONS).frfs
     assert (sensors(both), sensors(left)) == (["1:+z", "2:+z"], ["2:+z"])
     assert (left.values[:, 0] == both.values[:, 1]).all()
 
@@ -44,14 +44,14 @@ def test_a_diagnosis_sees_blows_without_it(campaign):
     seen = observe(test, OPTIONS, estimate_frfs(test, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
     whole = read_test(campaign / "test.toml")
     both = observe(whole, OPTIONS, estimate_frfs(whole, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
-    assert [[sensor.channel for sensor in blow.sensors] for blow in seen.blows] == [["acc_2"]] * 3
-    assert (seen.blows[0].responses[0] == both.blows[0].responses[1]).all()
+    assert [[sensor.channel for sensor in blow.sensors] for blow in seen.records] == [["acc_2"]] * 3
+    assert (seen.records[0].responses[0] == both.records[0].responses[1]).all()
 
 
 def test_a_known_mass_stays_where_it_is(campaign):
     path = campaign / "test.toml"
     path.write_text(path.read_text(encoding="utf-8").replace('dof = "1:+z"', 'dof = "1:+z"\nmass_kg = 0.004'))
-    assert read_job(hiding(campaign, "1:+z")).test.sensor_masses == {1: 0.004}
+    assert read_inputs(hiding(campaign, "1:+z")).test.sensor_masses == {1: 0.004}
 
 
 def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
@@ -59,7 +59,7 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
     head = "frequency_hz,output_dof,input_dof,real,imag"
     (tmp_path / "frf.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
     write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
-    frfs = estimate_frfs(read_job(hiding(tmp_path, "1:-z")).test, OPTIONS).frfs
+    frfs = estimate_frfs(read_inputs(hiding(tmp_path, "1:-z")).test, OPTIONS).frfs
     assert sensors(frfs) == ["2:+z"]
     assert frfs.values[0, 0] == 2.0
 
@@ -70,4 +70,4 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
 )
 def test_what_makes_no_sense_is_refused(campaign, dofs, said):
     with pytest.raises(FileFormatError, match=f"ingest.hide.*{said}"):
-        read_job(hiding(campaign, *dofs))
+        read_inputs(hiding(campaign, *dofs))

@@ -66,7 +66,7 @@ def test_a_run_without_a_law_has_no_picture_of_one():
 
 
 def test_the_force_of_a_law_is_drawn_where_no_blow_was_simulated(folder):
-    force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), blow=""))
+    force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), record=""))
     figure = draw("law", Folder(results={"diagnose": force_alone}, record={}, stale=()))
     assert figure.axes[0].get_ylabel() == "Force of the law, N"
 

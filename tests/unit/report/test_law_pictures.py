@@ -39,5 +39,5 @@ def test_the_force_is_drawn_over_motion_and_velocity():
 
 
 def test_where_blows_start_in_motion_the_force_is_all_there_is():
-    assert [picture.name for picture in law_pictures(replace(synthetic_law(), blow=""))] == ["law-force"]
+    assert [picture.name for picture in law_pictures(replace(synthetic_law(), record=""))] == ["law-force"]
     assert law_pictures(None) == []

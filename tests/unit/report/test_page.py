@@ -202,17 +202,17 @@ def test_a_fit_without_modes_and_an_update_without_targets_make_a_page(tmp_path)
 def test_records_of_a_shaker_are_drawn_from_their_start(tmp_path):
     folder = synthetic_folder(without=("fit", *MODEL_STAGES))
     recordings = folder.results["ingest"]
-    blows = recordings.blows[["blow", "used"]].assign(trigger_s=0.0)
-    folder.results["ingest"] = replace(recordings, blows=blows)
+    records = recordings.records[["record", "used"]].assign(trigger_s=0.0)
+    folder.results["ingest"] = replace(recordings, records=records)
     assert "Forces as recorded</figcaption>" in page_of(folder, tmp_path)
 
 
 def test_pulses_are_aligned_where_they_set_in(tmp_path):
     folder = synthetic_folder(without=("fit", *MODEL_STAGES))
     recordings = folder.results["ingest"]
-    folder.results["ingest"] = replace(recordings, blows=recordings.blows.assign(trigger_s=0.02))
+    folder.results["ingest"] = replace(recordings, records=recordings.records.assign(trigger_s=0.02))
     data = data_of(page_of(folder, tmp_path))
-    time_ms = np.frombuffer(base64.b64decode(data["arrays"][data["pictures"]["blows"]["data"][0]["x"]["$"]]), "<f4")
+    time_ms = np.frombuffer(base64.b64decode(data["arrays"][data["pictures"]["records"]["data"][0]["x"]["$"]]), "<f4")
     np.testing.assert_allclose(time_ms, 1e3 * (recordings.traces[0].time_s - 0.02), rtol=1e-6, atol=1e-5)  # in float32
 
 

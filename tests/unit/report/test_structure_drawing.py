@@ -8,7 +8,7 @@ from frf_ipz.report.structure_drawing import Marks, draw_structure
 from frf_ipz.structure import Geometry
 
 MARKS = Marks(
-    sensors=(parse_dof("3:+z"),), blows=(parse_dof("2:-z"),), points=(parse_dof("1:+z"),), missing={2: "added mass"}
+    sensors=(parse_dof("3:+z"),), records=(parse_dof("2:-z"),), points=(parse_dof("1:+z"),), missing={2: "added mass"}
 )
 
 

@@ -6,7 +6,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.inputs import read_job
+from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.show.app import build_app
 from frf_ipz.show.campaign import Place
 from frf_ipz.show.workbench import Workbench
@@ -25,7 +25,9 @@ def runs():
 @pytest.fixture
 def bench(demo, runs):
     return Workbench(
-        Place(folder=demo / "out", pipeline=demo / "pipeline.toml"), lambda path, _, **__: runs.append(path), read_job
+        Place(folder=demo / "out", pipeline=demo / "pipeline.toml"),
+        lambda path, _, **__: runs.append(path),
+        read_inputs,
     )
 
 

@@ -6,7 +6,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.inputs import read_job
+from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.run import run_pipeline
 from frf_ipz.show.app import build_app
 from frf_ipz.show.campaign import find_places
@@ -19,7 +19,7 @@ SOON_S = 120.0  # a whole run takes seconds
 
 
 def client_of(folder, run=None):
-    benches = [Workbench(place, run, read_job) for place in find_places(folder)]
+    benches = [Workbench(place, run, read_inputs) for place in find_places(folder)]
     app = build_app(benches, port=PORT, token=TOKEN)
     return TestClient(app, base_url=f"http://127.0.0.1:{PORT}", raise_server_exceptions=True), benches
 

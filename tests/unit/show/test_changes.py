@@ -128,7 +128,7 @@ def test_stretches_and_the_band():
 
 
 def test_blows_are_kept_dropped_and_left_to_the_checks():
-    drop = {"kind": "blow", "name": "hits/p18_03.csv", "use": "drop"}
+    drop = {"kind": "record", "name": "hits/p18_03.csv", "use": "drop"}
     text = after(drop)
     assert parse(text, PATH).ingest.drop == ("hits/p18_03.csv",)
     text = after({**drop, "use": "keep"}, text=text)
@@ -181,7 +181,7 @@ def test_text_of_others_cannot_break_out_of_its_string():
         ({"kind": "pin", "hz": float("nan")}, "is no frequency"),
         ({"kind": "pin", "hz": -3.0}, "is no frequency"),
         ({"kind": "leave", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
-        ({"kind": "blow", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
+        ({"kind": "record", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
         ({"kind": "point", "dof": "tip"}, "is no DOF label"),
         ({"kind": "sensor", "dof": "tip"}, "is no DOF label"),
         ({"kind": "retain", "dofs": ["9:z", "tip"]}, "is no DOF label"),

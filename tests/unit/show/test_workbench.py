@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from frf_ipz.errors import InputError
-from frf_ipz.pipeline.inputs import read_job
+from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.run import run_pipeline
 from frf_ipz.show.campaign import Place
 from frf_ipz.show.workbench import Workbench
@@ -27,7 +27,7 @@ def frequencies(folder):
 def test_a_struck_pole_is_gone_and_the_command_line_repeats_it(demo, tmp_path):
     out, pipeline = demo / "out", demo / "pipeline.toml"
     before, text = frequencies(out), pipeline.read_text(encoding="utf-8")
-    bench = Workbench(place_of(demo), run_pipeline, read_job)
+    bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     bench.change(STRIKE)
     bench.wait(SOON_S)
     assert bench.status.error == ""
@@ -40,7 +40,7 @@ def test_a_struck_pole_is_gone_and_the_command_line_repeats_it(demo, tmp_path):
 
 
 def test_only_what_depends_on_a_change_is_computed_anew(demo):
-    bench = Workbench(place_of(demo), run_pipeline, read_job)
+    bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     keys = []
     for dof in ("49:+z", "33:+z"):
         bench.change({"kind": "point", "dof": dof})
@@ -56,7 +56,7 @@ def test_only_what_depends_on_a_change_is_computed_anew(demo):
 def test_a_change_that_the_run_refuses_is_taken_back(demo):
     out, pipeline = demo / "out", demo / "pipeline.toml"
     text, poles = pipeline.read_bytes(), (out / "poles.parquet").read_bytes()
-    bench = Workbench(place_of(demo), run_pipeline, read_job)
+    bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     bench.change({"kind": "point", "dof": "4711:+z"})
     bench.wait(SOON_S)
     assert "no node 4711" in bench.status.error
@@ -72,7 +72,7 @@ def test_a_refused_change_leaves_what_another_program_wrote_meanwhile(demo):
         pipeline.write_text("# mine\n", encoding="utf-8")
         raise InputError("no")
 
-    bench = Workbench(place_of(demo), refuse, read_job)
+    bench = Workbench(place_of(demo), refuse, read_inputs)
     bench.change(STRIKE)
     bench.wait(SOON_S)
     assert pipeline.read_text(encoding="utf-8") == "# mine\n"
@@ -89,7 +89,7 @@ def test_a_change_during_a_run_is_refused_without_the_one_before_it(demo):
         if len(runs) == 2:
             raise InputError("no")
 
-    bench = Workbench(place_of(demo), run, read_job)
+    bench = Workbench(place_of(demo), run, read_inputs)
     bench.change(STRIKE)
     assert begun.wait(SOON_S)
     bench.change({"kind": "pin", "hz": 300.0})
@@ -101,7 +101,7 @@ def test_a_change_during_a_run_is_refused_without_the_one_before_it(demo):
 
 def test_nothing_is_written_for_a_change_that_makes_no_sense(demo):
     text = (demo / "pipeline.toml").read_bytes()
-    bench = Workbench(place_of(demo), run_pipeline, read_job)
+    bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     with pytest.raises(InputError, match="say why"):
         bench.change({"kind": "strike", "hz": 101.8})
     assert (demo / "pipeline.toml").read_bytes() == text
@@ -110,7 +110,7 @@ def test_nothing_is_written_for_a_change_that_makes_no_sense(demo):
 
 def test_without_its_pipeline_file_a_run_can_be_read_only(demo):
     (demo / "pipeline.toml").unlink()
-    bench = Workbench(place_of(demo), run_pipeline, read_job)
+    bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     assert bench.contents().fit is not None
     with pytest.raises(InputError, match="is gone"):
         bench.change(STRIKE)

@@ -185,7 +185,7 @@ def test_parameters_that_a_diagnosis_has_chosen_find_the_truth(method):
     factors[list(elements)] = 0.8
     truth, labels = Truth(scaled(case.nominal, factors), case.damping), labels_of(case)
     band = band_of(truth, case.n_modes)
-    ends = {"actuators": case.blows, "sensors": case.sensors, "points": case.points}
+    ends = {"actuators": case.input_dofs, "sensors": case.sensors, "points": case.points}
     reduced = reduce_model(case.nominal, ReduceOptions(), band_hz=band, **ends)
     fit = synthetic_fit(truth, labels, band, noise=1e-4, rng=np.random.default_rng(0))
     bench = replace(set_up(21), reduced=reduced, fit=fit, pairs=pair(fit, reduced))

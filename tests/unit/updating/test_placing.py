@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.misplacements import misplacements
-from frf_ipz.updating.position_uncertainty import Misplacement, with_misplacements
+from frf_ipz.updating.position_uncertainty import PositionUncertainty, with_position_uncertainty
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.study import set_up
@@ -28,7 +28,7 @@ def test_zeros_move_as_those_of_a_model_with_other_rows(bench):
     row = SMALL * np.random.default_rng(0).standard_normal(len(problem.model.dofs))
     for dof, is_output in ((label.output_dof, True), (label.input_dof, False)):
         only = replace(problem, covariance=np.zeros_like(problem.covariance))
-        found = with_misplacements(only, (Misplacement(dof=dof, is_output=is_output, row=row),))
+        found = with_position_uncertainty(only, (PositionUncertainty(dof=dof, is_output=is_output, row=row),))
         moved = _zeros_with(problem, dof, is_output, row) - problem.computed
         parts = np.stack([moved.real, moved.imag], axis=1).ravel()
         expected = np.outer(parts, parts)
@@ -67,7 +67,7 @@ def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are()
     ends = {(label.output_dof, True) for label in bench.fit.labels} | {(x.input_dof, False) for x in bench.fit.labels}
     assert {(one.dof, one.is_output) for one in off} == ends
     problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
-    wider = with_misplacements(problem, off) - problem.covariance
+    wider = with_position_uncertainty(problem, off) - problem.covariance
     zeros = np.repeat(problem.frf >= 0, 2)
     assert np.all(np.diagonal(wider)[zeros] >= 0)
     assert np.diagonal(wider)[zeros].max() > np.diagonal(problem.covariance)[zeros].min()

@@ -5,7 +5,7 @@ has and within which bounds, and what it changes for given numbers; everything e
 report) follows from that. A class in a user's own file does the same::
 
     # my_effects.py, named in pipeline.toml: [diagnose] extra_effects = ["my_effects.py:Sloshing"]
-    from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Sketch, at_nodes
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Signature, at_nodes
     from frf_ipz.diagnosis.physics.change import Attachment, Change
 
     class Sloshing(Effect):
@@ -30,7 +30,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.diagnosis.physics.change import Change
 
@@ -92,7 +92,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sketch:
+class Signature:
     """An effect as one dynamic stiffness on one motion, for a fast search.
 
     Parameters
@@ -128,15 +128,15 @@ class Effect(ABC):
     """Something with dynamics of its own hangs at a place: two of that kind at one place imitate much."""
 
     @abstractmethod
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Say where the effect could sit: nowhere if it does not apply to this kind of model."""
 
     @abstractmethod
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Say which numbers it has there."""
 
     @abstractmethod
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Give what changes the model or the measuring chain, for values of the parameters."""
 
     def chain(self, place: Place) -> Builder | None:
@@ -145,19 +145,19 @@ class Effect(ABC):
         return None
 
     @abstractmethod
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say to the user what it is and where, in one sentence."""
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch | None:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
         """Give the effect as one dynamic stiffness, if it is one; else it is searched by `starts`."""
         del specimen, place
         return None
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Give values to start from, (n_starts, n_parameters): a grid over the bounds unless it knows better."""
         return grid(self.parameters(specimen, place), 8)
 
-    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
         """Say how likely values at a place are beside what is stated by bounds and the number of places, nats."""
         del specimen, place, values
         return 0.0
@@ -172,12 +172,12 @@ class Effect(ABC):
         del place, name
         return value
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Places beside one, to look at when it is nearly right."""
         del specimen, place
         return ()
 
-    def around(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def around(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Places further around one, with the same parameters; the best few are looked at if none beside is better."""
         del specimen, place
         return ()
@@ -207,12 +207,12 @@ def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
     return np.array(list(product(*axes))).reshape(count ** len(axes), len(axes))
 
 
-def at_nodes(specimen: Specimen) -> list[Place]:
+def at_nodes(specimen: ModelContext) -> list[Place]:
     """Every node that can move in a direction of the test.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
 
     Returns
@@ -223,12 +223,12 @@ def at_nodes(specimen: Specimen) -> list[Place]:
     return [Place(key=(dof.node, dof.direction), location={"nodes": [dof.node]}) for dof in specimen.moving_dofs]
 
 
-def beside_node(specimen: Specimen, place: Place) -> list[Place]:
+def beside_node(specimen: ModelContext, place: Place) -> list[Place]:
     """Nodes next to one.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     place : Place
         A place of `at_nodes`.

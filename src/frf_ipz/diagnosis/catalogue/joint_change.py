@@ -10,16 +10,16 @@ import numpy as np
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Place
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.physics.change import Change
 
 
-def build_together(specimen: Specimen, effects: Sequence[tuple[Effect, Place]]) -> tuple[Builder, ...]:
+def build_together(specimen: ModelContext, effects: Sequence[tuple[Effect, Place]]) -> tuple[Builder, ...]:
     """Prepare effects that act together: where one exchanges the model, the others change the new one.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     effects : sequence of (Effect, Place)
         What acts, and where.
@@ -41,12 +41,12 @@ def build_together(specimen: Specimen, effects: Sequence[tuple[Effect, Place]]) 
     return tuple(builders)
 
 
-def typical_change(specimen: Specimen, effect: Effect, place: Place, build: Builder) -> Change:
+def typical_change(specimen: ModelContext, effect: Effect, place: Place, build: Builder) -> Change:
     """Give what an effect changes at typical values of its parameters.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     effect : Effect
         What acts.

@@ -22,7 +22,7 @@ NEAREST = 8  # nodes that count as neighbours where nodes are not in a row
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Specimen:
+class ModelContext:
     """A structure on its test bench.
 
     Parameters

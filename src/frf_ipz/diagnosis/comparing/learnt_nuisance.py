@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.response import Modes
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
     from frf_ipz.structure import StructuralModel
 
 HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that
@@ -116,12 +116,12 @@ def _fits(before: Sequence[tuple[State, Source]], options: CompareOptions) -> tu
         errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
 
 
-def fit_from_peaks(bench: Bench, source: Source) -> Fit:
+def fit_from_peaks(bench: InferenceProblem, source: Source) -> Fit:
     """Fit the model from the frequencies and damping that peaks of the measurement show: a model may be far off.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         To fit the model.
     source : Source
         What was measured.
@@ -148,7 +148,9 @@ def fit_from_peaks(bench: Bench, source: Source) -> Fit:
     return min(fits, key=lambda fit: fit.cost)
 
 
-def bench_of(state: State, source: Source, options: DiagnoseOptions, errors: DiagnoseOptions | None = None) -> Bench:
+def bench_of(
+    state: State, source: Source, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
+) -> InferenceProblem:
     """Bring a state's model and measurement together, with no effects to look for.
 
     Parameters
@@ -164,7 +166,7 @@ def bench_of(state: State, source: Source, options: DiagnoseOptions, errors: Dia
 
     Returns
     -------
-    Bench
+    InferenceProblem
         To fit the model.
     """
     frfs = state.observed.frfs

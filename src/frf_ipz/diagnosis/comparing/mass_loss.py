@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import StructuralModel
 
@@ -28,42 +28,42 @@ class MassLoss(Effect):
     name = "mass_loss"
     imitators = ("local_stiffness", "added_mass")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that has something to lose."""
         least = WORTH_A_LOOK * specimen.mass_kg
         first = {place.key[0]: place for place in reversed(at_nodes(specimen))}
         had = _mass_there(specimen.model, [str(place.key[1]) for place in first.values()], list(first))
         return [place for place, mass in sorted(zip(first.values(), had, strict=True), key=_by_node) if mass > least]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Mass, at most what the node has."""
         (had,) = _mass_there(specimen.model, [str(place.key[1])], [place.key[0]])
         return (Parameter(name="mass_kg", low=SMALLEST * specimen.mass_kg, high=MOST * had),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Less mass in all translational directions of the node."""
         model = specimen.model
         unit = with_point_masses(model, {int(str(place.key[0])): 1.0}).mass_all - model.mass_all
         return lambda values: Change(mass=-values[0] * unit)
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """-s^2 m against the direction of the test."""
         node, direction = place.key
         dof = next(d for d in specimen.moving_dofs if (d.node, d.direction) == (node, direction))
         (parameter,) = self.parameters(specimen, place)
-        return Sketch(
+        return Signature(
             motion=specimen.unit(dof),
             shapes=-(specimen.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,
         )
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside that have something to lose."""
         known = {other.key for other in self.places(specimen)}
         return [other for other in beside_node(specimen, place) if other.key in known]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much is gone from where."""
         mass = values["mass_kg"]
         return (

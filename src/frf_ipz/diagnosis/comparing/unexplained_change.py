@@ -91,22 +91,22 @@ def trusted(observed: Observations, gains: Mapping[str, float], missed: Missed |
     part = np.stack([np.interp(frfs.frequency_hz, missed.frequency_hz, column) for column in missed.part.T], axis=1)
     known = np.where(np.isfinite(frfs.variance), frfs.variance, 0.0)
     variance = known + ALIKE * (part * np.abs(frfs.values)) ** 2
-    return replace(plain, kind="frf", blows=(), frfs=replace(frfs, variance=variance))
+    return replace(plain, kind="frf", records=(), frfs=replace(frfs, variance=variance))
 
 
 def _without_gains(observed: Observations, gains: Mapping[str, float]) -> Observations:
-    blows = tuple(
+    records = tuple(
         replace(
-            blow,
-            force=blow.force / gains.get(blow.input_channel, 1.0),
-            responses=blow.responses / np.array([[gains.get(sensor.channel, 1.0)] for sensor in blow.sensors]),
+            record,
+            force=record.force / gains.get(record.input_channel, 1.0),
+            responses=record.responses / np.array([[gains.get(sensor.channel, 1.0)] for sensor in record.sensors]),
         )
-        for blow in observed.blows
+        for record in observed.records
     )
     frfs = observed.frfs
     if frfs is None:
-        return replace(observed, blows=blows)
+        return replace(observed, records=records)
     layout = lay_out(frfs.labels)
     factors = np.exp(-layout.gain_signs @ np.log([gains.get(channel, 1.0) for channel in layout.channels]))
     scaled = replace(frfs, values=frfs.values * factors, variance=frfs.variance * factors**2)
-    return replace(observed, blows=blows, frfs=scaled)
+    return replace(observed, records=records, frfs=scaled)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import Gate
+from frf_ipz.diagnosis.diagnosis import DataCheck
 from frf_ipz.diagnosis.measured.forces import cut_off
 from frf_ipz.diagnosis.measured.from_impacts import Survey
 from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs
@@ -24,7 +24,7 @@ BEFORE = 100  # samples before a blow that hold all ringing
 EXCHANGED = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
 
 
-def check(source: Source, linearity: Linearity | None) -> tuple[Gate, ...]:
+def check(source: Source, linearity: Linearity | None) -> tuple[DataCheck, ...]:
     """Check a measurement.
 
     Parameters
@@ -36,20 +36,20 @@ def check(source: Source, linearity: Linearity | None) -> tuple[Gate, ...]:
 
     Returns
     -------
-    tuple of Gate
+    tuple of DataCheck
         Homogeneity, reciprocity, coherence.
     """
     return homogeneity(linearity), reciprocity(source.training), coherence(source.training)
 
 
-def warn(source: Source, gates: tuple[Gate, ...]) -> tuple[str, ...]:
+def warn(source: Source, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     """Say what a user has to know before they believe a diagnosis.
 
     Parameters
     ----------
     source : Source
         What was measured.
-    gates : tuple of Gate
+    gates : tuple of DataCheck
         As `check` gives them.
 
     Returns
@@ -74,12 +74,12 @@ def _late(source: Source) -> tuple[str, ...]:
     """Say which records begin within the ringing that the converter's filter makes before a blow."""
     if source.kind != "hammer" or not isinstance(source.survey, Survey):
         return ()
-    blows = [blow for group in source.survey.groups for blow in group]
+    records = [record for group in source.survey.groups for record in group]
     pulses = [pulse for group in source.survey.pulses for pulse in group]
     late = [
-        blow.name
-        for blow, pulse in zip(blows, pulses, strict=True)
-        if cut_off(pulse, blow.responses)[0] > RINGS * blow.level
+        record.name
+        for record, pulse in zip(records, pulses, strict=True)
+        if cut_off(pulse, record.responses)[0] > RINGS * record.level
     ]
     if not late:
         return ()
@@ -89,7 +89,7 @@ def _late(source: Source) -> tuple[str, ...]:
     )
 
 
-def homogeneity(linearity: Linearity | None) -> Gate:
+def homogeneity(linearity: Linearity | None) -> DataCheck:
     """Say whether strong and weak blows agree.
 
     Parameters
@@ -99,22 +99,22 @@ def homogeneity(linearity: Linearity | None) -> Gate:
 
     Returns
     -------
-    Gate
+    DataCheck
         Not checked where no place has two blows.
     """
     if linearity is None:
         statement = "Linearity could not be checked: no place has two blows or records."
-        return Gate(name="homogeneity", value=np.nan, limit=np.nan, statement=statement)
+        return DataCheck(name="homogeneity", value=np.nan, limit=np.nan, statement=statement)
     statement = (
         f"Blows do not agree with one linear system, {linearity.score:.3g} times worse than noise explains: something "
         "is not linear, or the structure changed from blow to blow."
         if linearity.is_nonlinear
         else "Blows of all levels agree with one linear system."
     )
-    return Gate(name="homogeneity", value=linearity.score, limit=linearity.limit, statement=statement)
+    return DataCheck(name="homogeneity", value=linearity.score, limit=linearity.limit, statement=statement)
 
 
-def reciprocity(measured: Measured) -> Gate:
+def reciprocity(measured: Measured) -> DataCheck:
     """Compare FRFs whose sensor and blow change places.
 
     Parameters
@@ -124,7 +124,7 @@ def reciprocity(measured: Measured) -> Gate:
 
     Returns
     -------
-    Gate
+    DataCheck
         Not checked where no pair was measured both ways.
     """
     ends = [(label.output_dof.unsigned, label.input_dof.unsigned) for label in measured.labels]
@@ -135,7 +135,7 @@ def reciprocity(measured: Measured) -> Gate:
             if ends[other] == (struck, output) and output != struck and same:
                 ratios.append(_exchanged(measured, index, other))
     if not ratios:
-        return Gate(
+        return DataCheck(
             name="reciprocity",
             value=np.nan,
             limit=RECIPROCAL,
@@ -149,7 +149,7 @@ def reciprocity(measured: Measured) -> Gate:
         else f"FRFs differ with sensor and blow exchanged, {value:.3g} times more than noise and tolerances explain: a "
         "place, a gain or a delay is wrong, or something is not linear."
     )
-    return Gate(name="reciprocity", value=value, limit=RECIPROCAL, statement=statement)
+    return DataCheck(name="reciprocity", value=value, limit=RECIPROCAL, statement=statement)
 
 
 def _exchanged(measured: Measured, first: int, second: int) -> float:
@@ -160,7 +160,7 @@ def _exchanged(measured: Measured, first: int, second: int) -> float:
     return float(np.mean(np.abs(difference) ** 2 / noise))
 
 
-def coherence(measured: Measured) -> Gate:
+def coherence(measured: Measured) -> DataCheck:
     """Compare noise with signal.
 
     Parameters
@@ -170,7 +170,7 @@ def coherence(measured: Measured) -> Gate:
 
     Returns
     -------
-    Gate
+    DataCheck
         Of the worst FRF.
     """
     share = np.median(_noise(measured) / np.maximum(measured.size**2, np.finfo(float).tiny), axis=0)
@@ -182,7 +182,7 @@ def coherence(measured: Measured) -> Gate:
         else f"The FRF {measured.labels[worst]} drowns in noise over half of the band or more: strike harder, average "
         "more, or leave it out."
     )
-    return Gate(name="coherence", value=value, limit=COHERENT, statement=statement)
+    return DataCheck(name="coherence", value=value, limit=COHERENT, statement=statement)
 
 
 def _noise(measured: Measured) -> FloatArray:

@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search, search
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
 
 STRAINED = 0.75  # score of a cause that explains, but may stand for two others: 3 of 89 single ones had more
@@ -54,12 +54,12 @@ class Decision:
     another: Fit | None = None
 
 
-def decide(bench: Bench, progress: Progress) -> Decision:
+def decide(bench: InferenceProblem, progress: Progress) -> Decision:
     """Search, and decide what is missing.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data, model and effects.
     progress : Progress
         Told how far it is.
@@ -103,13 +103,13 @@ def decide(bench: Bench, progress: Progress) -> Decision:
     return three if three is not None and three.verdict == EXPLAINED else two
 
 
-def _needed(bench: Bench, null_good: Goodness, best: Fit) -> float:
+def _needed(bench: InferenceProblem, null_good: Goodness, best: Fit) -> float:
     """Evidence that a first cause must have: where it leaves less of a piece, errors there are not underrated."""
     left = goodness(bench, best).times_underrated
     return null_good.needed_nats * min(1.0, left / null_good.times_underrated)
 
 
-def _enough(bench: Bench, one: Decision) -> Decision:
+def _enough(bench: InferenceProblem, one: Decision) -> Decision:
     """Take a cause that leaves nothing to explain, if it explains anything, and what explains much beside it."""
     least = min(FOUND_NATS, LIMITS[bench.kind].second_nats)  # the nominal model does not explain: what is likelier does
     if not one.null_good.is_good and gain_over(one.final, one.null) < least:
@@ -121,12 +121,12 @@ def _enough(bench: Bench, one: Decision) -> Decision:
     return two or one
 
 
-def _two_at_once(bench: Bench, ranking: Ranking) -> Ranking:
+def _two_at_once(bench: InferenceProblem, ranking: Ranking) -> Ranking:
     """Search for two causes of which neither need be the best one alone."""
     return settle_ties(bench, search_second(bench, ranking, lambda fit: goodness(bench, fit).is_good))
 
 
-def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
+def _one_is_enough(bench: InferenceProblem, one: Decision, both: Fit) -> Decision | None:
     """Leave out a cause beside which the other one explains as much: it only helped to find it."""
     for number in range(2):
         alone = fit_without(bench, both, number)
@@ -137,7 +137,7 @@ def _one_is_enough(bench: Bench, one: Decision, both: Fit) -> Decision | None:
     return None
 
 
-def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
+def _beside(bench: InferenceProblem, found: Decision, ranking: Ranking) -> Decision | None:
     """Take a further cause, if it explains much."""
     if not ranking.fits:
         return None
@@ -152,12 +152,12 @@ def _beside(bench: Bench, found: Decision, ranking: Ranking) -> Decision | None:
     return replace(found, verdict=verdict, final=ranking.best, further=(*found.further, ranking), good=good)
 
 
-def only_null(bench: Bench) -> Decision:
+def only_null(bench: InferenceProblem) -> Decision:
     """Fit the nominal model and search for nothing.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and model.
 
     Returns
@@ -172,12 +172,12 @@ def only_null(bench: Bench) -> Decision:
     return Decision(verdict=verdict, null=null, final=null, ranking=nothing, further=(), good=good, null_good=good)
 
 
-def without_last(bench: Bench, found: Decision) -> Decision:
+def without_last(bench: InferenceProblem, found: Decision) -> Decision:
     """Leave out the last cause.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and model.
     found : Decision
         With one cause or more.
@@ -192,12 +192,12 @@ def without_last(bench: Bench, found: Decision) -> Decision:
     return replace(found, verdict=UNEXPLAINED, final=fit, further=left, good=goodness(bench, fit))
 
 
-def fit_without(bench: Bench, fit: Fit, number: int) -> Fit:
+def fit_without(bench: InferenceProblem, fit: Fit, number: int) -> Fit:
     """Fit all causes of a fit but one: what that one explains beside the others.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and model.
     fit : Fit
         With several causes.

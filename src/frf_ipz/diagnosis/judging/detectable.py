@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 PLACES = 2  # of each effect, spread over the structure
 STEPS = 5  # halvings of the range
 
 
-def detectable_sizes(bench: Bench, null: Fit, needed_nats: float) -> dict[str, dict[str, float]]:
+def detectable_sizes(bench: InferenceProblem, null: Fit, needed_nats: float) -> dict[str, dict[str, float]]:
     """Find the size at which each effect changes the FRFs by more than noise and tolerances can explain.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         The measurement.
     null : Fit
         Of the nominal model.
@@ -53,13 +53,13 @@ def detectable_sizes(bench: Bench, null: Fit, needed_nats: float) -> dict[str, d
     return found
 
 
-def _some_places(bench: Bench, effect: Effect) -> list[Cause]:
+def _some_places(bench: InferenceProblem, effect: Effect) -> list[Cause]:
     places = list(effect.places(bench.specimen))
     chosen = places[:: -(-len(places) // PLACES)] if places else []
     return [Cause(effect=effect, place=place, n_places=len(places)) for place in chosen]
 
 
-def _evidence(bench: Bench, null: Fit) -> Callable[[Hypothesis, FloatArray], float]:
+def _evidence(bench: InferenceProblem, null: Fit) -> Callable[[Hypothesis, FloatArray], float]:
     """Half the squared norm of a change that no scatter explains."""
     data, nothing = bench.data, np.zeros(bench.nuisance.size)
     nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
@@ -76,7 +76,11 @@ def _evidence(bench: Bench, null: Fit) -> Callable[[Hypothesis, FloatArray], flo
 
 
 def _smallest(
-    bench: Bench, effect: Effect, cause: Cause, measure: Callable[[Hypothesis, FloatArray], float], needed_nats: float
+    bench: InferenceProblem,
+    effect: Effect,
+    cause: Cause,
+    measure: Callable[[Hypothesis, FloatArray], float],
+    needed_nats: float,
 ) -> tuple[str, float, float] | None:
     """Name, value and relative size of the first parameter at the threshold; None where there is none."""
     parameters = effect.parameters(bench.specimen, cause.place)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.fit import Data, Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 BANDS = 6  # pieces of the band, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations
@@ -43,12 +43,12 @@ class Proof:
     curves: Curves
 
 
-def prove(bench: Bench, held_out: Data, null: Fit, final: Fit) -> Proof:
+def prove(bench: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Proof:
     """Compare models with what was fitted and what was not.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With what was fitted.
     held_out : Data
         What was not.
@@ -136,12 +136,12 @@ def _relative(wrong: ComplexArray, measured: ComplexArray) -> float:
     return float(np.linalg.norm(wrong) / np.linalg.norm(measured))
 
 
-def disagreement(bench: Bench, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
+def disagreement(bench: InferenceProblem, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
     """Say where the nominal model disagrees, beyond noise and what its tolerances allow.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With what was fitted.
     null : Fit
         Of the nominal model.

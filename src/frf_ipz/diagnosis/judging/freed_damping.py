@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.search.fit import Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 OF_MODES = ("damping_level", "structural_damping")
 ANY = 20.0  # relative tolerance of damping ratios: more than a factor of ten
 MOSTLY = 0.5  # of all pulls
 
 
-def is_damping_alone(bench: Bench, found: Decision) -> bool:
+def is_damping_alone(bench: InferenceProblem, found: Decision) -> bool:
     """Tell whether damping ratios are what the tolerances do not allow.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and model.
     found : Decision
         Unexplained.
@@ -47,7 +47,7 @@ def is_damping_alone(bench: Bench, found: Decision) -> bool:
     return any(_is_of_damping(bench, fit) for fit in suspects)
 
 
-def _is_of_damping(bench: Bench, fit: Fit) -> bool:
+def _is_of_damping(bench: InferenceProblem, fit: Fit) -> bool:
     pulls, _ = bench.nuisance.pulls(fit.unknown)
     own = float(np.sum(pulls[bench.nuisance.damping_places] ** 2))
     return own > max(goodness(bench, fit).most_pull, MOSTLY * fit.pull)
@@ -69,17 +69,17 @@ def with_any_damping(options: DiagnoseOptions) -> DiagnoseOptions:
     return replace(options, damping_tolerance=max(ANY, options.damping_tolerance))
 
 
-def without_level(bench: Bench) -> Bench:
+def without_level(bench: InferenceProblem) -> InferenceProblem:
     """Leave out what damping ratios that may be anything stand for.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With damping left free.
 
     Returns
     -------
-    Bench
+    InferenceProblem
         Without the effects of modal damping.
     """
     kept = {name: effect for name, effect in bench.effects.items() if name not in OF_MODES}

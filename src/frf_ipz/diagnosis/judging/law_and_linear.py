@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.judging.decision import Decision
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
     from frf_ipz.structure import StructuralModel
 
 MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
@@ -37,7 +37,7 @@ EASED = 0.5  # times the strain: what a linear cause beside a law must come down
 
 
 def search_beside_linear(
-    bench: Bench,
+    bench: InferenceProblem,
     linear: Decision,
     alone: LawSearch,
     model: StructuralModel,
@@ -48,7 +48,7 @@ def search_beside_linear(
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data, model and linear effects.
     linear : Decision
         What a linear search came to; where none was made, it is made here.
@@ -85,7 +85,7 @@ def search_beside_linear(
 
 
 def search_beside_law(
-    bench_of: Callable[[Observations], Bench],
+    bench_of: Callable[[Observations], InferenceProblem],
     laws: LawSearch,
     model: StructuralModel,
     observations: Observations,
@@ -144,8 +144,8 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
         without = without_law(without_dispersion(observations, laws.dispersion_rad), laws.freedom, laws.fit)
     sizes = [
-        [np.abs(blow.responses).max(initial=0.0) for blow in both]
-        for both in zip(without.blows, observations.blows, strict=True)
+        [np.abs(record.responses).max(initial=0.0) for record in both]
+        for both in zip(without.records, observations.records, strict=True)
     ]
     runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)
     return None if runs_away else without

@@ -16,19 +16,19 @@ from frf_ipz.diagnosis.search.inference_problem import weights_of
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.search.fit import Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 ERROR = 0.01  # of an FRF's size: what counts as a misfit
 FEWEST_FRFS = 2
 TELLS = 0.1  # of the misfit: a node that explains less tells nothing
 
 
-def trace(bench: Bench, null: Fit) -> dict[str, list[int]]:
+def trace(bench: InferenceProblem, null: Fit) -> dict[str, list[int]]:
     """Trace the misfit of the nominal model to a node.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With the data.
     null : Fit
         Of the nominal model.
@@ -46,7 +46,7 @@ def trace(bench: Bench, null: Fit) -> dict[str, list[int]]:
     return {"nodes": [dofs[best].node]} if left[best] < (1 - TELLS) * before else {}
 
 
-def _misfits(bench: Bench, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
+def _misfits(bench: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
     """Robust misfit without and with a free dynamic stiffness on each of some motions."""
     is_near = null.is_nearly_right
     data = bench.thin.measured if is_near else bench.coarse

@@ -9,18 +9,18 @@ import numpy as np
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.search.fit import Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 MOST_CANDIDATES = 60
 TELLS = 0.02  # relative difference of FRFs that a measurement shows beyond doubt
 
 
-def best_sensor(bench: Bench, first: Fit, second: Fit) -> str:
+def best_sensor(bench: InferenceProblem, first: Fit, second: Fit) -> str:
     """Find the place at which two explanations predict the most different FRFs.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With the test as it is.
     first, second : Fit
         The explanations.
@@ -38,14 +38,14 @@ def best_sensor(bench: Bench, first: Fit, second: Fit) -> str:
     size = np.sqrt(np.mean(np.abs(one) ** 2, axis=0))
     apart = np.sqrt(np.mean(np.abs(one - other) ** 2, axis=0)) / np.maximum(size, 1e-3 * size.max())
     sensor, struck = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    where, blow = specimen.where(dofs[int(sensor)].node), specimen.layout.inputs[int(struck)]
+    where, record = specimen.where(dofs[int(sensor)].node), specimen.layout.inputs[int(struck)]
     if apart[sensor, struck] < TELLS:
         return (
             "No further sensor in the directions of this test tells them apart; that takes a wider band, or another "
             "kind of test."
         )
     return (
-        f"A sensor at {where} with the blow at {blow} tells them apart: there they predict FRFs that differ by "
+        f"A sensor at {where} with the blow at {record} tells them apart: there they predict FRFs that differ by "
         f"{100 * float(apart[sensor, struck]):.2g} %."
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.diagnosis.physics.layout import extents
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
 
@@ -49,7 +49,7 @@ def another_kind(fit: Fit) -> str:
     return next((doubt for doubt in hypothesis.doubts(fit.values) if doubt), "")
 
 
-def _at_one_place(specimen: Specimen, first: Cause, second: Cause) -> bool:
+def _at_one_place(specimen: ModelContext, first: Cause, second: Cause) -> bool:
     nodes = [_nodes(cause) for cause in (first, second)]
     if nodes[0] & nodes[1]:
         return True
@@ -65,5 +65,5 @@ def _nodes(cause: Cause) -> set[int]:
     return {int(node) for node in named} if isinstance(named, list) else set()
 
 
-def _apart(specimen: Specimen, first: int, second: int) -> float:
+def _apart(specimen: ModelContext, first: int, second: int) -> float:
     return float(np.linalg.norm(specimen.positions[first] - specimen.positions[second]))

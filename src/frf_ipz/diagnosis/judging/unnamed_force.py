@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.global_scan.signatures import Start
     from frf_ipz.diagnosis.search.global_scan.starts import Supposed
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 KINDS: tuple[LocalForce, ...] = (PowerLaw(), NegativeSpring())
 FITTED = 5  # places with large errors
 FAR_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
 
 
-def find_another(bench: Bench, found: Decision) -> Fit | None:
+def find_unnamed_force(bench: InferenceProblem, found: Decision) -> Fit | None:
     """Look for one force that explains more than what was found, or as much as several causes.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and model.
     found : Decision
         With one cause or more.
@@ -54,7 +54,7 @@ def find_another(bench: Bench, found: Decision) -> Fit | None:
     return max((fit for fit in fits if fit.log_evidence > needed), key=lambda fit: fit.log_evidence, default=None)
 
 
-def _best_of(bench: Bench, null: Fit, kind: LocalForce, bar: float) -> Fit | None:
+def _best_of(bench: InferenceProblem, null: Fit, kind: LocalForce, bar: float) -> Fit | None:
     """Fit a kind of force at its best place; none where its cost with large errors is above a bar."""
     only = replace(bench, effects={kind.name: kind})
     refined = refine_far(only, null, wide_search(only, null))
@@ -68,7 +68,7 @@ def _best_of(bench: Bench, null: Fit, kind: LocalForce, bar: float) -> Fit | Non
     return ranked(only, fits.values())[0]
 
 
-def describe_another(fit: Fit) -> str:
+def describe_unnamed_force(fit: Fit) -> str:
     """Say what explains more than the catalogue.
 
     Parameters
@@ -86,5 +86,5 @@ def describe_another(fit: Fit) -> str:
     return kind.words(where_of(fit.hypothesis.specimen, cause.place), float(fit.values[-1]))
 
 
-def _closer(bench: Bench, refined: Sequence[Start]) -> list[Supposed]:
+def _closer(bench: InferenceProblem, refined: Sequence[Start]) -> list[Supposed]:
     return bring_closer(bench, [((), start) for start in refined[:FITTED]])

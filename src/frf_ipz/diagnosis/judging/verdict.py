@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Data, Fit
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 FOUND_NATS = 30.0  # evidence over the nominal model's: what a finding needs
 PARTIAL_NATS = 50.0  # evidence of a second finding over the first one's alone, where the two do not explain all
@@ -144,12 +144,12 @@ class Goodness:
         )
 
 
-def goodness(bench: Bench, fit: Fit) -> Goodness:
+def goodness(bench: InferenceProblem, fit: Fit) -> Goodness:
     """Measure how well a fit explains what it was fitted to.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         With the data.
     fit : Fit
         Any fit.

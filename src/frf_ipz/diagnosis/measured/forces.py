@@ -10,7 +10,7 @@ from scipy.signal import periodogram
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
-from frf_ipz.diagnosis.observations import Blow
+from frf_ipz.diagnosis.observations import ObservedRecord
 
 LEAST_PART = 3e-3  # of the peak: what belongs to the pulse
 ABOVE_NOISE = 6.0  # standard deviations
@@ -33,18 +33,18 @@ class Pulse:
 
     Parameters
     ----------
-    blow : Blow
+    record : ObservedRecord
         The blow with the force that is left.
     start, stop : int
         Samples that are kept.
     """
 
-    blow: Blow
+    record: ObservedRecord
     start: int
     stop: int
 
 
-def isolate_pulse(blow: Blow) -> Pulse:
+def isolate_pulse(record: ObservedRecord) -> Pulse:
     """Take away what the force shows while nothing touches.
 
     Noise that is kept beside the pulse of a weak blow is a part of its impulse, drift above all: the ringing of the
@@ -52,7 +52,7 @@ def isolate_pulse(blow: Blow) -> Pulse:
 
     Parameters
     ----------
-    blow : Blow
+    record : ObservedRecord
         A hammer blow.
 
     Returns
@@ -60,20 +60,20 @@ def isolate_pulse(blow: Blow) -> Pulse:
     Pulse
         The blow with a force that is zero outside the pulse and the ringing of the converter's filter.
     """
-    size = np.abs(blow.force)
+    size = np.abs(record.force)
     top = int(np.argmax(size))
-    quiet = np.concatenate([blow.force[: top // 2], blow.force[(top + blow.n_samples) // 2 :]])
+    quiet = np.concatenate([record.force[: top // 2], record.force[(top + record.n_samples) // 2 :]])
     noise = _noise_of(quiet)
     above = np.flatnonzero(size >= min(max(ABOVE_NOISE * noise, LEAST_PART * size[top]), size[top]))
     first, last = int(above[0]), int(above[-1])
-    last += _tail(blow.force[last + 1 :], quiet)
+    last += _tail(record.force[last + 1 :], quiet)
     ringing = max(_rings(size[:first][::-1], noise), _rings(size[last + 1 :], noise))
-    sample = np.arange(blow.n_samples)
+    sample = np.arange(record.n_samples)
     outside = np.maximum(first - ringing - sample, sample - last - ringing)
     taper = round(TAPER * ringing / RINGING)
     window = np.cos(np.pi / 2 * np.clip(outside / taper, 0, 1)) ** 2
     kept = np.flatnonzero(window > 0.5)
-    return Pulse(blow=replace(blow, force=blow.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
+    return Pulse(record=replace(record, force=record.force * window), start=int(kept[0]), stop=int(kept[-1]) + 1)
 
 
 def _tail(after: FloatArray, quiet: FloatArray) -> int:
@@ -116,16 +116,16 @@ def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
     """
     if pulse.start > 0:
         return np.zeros(1 + len(responses))
-    first = np.vstack([pulse.blow.force[:FIRST], responses[:, :FIRST]])
+    first = np.vstack([pulse.record.force[:FIRST], responses[:, :FIRST]])
     return np.asarray(np.sqrt(np.mean(first**2, axis=1)))
 
 
-def is_sweep(blow: Blow, band_hz: tuple[float, float], decay_1_s: float) -> bool:
+def is_sweep(record: ObservedRecord, band_hz: tuple[float, float], decay_1_s: float) -> bool:
     """Tell whether a force comes to a part of the band so late that a window of decay forgets it.
 
     Parameters
     ----------
-    blow : Blow
+    record : ObservedRecord
         Record of a shaker.
     band_hz : pair of float
         Where to look.
@@ -137,14 +137,14 @@ def is_sweep(blow: Blow, band_hz: tuple[float, float], decay_1_s: float) -> bool
     bool
         False for a force that is alike all the time, and for bursts.
     """
-    time = blow.step_s * np.arange(blow.n_samples)
-    frequency = np.fft.rfftfreq(blow.n_samples, blow.step_s)
+    time = record.step_s * np.arange(record.n_samples)
+    frequency = np.fft.rfftfreq(record.n_samples, record.step_s)
     used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     whole, early = (
         uniform_filter1d(np.abs(np.fft.rfft(force)[used]) ** 2, AROUND, mode="nearest")
-        for force in (blow.force, blow.force * np.exp(-decay_1_s * time))
+        for force in (record.force, record.force * np.exp(-decay_1_s * time))
     )
-    alike = (1 - np.exp(-2 * decay_1_s * blow.duration_s)) / (2 * decay_1_s * blow.duration_s)
+    alike = (1 - np.exp(-2 * decay_1_s * record.duration_s)) / (2 * decay_1_s * record.duration_s)
     return bool(np.any(early < LATE * alike * whole))
 
 
@@ -156,12 +156,12 @@ def _noise_of(quiet: FloatArray) -> float:
     return float(np.sqrt(np.median([stretch.mean() for stretch in squares])))
 
 
-def force_noise(blows: tuple[Blow, ...], pulses: tuple[Pulse, ...]) -> Noise:
+def force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> Noise:
     """Read the noise of the force channel where nothing touches.
 
     Parameters
     ----------
-    blows : tuple of Blow
+    records : tuple of ObservedRecord
         As recorded.
     pulses : tuple of Pulse
         The same blows, isolated.
@@ -173,12 +173,12 @@ def force_noise(blows: tuple[Blow, ...], pulses: tuple[Pulse, ...]) -> Noise:
     """
     lines: list[FloatArray] = []
     energies: list[FloatArray] = []
-    for blow, pulse in zip(blows, pulses, strict=True):
-        quiet = blow.force[pulse.stop + QUIET :]
+    for record, pulse in zip(records, pulses, strict=True):
+        quiet = record.force[pulse.stop + QUIET :]
         if len(quiet) < 64:
             continue
-        frequency, density = periodogram(quiet, 1 / blow.step_s, detrend=False)
-        inside = (frequency > 0) & (frequency < 0.4 / blow.step_s)
+        frequency, density = periodogram(quiet, 1 / record.step_s, detrend=False)
+        inside = (frequency > 0) & (frequency < 0.4 / record.step_s)
         lines.append(frequency[inside])
         energies.append(density[inside] / 2)
     if not lines:
@@ -203,7 +203,7 @@ def window_energy(s: ComplexArray, pulse: Pulse) -> ComplexArray:
         s.
     """
     rate = s[:, None] + s[None, :].conj()
-    first, last = pulse.start * pulse.blow.step_s, pulse.stop * pulse.blow.step_s
+    first, last = pulse.start * pulse.record.step_s, pulse.stop * pulse.record.step_s
     return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)
 
 
@@ -221,5 +221,5 @@ def window_energies(s: ComplexArray, pulse: Pulse) -> FloatArray:
         s.
     """
     rate = 2 * s.real
-    first, last = pulse.start * pulse.blow.step_s, pulse.stop * pulse.blow.step_s
+    first, last = pulse.start * pulse.record.step_s, pulse.stop * pulse.record.step_s
     return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)

@@ -22,7 +22,7 @@ from frf_ipz.diagnosis.measured.forces import (
 from frf_ipz.diagnosis.measured.lines import Lines, lines_of_band, same_places
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer import Measured
-from frf_ipz.diagnosis.observations import Blow, Observations, spectra
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, spectra
 from frf_ipz.frf import FrfLabel
 
 ENOUGH = 8.0  # decays within a record: of a mode 3e-4 is left
@@ -41,7 +41,7 @@ class Survey:
 
     Parameters
     ----------
-    groups : tuple of tuple of Blow
+    groups : tuple of tuple of ObservedRecord
         Blows with the same place and the same sensors, from shortly before their pulses on, without noise around them.
     pulses : tuple of tuple of Pulse
         The stretches of the forces that were kept; all of them for shakers.
@@ -55,7 +55,7 @@ class Survey:
         sigma that makes the ends of the records vanish.
     """
 
-    groups: tuple[tuple[Blow, ...], ...]
+    groups: tuple[tuple[ObservedRecord, ...], ...]
     pulses: tuple[tuple[Pulse, ...], ...]
     force: Noise
     responses: dict[str, Noise]
@@ -79,8 +79,8 @@ def survey(observations: Observations) -> Survey:
     is_hammer = observations.kind == "hammer"
     whole = _pulses(observations)
     pulses = _from_pulses(whole, observations.kind)
-    groups = _blows_of(pulses)
-    decay = forgetting_1_s(blow for group in groups for blow in group)
+    groups = _records_of(pulses)
+    decay = forgetting_1_s(record for group in groups for record in group)
     line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
     gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
@@ -100,9 +100,9 @@ def survey(observations: Observations) -> Survey:
     )
 
 
-def forgetting_1_s(blows: Iterable[Blow]) -> float:
+def forgetting_1_s(records: Iterable[ObservedRecord]) -> float:
     """Give the sigma that makes the end of the shortest record vanish, 1/s."""
-    return ENOUGH / min(blow.duration_s for blow in blows)
+    return ENOUGH / min(record.duration_s for record in records)
 
 
 def like(found: Survey, observations: Observations) -> Survey:
@@ -121,15 +121,17 @@ def like(found: Survey, observations: Observations) -> Survey:
         Of these.
     """
     pulses = _from_pulses(_pulses(observations), observations.kind)
-    return replace(found, groups=_blows_of(pulses), pulses=pulses)
+    return replace(found, groups=_records_of(pulses), pulses=pulses)
 
 
 def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
     """Pulses of the blows of each place; of a shaker, the whole records."""
     groups = same_places(observations)
     if observations.kind != "hammer":
-        return tuple(tuple(Pulse(blow=blow, start=0, stop=blow.n_samples) for blow in group) for group in groups)
-    return tuple(tuple(isolate_pulse(blow) for blow in group) for group in groups)
+        return tuple(
+            tuple(Pulse(record=record, start=0, stop=record.n_samples) for record in group) for group in groups
+        )
+    return tuple(tuple(isolate_pulse(record) for record in group) for group in groups)
 
 
 def _from_pulses(pulses: tuple[tuple[Pulse, ...], ...], kind: str) -> tuple[tuple[Pulse, ...], ...]:
@@ -139,20 +141,20 @@ def _from_pulses(pulses: tuple[tuple[Pulse, ...], ...], kind: str) -> tuple[tupl
     return tuple(tuple(_from_pulse(pulse) for pulse in group) for group in pulses)
 
 
-def _blows_of(pulses: tuple[tuple[Pulse, ...], ...]) -> tuple[tuple[Blow, ...], ...]:
-    return tuple(tuple(pulse.blow for pulse in group) for group in pulses)
+def _records_of(pulses: tuple[tuple[Pulse, ...], ...]) -> tuple[tuple[ObservedRecord, ...], ...]:
+    return tuple(tuple(pulse.record for pulse in group) for group in pulses)
 
 
 def _from_pulse(pulse: Pulse) -> Pulse:
     """Leave out what lies before a pulse: noise alone, which a transform beside the axis weighs most of all."""
-    begin, blow = max(pulse.start - AHEAD, 0), pulse.blow
+    begin, record = max(pulse.start - AHEAD, 0), pulse.record
     later = replace(
-        blow,
-        force=blow.force[begin:],
-        responses=blow.responses[:, begin:],
-        start_s=blow.start_s + begin * blow.step_s,
+        record,
+        force=record.force[begin:],
+        responses=record.responses[:, begin:],
+        start_s=record.start_s + begin * record.step_s,
     )
-    return Pulse(blow=later, start=pulse.start - begin, stop=pulse.stop - begin)
+    return Pulse(record=later, start=pulse.start - begin, stop=pulse.stop - begin)
 
 
 def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
@@ -169,7 +171,7 @@ def _response_noise(
     gone_on: list[FloatArray],
 ) -> dict[str, Noise]:
     found = {}
-    groups = _blows_of(pulses)
+    groups = _records_of(pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
@@ -191,17 +193,19 @@ def _response_noise(
     return found
 
 
-def _signals(groups: tuple[tuple[Blow, ...], ...], channel: str) -> list[FloatArray]:
+def _signals(groups: tuple[tuple[ObservedRecord, ...], ...], channel: str) -> list[FloatArray]:
     return [
         values
         for group in groups
-        for blow in group
-        for sensor, values in zip(blow.sensors, blow.responses, strict=True)
+        for record in group
+        for sensor, values in zip(record.sensors, record.responses, strict=True)
         if sensor.channel == channel
     ]
 
 
-def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Lines], gone_on: list[FloatArray]) -> Noise:
+def _noise_of_records(
+    groups: tuple[tuple[ObservedRecord, ...], ...], line_sets: list[Lines], gone_on: list[FloatArray]
+) -> Noise:
     """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
     found = []
     for group, lines, known in zip(groups, line_sets, gone_on, strict=True):
@@ -213,14 +217,17 @@ def _noise_of_records(groups: tuple[tuple[Blow, ...], ...], line_sets: list[Line
     return Noise(white=float(white), pink=float(pink))
 
 
-def _gain(group: tuple[Blow, ...], lines: Lines) -> FloatArray:
+def _gain(group: tuple[ObservedRecord, ...], lines: Lines) -> FloatArray:
     """Energy on each line of noise of density 1 over the whole record."""
     rate = 2 * lines.s.real
     return np.asarray((1 - np.exp(-rate * _duration_s(group))) / rate)
 
 
 def _noise_of_single(
-    groups: tuple[tuple[Blow, ...], ...], whole: tuple[tuple[Pulse, ...], ...], line_sets: list[Lines], channel: str
+    groups: tuple[tuple[ObservedRecord, ...], ...],
+    whole: tuple[tuple[Pulse, ...], ...],
+    line_sets: list[Lines],
+    channel: str,
 ) -> Noise:
     """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
     white = 0.0
@@ -231,14 +238,14 @@ def _noise_of_single(
         sensor = names.index(channel)
         energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / _gain(group, lines)
         white = max(white, UNREPEATED**2 * float(np.median(energy)))
-        before = whole[place][0].blow.responses[sensor, : whole[place][0].start]
+        before = whole[place][0].record.responses[sensor, : whole[place][0].start]
         if len(before) >= BEFORE:
             white = max(white, float(np.var(before)) * group[0].step_s)
     return Noise(white=white)
 
 
-def _duration_s(group: tuple[Blow, ...]) -> float:
-    return min(blow.duration_s for blow in group)
+def _duration_s(group: tuple[ObservedRecord, ...]) -> float:
+    return min(record.duration_s for record in group)
 
 
 def _resonances(line_sets: list[Lines], decay: float) -> Resonances:
@@ -303,18 +310,18 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
     )
 
 
-def _constants(points: Lines, group: tuple[Blow, ...], column: int) -> ComplexArray:
+def _constants(points: Lines, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
     """Error of an FRF, (n_points,), by one standard deviation of what may be left of a channel's constant."""
-    durations = np.array([blow.duration_s for blow in group])
+    durations = np.array([record.duration_s for record in group])
     units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
-    stds = np.array([0.0 if blow.constant_std is None else blow.constant_std[column] for blow in group])
+    stds = np.array([0.0 if record.constant_std is None else record.constant_std[column] for record in group])
     return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
 
 
 def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexArray:
     """Errors of an FRF, as independent columns, by the ringing that records lack at their beginning."""
     pulses, group = found.pulses[place], found.groups[place]
-    sizes = np.array([cut_off(pulse, blow.responses) for pulse, blow in zip(pulses, group, strict=True)])
+    sizes = np.array([cut_off(pulse, record.responses) for pulse, record in zip(pulses, group, strict=True)])
     if not sizes.any():
         return np.zeros((len(points.s), 0), np.complex128)
     step = group[0].step_s
@@ -325,21 +332,23 @@ def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexAr
     return np.hstack([of_response, points.values[:, [column]] * of_force])
 
 
-def _gone_on(resonances: Resonances, points: Lines, group: tuple[Blow, ...]) -> tuple[ComplexArray, FloatArray]:
+def _gone_on(
+    resonances: Resonances, points: Lines, group: tuple[ObservedRecord, ...]
+) -> tuple[ComplexArray, FloatArray]:
     """Transform what resonances went on to do after records ended, and say with how much of it each record ended.
 
     Each is by itself and of unknown phase: (n_points, n_blows, n_peaks) for half an amplitude of 1, and these halves,
     (n_blows, n_peaks, n_sensors).
     """
     decay = ENOUGH / _duration_s(group)
-    backwards = [replace(blow, force=blow.force[::-1], responses=blow.responses[:, ::-1]) for blow in group]
+    backwards = [replace(record, force=record.force[::-1], responses=record.responses[:, ::-1]) for record in group]
     pairs = spectra(backwards, np.asarray(decay + 1j * resonances.omega_rad_s, np.complex128))
     poles = -resonances.decay_1_s + 1j * resonances.omega_rad_s
-    ends = np.exp(-np.outer(points.s, [blow.duration_s for blow in group]))
+    ends = np.exp(-np.outer(points.s, [record.duration_s for record in group]))
     return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([shown for _, shown in pairs])
 
 
-def _gone_on_energy(resonances: Resonances, lines: Lines, group: tuple[Blow, ...]) -> FloatArray:
+def _gone_on_energy(resonances: Resonances, lines: Lines, group: tuple[ObservedRecord, ...]) -> FloatArray:
     """Energy, (n_lines, n_sensors), that blows do not share because of what went on after records ended."""
     units, left = _gone_on(resonances, lines, group)
     part = (1 - np.abs(lines.force) ** 2 / lines.power[:, None]) / max(len(group) - 1, 1)
@@ -353,7 +362,7 @@ def _bias(found: Survey, place: int, points: Lines) -> FloatArray:
     return np.asarray(1 / (1 - np.minimum(added / points.power, MOST_BIAS)))
 
 
-def _at(group: tuple[Blow, ...], s: ComplexArray) -> Lines:
+def _at(group: tuple[ObservedRecord, ...], s: ComplexArray) -> Lines:
     pairs = spectra(group, s)
     return Lines(
         s=s,

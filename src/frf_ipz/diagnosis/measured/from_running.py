@@ -64,7 +64,7 @@ def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     kept = np.flatnonzero(frfs.in_band(observations.band_hz) & (frfs.frequency_hz > 0))
     finer = fineness(len(kept))
     spacing = float(frfs.frequency_hz[1] - frfs.frequency_hz[0])
-    length = round(1 / (spacing * observations.blows[0].step_s))
+    length = round(1 / (spacing * observations.records[0].step_s))
     lines = frfs.lines(np.repeat(kept, finer))
     combs = [_comb(observations, frfs.labels, length, kept, part / finer) for part in range(finer)]
     between = frfs.frequency_hz[kept, None] + spacing * np.arange(finer) / finer
@@ -119,9 +119,9 @@ def _comb(
     cross, own = np.zeros(force.shape, np.complex128), np.zeros(force.shape)
     n_pieces = np.zeros(len(labels))
     places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
-    for blow in observations.blows:
-        columns = [places[sensor.channel, sensor.dof, blow.input_dof] for sensor in blow.sensors]
-        for F, X in pieces_without_transients(blow.force, blow.responses, length, lines, between=between):
+    for record in observations.records:
+        columns = [places[sensor.channel, sensor.dof, record.input_dof] for sensor in record.sensors]
+        for F, X in pieces_without_transients(record.force, record.responses, length, lines, between=between):
             n_pieces[columns] += 1
             force[:, columns] += (np.abs(F) ** 2)[:, None]
             cross[:, columns] += (F.conj() * X).T

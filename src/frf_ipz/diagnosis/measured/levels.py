@@ -23,7 +23,7 @@ from frf_ipz.ingest.signals.transients import pieces_without_transients
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
     from frf_ipz.identification.modal_fit import ModalFit
 
 LEAST_RATIO = 1.5  # of the strongest to the weakest blow at a place: below, there is one level only
@@ -33,7 +33,7 @@ STANDS_OUT = 0.5  # of an FRF at its peak: a mode that has less of it is not see
 COLUMNS = (
     "mode",
     "frf",
-    "blow",
+    "record",
     "level_N",
     "frequency_hz",
     "frequency_std_hz",
@@ -57,7 +57,7 @@ class LevelDependence:
     weak_N, strong_N : (n_frfs,) array
         Mean peak force of the blows behind them, N.
     modes : DataFrame
-        One row a mode and blow: ``mode`` (from 0), ``frf``, ``blow``, ``level_N``, ``frequency_hz``,
+        One row a mode and blow: ``mode`` (from 0), ``frf``, ``record``, ``level_N``, ``frequency_hz``,
         ``frequency_std_hz``, ``damping_ratio``, ``damping_ratio_std``.
     """
 
@@ -90,7 +90,7 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
         return _put_together(np.zeros(0), [], [])
     low, high = observations.band_hz
     step, is_hammer = groups[0][0].step_s, observations.kind == "hammer"
-    n = max(blow.n_samples for group in groups for blow in group)
+    n = max(record.n_samples for group in groups for record in group)
     if not is_hammer:
         n = round(1 / (step * float(np.diff(frfs.frequency_hz[:2])[0])))
     frequency = np.asarray(np.fft.rfftfreq(n, step))
@@ -101,8 +101,8 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
     curves: list[_Curve] = []
     rows: list[tuple[object, ...]] = []
     for group in groups:
-        blows = [isolate_pulse(blow).blow if is_hammer else blow for blow in group]
-        spectra = [transform(blow, n)[:, :, used] for blow in blows]
+        records = [isolate_pulse(record).record if is_hammer else record for record in group]
+        spectra = [transform(record, n)[:, :, used] for record in records]
         curves += _halves(group, spectra)
         rows += _modes(group, spectra, s, fit)
     return _put_together(frequency[used], curves, rows)
@@ -134,41 +134,41 @@ def _put_together(
     )
 
 
-def _halves(group: Sequence[Blow], spectra: Sequence[ComplexArray]) -> list[_Curve]:
+def _halves(group: Sequence[ObservedRecord], spectra: Sequence[ComplexArray]) -> list[_Curve]:
     parts = slice(len(group) // 2, None), slice(None, len(group) // 2)  # the strongest come first
     weak, strong = (np.abs(_h1(np.concatenate(spectra[part]))) for part in parts)
-    levels = [float(np.mean([blow.level for blow in group[part]])) for part in parts]
+    levels = [float(np.mean([record.level for record in group[part]])) for part in parts]
     return [_Curve(label, weak[:, row], strong[:, row], *levels) for row, label in enumerate(_labels(group[0]))]
 
 
-def _groups(observations: Observations) -> Iterator[tuple[Blow, ...]]:
+def _groups(observations: Observations) -> Iterator[tuple[ObservedRecord, ...]]:
     """Blows of several levels at one place with the sensors in one place, the strongest first."""
     for dof in observations.input_dofs:
-        blows = [blow for blow in observations.at(dof) if blow.rested or observations.kind != "hammer"]
-        for labels in dict.fromkeys(tuple(_labels(blow)) for blow in blows):
-            group = tuple(blow for blow in blows if tuple(_labels(blow)) == labels)
+        records = [record for record in observations.at(dof) if record.rested or observations.kind != "hammer"]
+        for labels in dict.fromkeys(tuple(_labels(record)) for record in records):
+            group = tuple(record for record in records if tuple(_labels(record)) == labels)
             if len(group) >= LEAST_BLOWS and group[0].level > LEAST_RATIO * group[-1].level:
                 yield group
 
 
-def _labels(blow: Blow) -> list[FrfLabel]:
+def _labels(record: ObservedRecord) -> list[FrfLabel]:
     return [
-        FrfLabel(sensor.dof, blow.input_dof, sensor.quantity, sensor.channel, blow.input_channel)
-        for sensor in blow.sensors
+        FrfLabel(sensor.dof, record.input_dof, sensor.quantity, sensor.channel, record.input_channel)
+        for sensor in record.sensors
     ]
 
 
-def _decaying(blow: Blow, n: int, decay_1_s: float) -> ComplexArray:
+def _decaying(record: ObservedRecord, n: int, decay_1_s: float) -> ComplexArray:
     """Transform force and responses under one window, (1, 1 + n_sensors, n_lines)."""
-    signals = np.vstack([blow.force, blow.responses])
-    window = np.exp(-decay_1_s * blow.step_s * np.arange(blow.n_samples))
-    return np.asarray(np.fft.rfft(signals * window, n))[None] * blow.step_s
+    signals = np.vstack([record.force, record.responses])
+    window = np.exp(-decay_1_s * record.step_s * np.arange(record.n_samples))
+    return np.asarray(np.fft.rfft(signals * window, n))[None] * record.step_s
 
 
-def _going_on(blow: Blow, n: int) -> ComplexArray:
+def _going_on(record: ObservedRecord, n: int) -> ComplexArray:
     """Transform pieces without what goes on at their ends, (n_pieces, 1 + n_sensors, n_lines)."""
-    pieces = pieces_without_transients(blow.force, blow.responses, n)
-    return np.stack([np.vstack(piece) for piece in pieces]) * blow.step_s
+    pieces = pieces_without_transients(record.force, record.responses, n)
+    return np.stack([np.vstack(piece) for piece in pieces]) * record.step_s
 
 
 def _h1(spectra: ComplexArray) -> ComplexArray:
@@ -179,7 +179,7 @@ def _h1(spectra: ComplexArray) -> ComplexArray:
 
 
 def _modes(
-    group: Sequence[Blow], spectra: Sequence[ComplexArray], s: ComplexArray, fit: ModalFit
+    group: Sequence[ObservedRecord], spectra: Sequence[ComplexArray], s: ComplexArray, fit: ModalFit
 ) -> list[tuple[object, ...]]:
     labels = _labels(group[0])
     rows: list[tuple[object, ...]] = []
@@ -188,10 +188,10 @@ def _modes(
         near = lines_near(s, complex(pole))
         if sensor is None or len(near) < LEAST_LINES:
             continue
-        for blow, lines in zip(group, spectra, strict=True):
+        for record, lines in zip(group, spectra, strict=True):
             found = pole_near(s[near], _h1(lines)[near, sensor], complex(pole))
             if found is not None:
-                rows.append((mode, str(labels[sensor]), blow.name, blow.level, *_as_numbers(found)))
+                rows.append((mode, str(labels[sensor]), record.name, record.level, *_as_numbers(found)))
     return rows
 
 

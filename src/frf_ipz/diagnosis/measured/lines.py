@@ -11,7 +11,7 @@ from scipy.fft import next_fast_len
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 FINER = 4  # lines between those of the record: peaks are seen at their tops
 
@@ -57,12 +57,12 @@ class Lines:
         return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
 
 
-def lines_of_band(group: tuple[Blow, ...], band_hz: tuple[float, float], decay_1_s: float) -> Lines:
+def lines_of_band(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float], decay_1_s: float) -> Lines:
     """Transform blows to uniform lines of a band by FFT.
 
     Parameters
     ----------
-    group : tuple of Blow
+    group : tuple of ObservedRecord
         At one place, with the same sensors; where they differ in length, the shortest counts.
     band_hz : pair of float
         Hz.
@@ -74,18 +74,18 @@ def lines_of_band(group: tuple[Blow, ...], band_hz: tuple[float, float], decay_1
     Lines
         `FINER` times as many as the shortest record has.
     """
-    n, step = min(blow.n_samples for blow in group), group[0].step_s
+    n, step = min(record.n_samples for record in group), group[0].step_s
     window = np.exp(-decay_1_s * step * np.arange(n)) * step
     padded = next_fast_len(FINER * n, real=True)
     frequency = np.fft.rfftfreq(padded, step)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = np.stack([np.fft.rfft(blow.force[:n] * window, padded)[inside] for blow in group], 1)
-    responses = np.stack([np.fft.rfft(blow.responses[:, :n] * window, padded)[:, inside].T for blow in group], 1)
+    force = np.stack([np.fft.rfft(record.force[:n] * window, padded)[inside] for record in group], 1)
+    responses = np.stack([np.fft.rfft(record.responses[:, :n] * window, padded)[:, inside].T for record in group], 1)
     s = np.asarray(decay_1_s + 2j * np.pi * frequency[inside], np.complex128)
     return Lines(s=s, force=force, responses=responses)
 
 
-def same_places(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
+def same_places(observations: Observations) -> tuple[tuple[ObservedRecord, ...], ...]:
     """Gather the blows with the same place and the same sensors.
 
     Parameters
@@ -95,17 +95,18 @@ def same_places(observations: Observations) -> tuple[tuple[Blow, ...], ...]:
 
     Returns
     -------
-    tuple of tuple of Blow
+    tuple of tuple of ObservedRecord
         The strongest of each place first.
     """
     keys = dict.fromkeys(
-        (blow.input_dof, tuple((sensor.channel, sensor.dof) for sensor in blow.sensors)) for blow in observations.blows
+        (record.input_dof, tuple((sensor.channel, sensor.dof) for sensor in record.sensors))
+        for record in observations.records
     )
     return tuple(
         tuple(
-            blow
-            for blow in observations.at(key[0])
-            if tuple((sensor.channel, sensor.dof) for sensor in blow.sensors) == key[1]
+            record
+            for record in observations.at(key[0])
+            if tuple((sensor.channel, sensor.dof) for sensor in record.sensors) == key[1]
         )
         for key in keys
     )

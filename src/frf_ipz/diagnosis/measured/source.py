@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.diagnosis.measured.transfer import Measured
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 ENOUGH_BLOWS = 3  # at a place: one of them can be kept for the check, the rest still tell the noise
 EVERY = 4  # points of the contour: one is kept for the check where blows are too few
@@ -40,7 +40,7 @@ class Source:
         What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones or sweeps,
         or ``frf``.
     held : str
-        What was kept for the check: ``blows`` or ``lines``.
+        What was kept for the check: ``records`` or ``lines``.
     held_names : tuple of str
         The blows that were kept.
     """
@@ -75,16 +75,16 @@ def divide(observations: Observations) -> Source:
     """
     if not observations.are_from_rest or _sweeps(observations):
         return _of_frfs(observations)
-    kept = _kept_blows(observations)
-    names = {blow.name for blow in kept}
-    fitted = tuple(blow for blow in observations.blows if blow.name not in names)
-    found = survey(replace(observations, blows=fitted))
+    kept = _kept_records(observations)
+    names = {record.name for record in kept}
+    fitted = tuple(record for record in observations.records if record.name not in names)
+    found = survey(replace(observations, records=fitted))
     far = _far(observations, found.least_decay_1_s, lambda s: measure(found, s))
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
     near = _looked_at(measure(found, s), observations)
     if not kept:
         return _by_points(far, near, found, observations.kind)
-    held = without_faint(measure(like(found, replace(observations, blows=kept)), near.s))
+    held = without_faint(measure(like(found, replace(observations, records=kept)), near.s))
     return Source(
         coarse=far[0],
         middle=far[1],
@@ -101,17 +101,17 @@ def _sweeps(observations: Observations) -> bool:
     """Tell whether records end before the structure has answered all of a sweep."""
     if observations.kind == "hammer" or observations.frfs is None:
         return False
-    decay = forgetting_1_s(observations.blows)
-    return any(is_sweep(blow, observations.band_hz, decay) for blow in observations.blows)
+    decay = forgetting_1_s(observations.records)
+    return any(is_sweep(record, observations.band_hz, decay) for record in observations.records)
 
 
-def _kept_blows(observations: Observations) -> tuple[Blow, ...]:
+def _kept_records(observations: Observations) -> tuple[ObservedRecord, ...]:
     """One of the stronger blows of every place and layout of sensors, if each has enough of them."""
-    groups: dict[tuple[object, ...], list[Blow]] = {}
+    groups: dict[tuple[object, ...], list[ObservedRecord]] = {}
     for dof in observations.input_dofs:
-        for blow in observations.at(dof):
-            key = (blow.input_dof, *((sensor.channel, sensor.dof) for sensor in blow.sensors))
-            groups.setdefault(key, []).append(blow)
+        for record in observations.at(dof):
+            key = (record.input_dof, *((sensor.channel, sensor.dof) for sensor in record.sensors))
+            groups.setdefault(key, []).append(record)
     if observations.kind != "hammer" or min(len(group) for group in groups.values()) < ENOUGH_BLOWS:
         return ()
     return tuple(group[1] for group in groups.values())
@@ -138,7 +138,7 @@ def _far(
 
 def _near(found: FrfSurvey, observations: Observations) -> Measured:
     """Smooth what was estimated from running records, on many fine lines; take others as they are."""
-    if observations.blows:
+    if observations.records:
         return measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
     spacing = float(np.median(np.diff(found.frfs.s.imag)))
     return lines_along(found, fine_contour(found.resonances, observations.band_hz, spacing))

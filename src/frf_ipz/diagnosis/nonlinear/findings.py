@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.finding import Estimate, Finding, doubt_of_place
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
 
 LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
 NORMAL_95 = 1.96
@@ -48,13 +48,13 @@ def gain_of(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
 
 
 def findings_of(
-    plant: Plant, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
+    plant: ModalModel, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
 ) -> tuple[Finding, ...]:
     """Make one finding of each law, at its best place.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
     fits : list of LawFit
         Laws at places.

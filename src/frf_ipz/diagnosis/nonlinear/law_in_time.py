@@ -7,63 +7,69 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import LawAtWork
+from frf_ipz.diagnosis.diagnosis import LawInTime
 from frf_ipz.diagnosis.nonlinear.recorded.segments import starts_at_rest
 from frf_ipz.diagnosis.nonlinear.simulate import simulate
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
-    from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import Recordings
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
+    from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FittedSegments
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.observations import Blow
+    from frf_ipz.diagnosis.observations import ObservedRecord
 
 
-def show_law(recordings: Recordings, track: Track, fit: LawFit) -> LawAtWork:
+def show_law(recordings: FittedSegments, track: LawFitProgress, fit: LawFit) -> LawInTime:
     """Show a law at work.
 
     Parameters
     ----------
-    recordings : Recordings
+    recordings : FittedSegments
         What it was fitted to, and what was held out.
-    track : Track
+    track : LawFitProgress
         The stretches that it was fitted to.
     fit : LawFit
         The law at its place.
 
     Returns
     -------
-    LawAtWork
+    LawInTime
         With the response to the strongest blow that was held out, or else to the strongest of all, from rest.
     """
     most = int(np.argmax(np.abs(fit.motion).max(1)))
     motion, velocity = fit.motion[most], fit.velocity[most]
     force = fit.strength * fit.law.unit_force(motion, velocity, fit.shape)
-    law = LawAtWork(motion_m=motion, velocity_m_s=velocity, force_N=force)
+    law = LawInTime(motion_m=motion, velocity_m_s=velocity, force_N=force)
     is_hammer = recordings.training.kind == "hammer"
     for source in (recordings.held_out, recordings.training):
-        resting = [blow for blow in source.blows if _is_from_rest(blow, is_hammer=is_hammer)]
+        resting = [record for record in source.records if _is_from_rest(record, is_hammer=is_hammer)]
         if resting:
-            blow = max(resting, key=lambda one: one.level)
-            return _with_response(law, recordings, track, fit, blow, is_held_out=source is recordings.held_out)
+            record = max(resting, key=lambda one: one.level)
+            return _with_response(law, recordings, track, fit, record, is_held_out=source is recordings.held_out)
     return law
 
 
-def _is_from_rest(blow: Blow, *, is_hammer: bool) -> bool:
-    return not blow.follows if is_hammer else starts_at_rest(blow)
+def _is_from_rest(record: ObservedRecord, *, is_hammer: bool) -> bool:
+    return not record.follows if is_hammer else starts_at_rest(record)
 
 
 def _with_response(
-    law: LawAtWork, recordings: Recordings, track: Track, fit: LawFit, blow: Blow, *, is_held_out: bool
-) -> LawAtWork:
+    law: LawInTime,
+    recordings: FittedSegments,
+    track: LawFitProgress,
+    fit: LawFit,
+    record: ObservedRecord,
+    *,
+    is_held_out: bool,
+) -> LawInTime:
     freedom, unknowns = track.linear.freedom.without_starts(fit.unknowns)
-    alone = replace(recordings.training, blows=(blow,))
+    alone = replace(recordings.training, records=(record,))
     shown = simulate(alone, freedom, replace(fit, unknowns=unknowns), duration_s=track.duration_s)
     sizes = np.maximum(np.linalg.norm(shown.measured[0], axis=1), np.finfo(float).tiny)
     row = int(np.argmax(np.linalg.norm(shown.simulated[0] - shown.without[0], axis=1) / sizes))
     sensor = freedom.plant.sensors[row]
     return replace(
         law,
-        blow=blow.name,
+        record=record.name,
         is_held_out=is_held_out,
         channel=sensor.channel,
         response=sensor.quantity.response,

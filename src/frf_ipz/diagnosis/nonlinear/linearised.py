@@ -16,17 +16,17 @@ from frf_ipz.numerics.column_scaling import solve_columns
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
 
 
-def linearise(fit: LawFit, plant: Plant) -> Linearised:
+def linearise(fit: LawFit, plant: ModalModel) -> Linearised:
     """Replace a law by a spring and a damper.
 
     Parameters
     ----------
     fit : LawFit
         The law, with the motion of its place in each blow.
-    plant : Plant
+    plant : ModalModel
         The structure.
 
     Returns

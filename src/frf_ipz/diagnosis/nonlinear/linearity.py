@@ -24,7 +24,7 @@ from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 from frf_ipz.numerics.column_scaling import solve_columns
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 WIDTH = 24  # lines that are looked at together
 DEGREES = (0, 2), (2, 2), (3, 3)  # of the local polynomials: of the poles; of the zeros and of transients
@@ -80,7 +80,7 @@ def assess_linearity(observations: Observations) -> Linearity:
         The verdict and where in the band it comes from.
     """
     noise = read_noise(observations)
-    parts = [_at_place(observations, blows, noise) for blows in same_places(observations)]
+    parts = [_at_place(observations, records, noise) for records in same_places(observations)]
     frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
     return Linearity(
         score=float(misfit.max(initial=0.0)),
@@ -91,26 +91,28 @@ def assess_linearity(observations: Observations) -> Linearity:
 
 
 def _at_place(
-    observations: Observations, blows: tuple[Blow, ...], noise: ChannelNoise
+    observations: Observations, records: tuple[ObservedRecord, ...], noise: ChannelNoise
 ) -> tuple[FloatArray, FloatArray]:
     """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
-    n, step = min(blow.n_samples for blow in blows), blows[0].step_s
+    n, step = min(record.n_samples for record in records), records[0].step_s
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
-    looked_at = observations.looks_at(frequency, REACH / (n * step)) & (len(blows) >= LEAST_RECORDS)
+    looked_at = observations.looks_at(frequency, REACH / (n * step)) & (len(records) >= LEAST_RECORDS)
     used, n_groups = _groups(np.flatnonzero(looked_at))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
     if not n_groups:
         return middle, misfit
     sigma = DECAYS / (n * step) if noise.is_hammer else 0.0
-    lines = [_lines(blow, noise, n, sigma)[:, used] for blow in blows]
+    lines = [_lines(record, noise, n, sigma)[:, used] for record in records]
     length = (1 - np.exp(-2 * DECAYS)) / (2 * sigma) if sigma else n * step
-    lacking = np.array([_lacking(blow) if noise.is_hammer else np.zeros(1 + len(blow.responses)) for blow in blows])
+    lacking = np.array(
+        [_lacking(record) if noise.is_hammer else np.zeros(1 + len(record.responses)) for record in records]
+    )
     of_force = noise.force_energy(frequency[used], n * step) + lacking[:, :1]
-    for row, sensor in enumerate(blows[0].sensors):
+    for row, sensor in enumerate(records[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
         of_response = noise.response_energy(column, frequency[used], length) + lacking[:, [1 + row]]
-        of_response = of_response + _left_over(blows, row, frequency[used], sigma)
+        of_response = of_response + _left_over(records, row, frequency[used], sigma)
         energies = np.array([of_force, of_response])
         for group in range(n_groups):
             here = slice(group * WIDTH, (group + 1) * WIDTH)
@@ -120,20 +122,20 @@ def _at_place(
     return middle, misfit
 
 
-def _lacking(blow: Blow) -> FloatArray:
+def _lacking(record: ObservedRecord) -> FloatArray:
     """Energy, of the force and of each response, of the ringing that a record lacks at its beginning."""
-    return CUT_OFF * (blow.step_s * cut_off(isolate_pulse(blow), blow.responses)) ** 2
+    return CUT_OFF * (record.step_s * cut_off(isolate_pulse(record), record.responses)) ** 2
 
 
-def _left_over(blows: tuple[Blow, ...], row: int, frequency_hz: FloatArray, sigma: float) -> FloatArray:
+def _left_over(records: tuple[ObservedRecord, ...], row: int, frequency_hz: FloatArray, sigma: float) -> FloatArray:
     """Energy of the motion that is left where the next blow of a recording falls, (n_blows, n_lines).
 
     What is taken off of it leaves as much where a mode is not known well. Its size is read at the ends of the records.
     """
-    ends = [blow.responses[row, -max(blow.n_samples // END, 1) :] for blow in blows]
+    ends = [record.responses[row, -max(record.n_samples // END, 1) :] for record in records]
     largest = 2 * max(float(np.mean(end**2)) for end in ends)
     energy = largest / (sigma**2 + (2 * np.pi * frequency_hz) ** 2)
-    return np.array([energy if blow.follows and sigma else np.zeros_like(energy) for blow in blows])
+    return np.array([energy if record.follows and sigma else np.zeros_like(energy) for record in records])
 
 
 def _groups(used: IntArray) -> tuple[IntArray, int]:
@@ -143,13 +145,15 @@ def _groups(used: IntArray) -> tuple[IntArray, int]:
     return kept, len(kept) // WIDTH
 
 
-def _lines(blow: Blow, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:
+def _lines(record: ObservedRecord, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:
     """Transform force and responses, a blow's from its pulse on."""
-    signals = np.vstack([noise.force_of(blow), blow.responses])[:, :n]
+    signals = np.vstack([noise.force_of(record), record.responses])[:, :n]
     if sigma:
         start = max(int(np.argmax(np.abs(signals[0]) > 0)) - BEFORE, 0)
         signals = np.hstack([signals[:, start:], np.zeros((len(signals), start))])
-    return np.asarray(np.fft.rfft(signals * np.exp(-sigma * blow.step_s * np.arange(signals.shape[1])))) * blow.step_s
+    return (
+        np.asarray(np.fft.rfft(signals * np.exp(-sigma * record.step_s * np.arange(signals.shape[1])))) * record.step_s
+    )
 
 
 def _variance(motion: ComplexArray, frf: ComplexArray, energies: FloatArray) -> FloatArray:
@@ -174,11 +178,11 @@ def _left(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> fl
 
 def _left_by(degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
     """Misfit of the best of all rounds over its expectation; they may swing where a pole comes onto a line."""
-    (n_blows, n_lines), (poles, zeros) = motion.shape, degrees
+    (n_records, n_lines), (poles, zeros) = motion.shape, degrees
     above = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(zeros + 1)
     below = above[:, 1 : poles + 1]
-    common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_blows * n_lines, -1)
-    columns = np.hstack([common, np.kron(np.eye(n_blows), above)])
+    common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_records * n_lines, -1)
+    columns = np.hstack([common, np.kron(np.eye(n_records), above)])
     denominator, frf = np.ones(n_lines, complex), np.zeros(n_lines, complex)
     least = np.inf
     for _ in range(ROUNDS):

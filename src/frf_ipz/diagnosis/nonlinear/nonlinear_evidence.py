@@ -16,8 +16,8 @@ from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 ENOUGH = 2  # blows at a place
 FLOOR = 0.002  # of the response: what blows on a linear structure may differ by, besides noise
@@ -39,14 +39,14 @@ class Agreement:
     left: float
 
 
-def agreement_with(stretches: Stretches, freedom: Freedom, fit: LawFit) -> Agreement:
+def agreement_with(stretches: SegmentSet, freedom: NuisancePrior, fit: LawFit) -> Agreement:
     """Compare how blows agree with one linear system, before and after the law's force is taken out.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         From rest.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -71,7 +71,7 @@ def agreement_with(stretches: Stretches, freedom: Freedom, fit: LawFit) -> Agree
     return Agreement(float(0.5 * (before - after) / max(1.0, left)), float(left))
 
 
-def _disagreement(stretches: Stretches, motion: ComplexArray, variance: FloatArray) -> float:
+def _disagreement(stretches: SegmentSet, motion: ComplexArray, variance: FloatArray) -> float:
     """Weighted sum of squares that the best FRF of each line and place leaves."""
     cost, weight = 0.0, 1 / variance
     for number in np.unique(stretches.input_of):

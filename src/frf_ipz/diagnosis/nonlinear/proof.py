@@ -7,27 +7,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Misfit
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 
-def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit, Misfit, Misfit]:
+def prove(track: LawFitProgress, held_out: SegmentSet | None, fit: LawFit) -> tuple[Misfit, Misfit, Misfit]:
     """Compare the nominal model, the same with its tolerances, and the law, with what was fitted and was held out.
 
     Parameters
     ----------
-    track : Track
+    track : LawFitProgress
         What was fitted, and the linear model.
-    held_out : Stretches, optional
+    held_out : SegmentSet, optional
         What was not.
     fit : LawFit
         The law at its place.
@@ -44,7 +44,7 @@ def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit
     other = [(np.nan, np.nan)] * len(training)
     if held_out is not None and not held_out.moving.any():
         resting, unknowns = freedom.without_starts(fit.unknowns)
-        simulated = shoot(held_out, resting, fit.start(unknowns), iterations=0).misfit
+        simulated = fit_output_error(held_out, resting, fit.start(unknowns), iterations=0).misfit
         plain = [_linear(held_out, resting, freedom.without_starts(model)[1]) for model in models]
         other = [_figures(held_out, misfit) for misfit in (*plain, simulated)]
     before, updated, after = (
@@ -54,7 +54,7 @@ def prove(track: Track, held_out: Stretches | None, fit: LawFit) -> tuple[Misfit
     return before, updated, after
 
 
-def _linear(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> FloatArray:
+def _linear(stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray) -> FloatArray:
     """Weighted misfit of the linear model."""
     response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
     shown = linear_motion(stretches, freedom, response)
@@ -63,7 +63,7 @@ def _linear(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> Flo
     return as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
 
 
-def _figures(stretches: Stretches, misfit: FloatArray) -> tuple[float, float]:
+def _figures(stretches: SegmentSet, misfit: FloatArray) -> tuple[float, float]:
     """Norm of the misfit over that of the measured, and over what noise and the model's errors make one expect."""
     used = stretches.used
     deviation = np.sqrt(stretches.variance[:, :, used])
@@ -75,12 +75,12 @@ def _figures(stretches: Stretches, misfit: FloatArray) -> tuple[float, float]:
     return float(away / size), float(expected)
 
 
-def relative_misfit(stretches: Stretches, misfit: FloatArray) -> float:
+def relative_misfit(stretches: SegmentSet, misfit: FloatArray) -> float:
     """Give what is left as a part of the response.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     misfit : (n_rows,) array
         Weighted, as `LawFit.misfit`.
@@ -93,14 +93,14 @@ def relative_misfit(stretches: Stretches, misfit: FloatArray) -> float:
     return _figures(stretches, misfit)[0]
 
 
-def working_range(fit: LawFit, plant: Plant) -> str:
+def working_range(fit: LawFit, plant: ModalModel) -> str:
     """Say for which motions of its place a law was seen.
 
     Parameters
     ----------
     fit : LawFit
         The law.
-    plant : Plant
+    plant : ModalModel
         The structure.
 
     Returns

@@ -22,7 +22,7 @@ import numpy as np
 from frf_ipz.diagnosis.finding import doubt_of_place
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
-from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, ROUGH, WEAK, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, ROUGH, WEAK, FittedSegments
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import TIE
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import gain_of_further
 from frf_ipz.diagnosis.nonlinear.fitting.rescoring import tell_apart
@@ -35,7 +35,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import (
 )
 from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
 from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import agreement_with
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
@@ -45,13 +45,13 @@ from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.diagnosis import LawAtWork, Misfit
+    from frf_ipz.diagnosis.diagnosis import LawInTime, Misfit
     from frf_ipz.diagnosis.finding import Finding
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
     from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -103,11 +103,11 @@ class LawSearch:
         Of the nominal model, of the same with its tolerances, and with the first finding.
     statement : str
         The verdict in a sentence or two.
-    plant : Plant, optional
+    plant : ModalModel, optional
         The structure that the law sits on; None for a linear system, as what follows.
     fit : LawFit, optional
         The best law at its place.
-    freedom : Freedom, optional
+    freedom : NuisancePrior, optional
         Unknowns of the linear model that it was fitted with; `simulate` needs them.
     place : mapping
         Where a force sits whose law is not known, as in `diagnosis.json`; empty where that was not asked or not found.
@@ -115,7 +115,7 @@ class LawSearch:
         What was taken back of the converters' dispersion before the law was fitted, see `without_dispersion`; rad.
     is_early : bool
         The law explains first moments only: what it misses later grows from small errors of the model.
-    at_work : LawAtWork, optional
+    at_work : LawInTime, optional
         The best law in time, to be drawn.
     """
 
@@ -127,13 +127,13 @@ class LawSearch:
     updated: Misfit | None = None
     after: Misfit | None = None
     statement: str = ""
-    plant: Plant | None = None
+    plant: ModalModel | None = None
     fit: LawFit | None = None
-    freedom: Freedom | None = None
+    freedom: NuisancePrior | None = None
     place: Mapping[str, object] = field(default_factory=dict)
     dispersion_rad: float = 0.0
     is_early: bool = False
-    at_work: LawAtWork | None = None
+    at_work: LawInTime | None = None
 
     @property
     def is_nonlinear(self) -> bool:
@@ -195,8 +195,8 @@ def search_laws(
         return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was looked for.")
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
-    plant, noise = make_plant(model, observations), read_noise(observations)
-    recordings = Recordings(training=training, held_out=held_out, plant=plant, noise=noise, options=options)
+    plant, noise = make_modal_model(model, observations), read_noise(observations)
+    recordings = FittedSegments(training=training, held_out=held_out, plant=plant, noise=noise, options=options)
     look = _look(recordings, linearity, laws)
     if look.found.fit is not None and (look.found.verdict == UNEXPLAINED or not is_explained(look.found.fit)):
         progress(0.4, "looking whether converters turned the phase")
@@ -219,19 +219,19 @@ def search_laws(
 class _Look:
     """What laws say of recordings: the stretches, all fits, and what was found."""
 
-    recordings: Recordings
-    short: Track
-    long: Track
+    recordings: FittedSegments
+    short: LawFitProgress
+    long: LawFitProgress
     fits: list[LawFit]
     bend_of: Callable[[LawFit], float]
     found: LawSearch
 
 
-def _look(recordings: Recordings, linearity: Linearity, laws: Sequence[Law]) -> _Look:
+def _look(recordings: FittedSegments, linearity: Linearity, laws: Sequence[Law]) -> _Look:
     """Try every law at every place, and judge the best."""
     short, long = recordings.tracks()
 
-    def track_of(duration_s: float, floor: float) -> Track:
+    def track_of(duration_s: float, floor: float) -> LawFitProgress:
         return replace(recordings.track(duration_s, floor, loudest=False), where=long.where)
 
     first = partial(track_of, FIRST / recordings.training.band_hz[1], ROUGH) if short.missed > WEAK else None
@@ -277,18 +277,18 @@ def _anywhere(look: _Look) -> AnyForce:
     return early if early.cost < first.cost + TIE else first
 
 
-def _can_explain(track: Track, place: int) -> bool:
+def _can_explain(track: LawFitProgress, place: int) -> bool:
     """Say whether sensors tell that some force at a place, whatever it does, explains what nothing linear does."""
     least = min((free.cost for free in track.where.forces if free.place == place), default=np.inf)
     return least < min(track.linear.n_rows, HALVED * track.linear.cost)
 
 
-def _bend(track: Track, fit: LawFit) -> float:
+def _bend(track: LawFitProgress, fit: LawFit) -> float:
     """Drop of the cost by forces of other kinds at the place of a law."""
     return gain_of_further(track.stretches, track.linear.freedom, fit.start(), simple_forces)
 
 
-def _with_place(found: LawSearch, plant: Plant, best: AnyForce, part: float) -> LawSearch:
+def _with_place(found: LawSearch, plant: ModalModel, best: AnyForce, part: float) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
     left = best.left
     if left > max(min(PLACED, HALVED * best.missed), part * best.missed):
@@ -307,12 +307,16 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
     if observations.kind == "hammer":
         groups = [observations.at(dof) for dof in observations.input_dofs]
         held = [group[1] for group in groups if len(group) >= LEAST_TO_HOLD]
-    kept = tuple(blow for blow in observations.blows if not any(blow is other for other in held))
-    return replace(observations, blows=kept), replace(observations, blows=tuple(held))
+    kept = tuple(record for record in observations.records if not any(record is other for other in held))
+    return replace(observations, records=kept), replace(observations, records=tuple(held))
 
 
 def _judge(
-    track: Track, linearity: Linearity, plant: Plant, fits: list[LawFit], bend_of: Callable[[LawFit], float]
+    track: LawFitProgress,
+    linearity: Linearity,
+    plant: ModalModel,
+    fits: list[LawFit],
+    bend_of: Callable[[LawFit], float],
 ) -> LawSearch:
     if not fits:
         return LawSearch(
@@ -341,7 +345,7 @@ def _judge(
     )
 
 
-def _ranked(track: Track, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]:
+def _ranked(track: LawFitProgress, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]:
     """Order fits by their evidence, which is given too: half the drop of the cost.
 
     Where that is little, how blows disagree counts besides, which the model's errors do not hide. What explains alike
@@ -360,7 +364,7 @@ def _ranked(track: Track, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]
 
 
 def _complaint(
-    track: Track, best: LawFit, agreement: Agreement, gain: float, bend_of: Callable[[LawFit], float]
+    track: LawFitProgress, best: LawFit, agreement: Agreement, gain: float, bend_of: Callable[[LawFit], float]
 ) -> str:
     """Say what is wrong with a law; nothing where it explains the recordings."""
     if np.fmin(gain, agreement.gain) < FOUND_NATS:
@@ -379,13 +383,13 @@ def _complaint(
     return ""
 
 
-def _explains_first(firsts: Iterable[Track], fit: LawFit) -> bool:
+def _explains_first(firsts: Iterable[LawFitProgress], fit: LawFit) -> bool:
     """Say whether a law explains all but little of first moments; later, errors of the model may have grown."""
     return any(_explains_most(first, fit) for first in firsts)
 
 
-def _explains_most(track: Track, fit: LawFit) -> bool:
-    again = min(track.shoot(fit, FRESH), track.shoot_afresh(fit, FRESH), key=lambda one: one.cost)
+def _explains_most(track: LawFitProgress, fit: LawFit) -> bool:
+    again = min(track.fit_output_error(fit, FRESH), track.fit_output_error_afresh(fit, FRESH), key=lambda one: one.cost)
     if again.cost > NEARLY_ALL * track.linear.cost:
         return False
     agreement = agreement_with(track.stretches, track.linear.freedom, again)
@@ -394,13 +398,13 @@ def _explains_most(track: Track, fit: LawFit) -> bool:
     return bent < _bend_of_errors(track, again, BENT) and not _complaint(track, again, agreement, gain, lambda _: bent)
 
 
-def _is_bent(track: Track, fit: LawFit, drop: float, *, least: float) -> bool:
+def _is_bent(track: LawFitProgress, fit: LawFit, drop: float, *, least: float) -> bool:
     """Other forces at the place of a law explain more than errors of the model imitate, and so many nats at least."""
     parts = BENT_MOVING if track.stretches.moving.any() else BENT
     return drop > _bend_of_errors(track, fit, parts) and 0.5 * drop / max(1.0, fit.cost / fit.n_rows) > least
 
 
-def _bend_of_errors(track: Track, fit: LawFit, parts: tuple[float, float]) -> float:
+def _bend_of_errors(track: LawFitProgress, fit: LawFit, parts: tuple[float, float]) -> float:
     """Drop of the cost by forces of other kinds that errors of the model imitate."""
     of_cost, of_gain = parts
     return max(of_cost * fit.cost, of_gain * (track.linear.cost - fit.cost))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import march
+from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import step_in_time
 from frf_ipz.diagnosis.nonlinear.linear.place_in_time import PlaceInTime
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.segments import FINER, Window, transform
@@ -20,10 +20,10 @@ from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import March
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import TimeSteps
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.dofs import Dof
 
@@ -56,7 +56,9 @@ class Simulation:
     misfit: FloatArray
 
 
-def simulate(observations: Observations, freedom: Freedom, fit: LawFit, *, duration_s: float = np.inf) -> Simulation:
+def simulate(
+    observations: Observations, freedom: NuisancePrior, fit: LawFit, *, duration_s: float = np.inf
+) -> Simulation:
     """Simulate records.
 
     Parameters
@@ -64,7 +66,7 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit, *, durat
     observations : Observations
         Blows or records that start at rest, without the dispersion of their converters (`without_dispersion`) if the
         law was fitted without it.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -96,14 +98,14 @@ def simulate(observations: Observations, freedom: Freedom, fit: LawFit, *, durat
     )
 
 
-def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Observations:
+def without_law(observations: Observations, freedom: NuisancePrior, fit: LawFit) -> Observations:
     """Take out of recordings what a law adds to them.
 
     Parameters
     ----------
     observations : Observations
         As for `simulate`.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -120,29 +122,31 @@ def without_law(observations: Observations, freedom: Freedom, fit: LawFit) -> Ob
     """
     place, done = _in_time(observations, freedom, fit, np.inf)
     added = _sensors(place, done.force) - _sensors(place, np.zeros_like(done.force))
-    blows, keys = list(observations.blows), _channels(freedom.plant)
-    for row, number in enumerate(place.stretches.blow_of):
-        blow, start = blows[number], place.stretches.first_sample[row]
-        left = blow.responses.copy()
-        for response, sensor in zip(left, blow.sensors, strict=True):
+    records, keys = list(observations.records), _channels(freedom.plant)
+    for row, number in enumerate(place.stretches.record_of):
+        record, start = records[number], place.stretches.first_sample[row]
+        left = record.responses.copy()
+        for response, sensor in zip(left, record.sensors, strict=True):
             response[start : start + added.shape[-1]] -= added[row, keys.index((sensor.channel, sensor.dof))]
-        blows[number] = replace(blow, responses=left)
-    return replace(observations, blows=tuple(blows))
+        records[number] = replace(record, responses=left)
+    return replace(observations, records=tuple(records))
 
 
-def _in_time(observations: Observations, freedom: Freedom, fit: LawFit, duration_s: float) -> tuple[PlaceInTime, March]:
+def _in_time(
+    observations: Observations, freedom: NuisancePrior, fit: LawFit, duration_s: float
+) -> tuple[PlaceInTime, TimeSteps]:
     """Go through records, or the first part of them."""
-    longest = max(blow.duration_s for blow in observations.blows)
+    longest = max(record.duration_s for record in observations.records)
     window = Window(duration_s=min(duration_s, longest), loudest=False)
     stretches = transform(observations, freedom.plant, read_noise(observations), window)
     if stretches.moving.any():
         raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
     yielding = place.yielding(constant=fit.law.holds)
-    return place, march(fit.law, (fit.strength, fit.shape), yielding, *place.without_law())
+    return place, step_in_time(fit.law, (fit.strength, fit.shape), yielding, *place.without_law())
 
 
-def _channels(plant: Plant) -> list[tuple[str, Dof]]:
+def _channels(plant: ModalModel) -> list[tuple[str, Dof]]:
     return [(sensor.channel, sensor.dof) for sensor in plant.sensors]
 
 
@@ -167,12 +171,12 @@ def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
     return shown
 
 
-def _measured(observations: Observations, plant: Plant, stretches: Stretches) -> FloatArray:
-    found = np.zeros((stretches.n_blows, stretches.motion.shape[1], stretches.n_samples))
+def _measured(observations: Observations, plant: ModalModel, stretches: SegmentSet) -> FloatArray:
+    found = np.zeros((stretches.n_records, stretches.motion.shape[1], stretches.n_samples))
     keys = _channels(plant)
-    for row, number in enumerate(stretches.blow_of):
-        blow, start = observations.blows[number], stretches.first_sample[row]
-        for sensor, response in zip(blow.sensors, blow.responses, strict=True):
+    for row, number in enumerate(stretches.record_of):
+        record, start = observations.records[number], stretches.first_sample[row]
+        for sensor, response in zip(record.sensors, record.responses, strict=True):
             found[row, keys.index((sensor.channel, sensor.dof))] = response[start : start + stretches.n_samples]
     return found
 

@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.physics.response import Modes, Response, Rows, respond, r
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 
 
 REMEMBERED = 4  # sets of values
@@ -65,7 +65,7 @@ class Hypothesis:
         Coordinates.
     rows : Rows
         Sensors and blows in them.
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     nuisance : Nuisance
         What cannot be known.
@@ -77,7 +77,7 @@ class Hypothesis:
     counts: tuple[int, ...]
     basis: Basis
     rows: Rows
-    specimen: Specimen
+    specimen: ModelContext
     nuisance: Nuisance
     _latest: dict[bytes, Modified] = field(init=False, default_factory=dict, repr=False)
 
@@ -162,12 +162,12 @@ class Hypothesis:
         return self._latest[key]
 
 
-def suppose(specimen: Specimen, nuisance: Nuisance, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
+def suppose(specimen: ModelContext, nuisance: Nuisance, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
     """Make a hypothesis.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     nuisance : Nuisance
         What cannot be known.

@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis, suppose
 from frf_ipz.diagnosis.search.map_fit import polish, same_modes
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.physics.nuisance import Nuisance
 
@@ -23,12 +23,12 @@ LAST_STEPS = 90  # along a bent valley many are small
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Bench:
+class InferenceProblem:
     """Everything a search works with.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     nuisance : Nuisance
         What cannot be known.
@@ -46,7 +46,7 @@ class Bench:
         What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     """
 
-    specimen: Specimen
+    specimen: ModelContext
     nuisance: Nuisance
     effects: Mapping[str, Effect]
     coarse: Measured

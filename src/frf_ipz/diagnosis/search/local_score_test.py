@@ -17,11 +17,11 @@ from frf_ipz.diagnosis.search.score import Score, score_on
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.diagnosis.catalogue.effect import Parameter, Sketch
+    from frf_ipz.diagnosis.catalogue.effect import Parameter, Signature
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 COLUMNS = 600  # signatures that are weighed together
 BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear
@@ -29,12 +29,12 @@ LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are
 FADING = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
 
 
-def close_search(bench: Bench, base: Fit) -> list[Start]:
+def close_search(bench: InferenceProblem, base: Fit) -> list[Start]:
     """Look for small effects.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already, nearly right.
@@ -55,7 +55,7 @@ def close_search(bench: Bench, base: Fit) -> list[Start]:
     return sorted(found, key=lambda start: start.cost)
 
 
-def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Sketch]]) -> list[Start]:
+def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Signature]]) -> list[Start]:
     """Weigh all shapes of all sketches; keep the best of each."""
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
@@ -77,7 +77,10 @@ def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Sketch]]) 
 
 
 def _weigh(
-    score: Score, drawn: list[tuple[Cause, Sketch]], batch: list[tuple[int, int, ComplexArray]], best: dict[int, Start]
+    score: Score,
+    drawn: list[tuple[Cause, Signature]],
+    batch: list[tuple[int, int, ComplexArray]],
+    best: dict[int, Start],
 ) -> None:
     sizes, gains = score.weigh(np.stack([change for _, _, change in batch], 2))
     for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):

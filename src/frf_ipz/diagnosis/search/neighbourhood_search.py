@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.search.fit import Fit
 from frf_ipz.diagnosis.search.global_scan.grid_scan import best_start, causes_of
 from frf_ipz.diagnosis.search.global_scan.refine import refine
 from frf_ipz.diagnosis.search.global_scan.starts import REFINED_ERROR
-from frf_ipz.diagnosis.search.inference_problem import Bench, weights_of
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
 from frf_ipz.diagnosis.search.map_fit import polish
 
 if TYPE_CHECKING:
@@ -51,12 +51,12 @@ def bar_of(fits: Iterable[Fit]) -> float:
     return WANTED * best.cost + BEHIND if best is not None and best.is_nearly_all else np.inf
 
 
-def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> None:
+def climb_all(bench: InferenceProblem, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> None:
     """Step to neighbours as long as that makes an effect more probable.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -79,19 +79,19 @@ def climb_all(bench: Bench, base: Fit, fits: Fits, n_effects: int = CLIMBED) -> 
             _climb(bench, base, leader, fits)
 
 
-def _add_imitators(bench: Bench, base: Fit, best: Fit, fits: Fits) -> None:
+def _add_imitators(bench: InferenceProblem, base: Fit, best: Fit, fits: Fits) -> None:
     """Fit what looks like the best, at its place or at one end of it."""
     for other in imitators_of(bench, best):
         if other.key not in fits:
             fits[other.key] = fit_from_neighbour(bench, base, other, best, bar_of(fits.values()))
 
 
-def imitators_of(bench: Bench, fit: Fit) -> list[Cause]:
+def imitators_of(bench: InferenceProblem, fit: Fit) -> list[Cause]:
     """List what looks like the last cause of a fit, at its place or at one end of it.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     fit : Fit
         With one cause at least.
@@ -120,7 +120,7 @@ def are_alike(one: Effect, other: Effect) -> bool:
     return one.name in other.imitators or other.name in one.imitators
 
 
-def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
+def _climb(bench: InferenceProblem, base: Fit, fit: Fit, fits: Fits) -> None:
     for _ in range(MOST_STEPS):
         cause = fit.hypothesis.causes[-1]
         beside = cause.effect.neighbours(bench.specimen, cause.place)
@@ -135,7 +135,7 @@ def _climb(bench: Bench, base: Fit, fit: Fit, fits: Fits) -> None:
         fit = better
 
 
-def _settle(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> None:
+def _settle(bench: InferenceProblem, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> None:
     """Go on with fits beside the best place that were given up on their way: small steps may lead far down.
 
     Where they do not, the best place's values and scatter may be the better start.
@@ -150,7 +150,7 @@ def _settle(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fi
             fits[cause.key] = max(went_on, anew, key=lambda one: one.log_evidence)
 
 
-def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
+def _best_of(bench: InferenceProblem, base: Fit, fit: Fit, places: Sequence[Place], fits: Fits) -> Fit:
     """Fit the last cause at other places too; the fit itself where none is better."""
     cause = fit.hypothesis.causes[-1]
     better = fit
@@ -165,7 +165,7 @@ def _best_of(bench: Bench, base: Fit, fit: Fit, places: Sequence[Place], fits: F
     return better
 
 
-def _promising_around(bench: Bench, fit: Fit) -> list[Place]:
+def _promising_around(bench: InferenceProblem, fit: Fit) -> list[Place]:
     """Choose places further around the last cause by one step on few data: far from the axis they are all alike."""
     glances = []
     for causes, values in further_around(bench, fit.hypothesis.causes, fit.values)[:GLANCED_AT]:
@@ -177,13 +177,13 @@ def _promising_around(bench: Bench, fit: Fit) -> list[Place]:
 
 
 def further_around(
-    bench: Bench, causes: tuple[Cause, ...], values: FloatArray
+    bench: InferenceProblem, causes: tuple[Cause, ...], values: FloatArray
 ) -> list[tuple[tuple[Cause, ...], FloatArray]]:
     """Bring values to places further around the last cause.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     causes : tuple of Cause
         The last one is moved.
@@ -205,12 +205,12 @@ def further_around(
     return [(there, at) for _, there, at in sorted(found, key=lambda one: one[0])]
 
 
-def fit_from_neighbour(bench: Bench, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
+def fit_from_neighbour(bench: InferenceProblem, base: Fit, cause: Cause, fit: Fit, bar: float) -> Fit:
     """Fit a cause from the values and the scatter of a fit of a similar one.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.

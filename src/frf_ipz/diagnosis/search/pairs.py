@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.search.global_scan.grid_scan import wide_search
 from frf_ipz.diagnosis.search.global_scan.refine import refine
 from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.global_scan.starts import REFINED_ERROR, bring_closer, spread, step_far
-from frf_ipz.diagnosis.search.inference_problem import Bench, weights_of
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
 from frf_ipz.diagnosis.search.map_fit import polish
 from frf_ipz.diagnosis.search.neighbourhood_search import GAIN, Fits, bar_of, climb_all
 from frf_ipz.diagnosis.search.search import Ranking, by_effect, how_many, ranked, search, search_beside
@@ -42,12 +42,12 @@ CLOSER_PAIRS, EARLY_PAIRS, EXACT_PAIRS = 16, 8, 4  # that come half-way to the a
 FAR_BEHIND, SLACK = 4.0, 400.0  # times the best one's cost, and nats: such pairs are not fitted exactly
 
 
-def search_second(bench: Bench, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
+def search_second(bench: InferenceProblem, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
     """Search for two causes.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     first : Ranking
         Of one cause.
@@ -86,7 +86,7 @@ def _likeliest(found: list[Ranking]) -> Ranking:
     return best
 
 
-def _from_others(bench: Bench, first: Ranking, best: Fit, count: int) -> list[Ranking]:
+def _from_others(bench: InferenceProblem, first: Ranking, best: Fit, count: int) -> list[Ranking]:
     """Search beside other first causes: one with parameters of its own may have stood for both."""
     others = [fits[0] for fits in by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
     found = [search_beside(bench, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others]
@@ -97,7 +97,7 @@ def _is_near(pair: Fit, best: Fit) -> bool:
     return len(pair.hypothesis.causes) > 1 and pair.log_evidence > best.log_evidence - NEAR_NATS
 
 
-def _settled(bench: Bench, pairs: Ranking) -> Ranking:
+def _settled(bench: InferenceProblem, pairs: Ranking) -> Ranking:
     """Step both causes of the best pair to better places: the first was placed when it was alone.
 
     Where the first one moves, others are searched beside it again.
@@ -112,7 +112,7 @@ def _settled(bench: Bench, pairs: Ranking) -> Ranking:
     return _likeliest([settled, search_beside(bench, base, PROMISED * (best.log_evidence - base.log_evidence))])
 
 
-def _simpler(bench: Bench, pairs: Ranking) -> Ranking:
+def _simpler(bench: InferenceProblem, pairs: Ranking) -> Ranking:
     """Try other effects for either cause of a pair, and go on from there: one with dynamics can stand for many."""
     found = pairs.best
     for pair in (found, _turned(bench, found)):
@@ -127,18 +127,18 @@ def _is_other(fit: Fit, pair: Fit) -> bool:
     return one.name != other.name and _is_near(fit, pair)
 
 
-def _around(bench: Bench, best: Fit, n_tried: int) -> Ranking:
+def _around(bench: InferenceProblem, best: Fit, n_tried: int) -> Ranking:
     """Look at all neighbours of the last cause of a pair."""
     base = bench.fit(best.hypothesis.causes[:1], best.values[: best.hypothesis.counts[0]])
     return Ranking(base=base, fits=ranked(bench, _neighbours(bench, best)), n_tried=n_tried)
 
 
-def _newest_alone(bench: Bench, fit: Fit) -> Fit:
+def _newest_alone(bench: InferenceProblem, fit: Fit) -> Fit:
     count = fit.hypothesis.counts[-1]
     return bench.fit((fit.hypothesis.causes[-1],), fit.values[len(fit.values) - count :])
 
 
-def _of_pairs(bench: Bench, first: Ranking, known: float) -> list[Ranking]:
+def _of_pairs(bench: InferenceProblem, first: Ranking, known: float) -> list[Ranking]:
     """Search for pairs far from the axis; the best one is kept, and stepped to better places, if it beats a cost."""
     starts = spread(first.refined, 1)[:FIRSTS]
     pairs: list[tuple[Cause, Start]] = []
@@ -156,7 +156,7 @@ def _of_pairs(bench: Bench, first: Ranking, known: float) -> list[Ranking]:
     return [_around(bench, best, first.n_tried * len(starts))]
 
 
-def _early(bench: Bench, pairs: list[tuple[Cause, Start]]) -> list[Fit]:
+def _early(bench: InferenceProblem, pairs: list[tuple[Cause, Start]]) -> list[Fit]:
     """Fit the best pairs with large errors, each one once whichever of its causes came first."""
     pairs = _once(pairs)
     limit = NOT_MUCH * pairs[0][1].cost
@@ -177,7 +177,7 @@ def _once(pairs: list[tuple[Cause, Start]]) -> list[tuple[Cause, Start]]:
     return list(once.values())
 
 
-def _stepped(bench: Bench, cause: Cause, both: Start) -> tuple[Cause, Start]:
+def _stepped(bench: InferenceProblem, cause: Cause, both: Start) -> tuple[Cause, Start]:
     """Step one cause of a pair to better places, and then the other."""
     for _ in range(2):
         both = step_far(bench, (cause,), both)
@@ -187,7 +187,7 @@ def _stepped(bench: Bench, cause: Cause, both: Start) -> tuple[Cause, Start]:
     return cause, both
 
 
-def _companions(bench: Bench, start: Start) -> list[Start]:
+def _companions(bench: InferenceProblem, start: Start) -> list[Start]:
     """Find what explains most beside a cause, far from the axis."""
     base = _as_it_is(bench, start.cause, start.values)
     starts = [one for one in wide_search(bench, base) if one.cause.key != start.cause.key]
@@ -200,17 +200,17 @@ def _companions(bench: Bench, start: Start) -> list[Start]:
     return found
 
 
-def _as_it_is(bench: Bench, cause: Cause, values: FloatArray) -> Fit:
+def _as_it_is(bench: InferenceProblem, cause: Cause, values: FloatArray) -> Fit:
     """Take a cause with the values that it has beside another one."""
     return polish(bench.suppose((cause,)), bench.early, values, iterations=0)
 
 
-def _climbed(bench: Bench, fit: Fit) -> Fit:
+def _climbed(bench: InferenceProblem, fit: Fit) -> Fit:
     """Exchange the two causes and step the new last one to better places."""
     return max(_neighbours(bench, _turned(bench, fit)), key=lambda one: one.log_evidence)
 
 
-def _climbed_up(bench: Bench, fit: Fit) -> Fit:
+def _climbed_up(bench: InferenceProblem, fit: Fit) -> Fit:
     """Step both causes in turn until neither gains."""
     vain = 0
     for _ in range(MOST_TURNS):
@@ -222,7 +222,7 @@ def _climbed_up(bench: Bench, fit: Fit) -> Fit:
     return fit
 
 
-def _turned(bench: Bench, fit: Fit) -> Fit:
+def _turned(bench: InferenceProblem, fit: Fit) -> Fit:
     """Exchange the two causes."""
     hypothesis, count = fit.hypothesis, fit.hypothesis.counts[0]
     values = np.concatenate([fit.values[count:], fit.values[:count]])
@@ -230,7 +230,7 @@ def _turned(bench: Bench, fit: Fit) -> Fit:
     return polish(bench.suppose(causes), bench.data, values, unknown=fit.unknown, iterations=4, tolerance=0.5)
 
 
-def _neighbours(bench: Bench, pair: Fit) -> list[Fit]:
+def _neighbours(bench: InferenceProblem, pair: Fit) -> list[Fit]:
     """Step the last cause of a pair to better places; the pair is among what is given."""
     hypothesis = pair.hypothesis
     first = _as_it_is(bench, hypothesis.causes[0], pair.values[: hypothesis.counts[0]])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.fit import Data, Fit
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,7 +25,7 @@ class Score:
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         The data.
     base : Fit
         What is supposed already.
@@ -43,7 +43,7 @@ class Score:
         Of the base.
     """
 
-    bench: Bench
+    bench: InferenceProblem
     base: Fit
     data: Data
     misfit: FloatArray
@@ -94,12 +94,12 @@ class Score:
         return float(one @ other - seen[0] @ seen[1])
 
 
-def score_on(bench: Bench, base: Fit, data: Data) -> Score:
+def score_on(bench: InferenceProblem, base: Fit, data: Data) -> Score:
     """Prepare scores on top of a fit.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         What is tested.
     base : Fit
         What is supposed already.

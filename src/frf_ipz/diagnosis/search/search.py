@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.search.fit import Fit
 from frf_ipz.diagnosis.search.global_scan.grid_scan import search_among_scatter, wide_search
 from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.global_scan.starts import bring_closer, refine_far, spread
-from frf_ipz.diagnosis.search.inference_problem import Bench
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 from frf_ipz.diagnosis.search.local_score_test import close_search
 from frf_ipz.diagnosis.search.neighbourhood_search import (
     CLIMBED,
@@ -93,17 +93,17 @@ def by_effect(fits: Iterable[Fit]) -> list[tuple[Fit, ...]]:
     return [tuple(groups[name]) for name in sorted(groups, key=lambda name: -total[name])]
 
 
-def fit_nothing(bench: Bench) -> Fit:
+def fit_nothing(bench: InferenceProblem) -> Fit:
     """Fit the nominal model with what cannot be known."""
     return bench.fit((), np.zeros(0))
 
 
-def search(bench: Bench, base: Fit) -> Ranking:
+def search(bench: InferenceProblem, base: Fit) -> Ranking:
     """Search for one more cause.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -129,12 +129,12 @@ def search(bench: Bench, base: Fit) -> Ranking:
     return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=n_tried, refined=tuple(refined))
 
 
-def ranked(bench: Bench, fits: Iterable[Fit]) -> tuple[Fit, ...]:
+def ranked(bench: InferenceProblem, fits: Iterable[Fit]) -> tuple[Fit, ...]:
     """Sort fits by falling evidence; the best ones go on where they have not converged.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     fits : iterable of Fit
         In any order.
@@ -152,12 +152,12 @@ def ranked(bench: Bench, fits: Iterable[Fit]) -> tuple[Fit, ...]:
     return tuple(sorted([*settled, *order[SETTLED:]], key=lambda fit: -fit.log_evidence))
 
 
-def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
+def search_beside(bench: InferenceProblem, base: Fit, least: float) -> Ranking:
     """Search for one more cause that is small: from a fit that leaves nothing to explain but what scatter hides.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         Nearly right.
@@ -178,7 +178,7 @@ def search_beside(bench: Bench, base: Fit, least: float) -> Ranking:
     return Ranking(base=base, fits=ranked(bench, fits.values()), n_tried=len(found))
 
 
-def _add_close(bench: Bench, base: Fit, fits: Fits) -> int:
+def _add_close(bench: InferenceProblem, base: Fit, fits: Fits) -> int:
     """Fit small effects from where the base is, if one linear step promises something."""
     found = close_search(bench, base)
     starts = _most_promising(found, PROMISING if base.is_nearly_right else MOST_OF_IT * base.cost)
@@ -200,7 +200,7 @@ def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
     return [start for start in starts[:CLOSE_FITTED] if -start.cost > max(least, -starts[0].cost - HOPELESS)]
 
 
-def _keep_close(bench: Bench, base: Fit, start: Start, fits: Fits) -> None:
+def _keep_close(bench: InferenceProblem, base: Fit, start: Start, fits: Fits) -> None:
     """Fit a small effect from where the base is; anew, where that gains much less than one linear step promised."""
     hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
     values, bar = np.concatenate([base.values, start.values]), bar_of((base, *fits.values()))
@@ -225,7 +225,7 @@ def keep(fits: Fits, fit: Fit) -> None:
         fits[key] = fit
 
 
-def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
+def _fitted(bench: InferenceProblem, base: Fit, refined: Sequence[Start]) -> Fits:
     """Fit with large errors first, and exactly what then is not far behind."""
     known = base.hypothesis.causes
     closer = bring_closer(bench, [(known, start) for start in refined[:FITTED]])
@@ -244,7 +244,7 @@ def _fitted(bench: Bench, base: Fit, refined: Sequence[Start]) -> Fits:
     return fits
 
 
-def _add_among_scatter(bench: Bench, base: Fit, fits: Fits) -> None:
+def _add_among_scatter(bench: InferenceProblem, base: Fit, fits: Fits) -> None:
     """Fit what stands out beside the scatter that was fitted without it."""
     known = base.hypothesis.causes
     starts = sorted(spread(search_among_scatter(bench, base), CLOSE_EACH), key=lambda start: start.cost)
@@ -274,7 +274,7 @@ def how_many(early: Sequence[Fit], usual: int) -> int:
     return FITTED_HOPELESS if early and early[0].is_hopeless else usual
 
 
-def _fit_imitators(bench: Bench, early: Sequence[Fit], fits: Fits) -> None:
+def _fit_imitators(bench: InferenceProblem, early: Sequence[Fit], fits: Fits) -> None:
     """Fit what is known to look like the best: far behind at first, it may yet be as good."""
     best = max(fits.values(), key=lambda fit: fit.log_evidence).hypothesis.causes[-1].effect
     fitted = {fit.hypothesis.causes[-1].effect.name for fit in fits.values()}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.model_context import Specimen
+from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
@@ -16,7 +16,7 @@ from frf_ipz.diagnosis.physics.modified import modify
 from frf_ipz.diagnosis.physics.nuisance import make_nuisance
 from frf_ipz.diagnosis.physics.response import respond, rows_of, scatter
 from frf_ipz.diagnosis.search.fit import Data
-from frf_ipz.diagnosis.search.inference_problem import Bench
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,7 +43,7 @@ def set_up(
     effects: Mapping[str, Effect],
     *,
     free_gains: str = "none",
-) -> Bench:
+) -> InferenceProblem:
     """Bring model and measurement together.
 
     Parameters
@@ -63,7 +63,7 @@ def set_up(
 
     Returns
     -------
-    Bench
+    InferenceProblem
         Ready for a search.
 
     Raises
@@ -81,9 +81,9 @@ def set_up(
     n_points = len(source.training.s)
     half = points_of(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
     few = points_of(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
-    specimen = Specimen(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
+    specimen = ModelContext(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
     early = with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
-    return Bench(
+    return InferenceProblem(
         specimen=specimen,
         nuisance=nuisance,
         effects=effects,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.campaign_file import run_labels
+from frf_ipz.ingest.campaign_file import setup_labels
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.spectra import SpectrumSums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.variance import frf_variance, power_to_variance
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.ingest.campaign_file import Run, Test
+    from frf_ipz.ingest.campaign_file import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.survey.record_info import Survey
 
 
 @dataclass(slots=True, eq=False)
-class RunAverage:
+class SetupAverage:
     """What has been summed for one run.
 
     Parameters
@@ -51,16 +51,18 @@ class _Estimate:
     count: int
 
 
-def assemble_frfs(test: Test, survey: Survey, averages: Mapping[Run, RunAverage], options: IngestOptions) -> FrfSet:
+def assemble_frfs(
+    test: VibrationTest, survey: Survey, averages: Mapping[TestSetup, SetupAverage], options: IngestOptions
+) -> FrfSet:
     """Make the FRFs of a test.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     survey : Survey
         Step, length and window.
-    averages : mapping of Run to RunAverage
+    averages : mapping of TestSetup to SetupAverage
         Sums of each run. An FRF that several runs measured is the mean of them all.
     options : IngestOptions
         The estimator.
@@ -90,12 +92,12 @@ def assemble_frfs(test: Test, survey: Survey, averages: Mapping[Run, RunAverage]
     )
 
 
-def about_variance(averages: Mapping[Run, RunAverage]) -> tuple[str, ...]:
+def about_variance(averages: Mapping[TestSetup, SetupAverage]) -> tuple[str, ...]:
     """Say where the variance comes from a single blow.
 
     Parameters
     ----------
-    averages : mapping of Run to RunAverage
+    averages : mapping of TestSetup to SetupAverage
         Sums of each run.
 
     Returns
@@ -111,23 +113,25 @@ def about_variance(averages: Mapping[Run, RunAverage]) -> tuple[str, ...]:
     return (f"a single blow or record at {', '.join(dict.fromkeys(single))}: no coherence, and the variance {source}",)
 
 
-def _sharing(test: Test) -> dict[tuple[Run, ...], list[FrfLabel]]:
+def _sharing(test: VibrationTest) -> dict[tuple[TestSetup, ...], list[FrfLabel]]:
     """Group the labels by the runs that measured them."""
-    groups: dict[tuple[Run, ...], list[FrfLabel]] = {}
+    groups: dict[tuple[TestSetup, ...], list[FrfLabel]] = {}
     for label in test.labels:
-        runs = tuple(run for run in test.runs if label in run_labels(test.channels, run))
+        runs = tuple(run for run in test.runs if label in setup_labels(test.channels, run))
         groups.setdefault(runs, []).append(label)
     return groups
 
 
-def _pool(test: Test, averages: Sequence[RunAverage], runs: Sequence[Run], labels: Sequence[FrfLabel]) -> RunAverage:
-    places = [[run_labels(test.channels, run).index(label) for label in labels] for run in runs]
+def _pool(
+    test: VibrationTest, averages: Sequence[SetupAverage], runs: Sequence[TestSetup], labels: Sequence[FrfLabel]
+) -> SetupAverage:
+    places = [[setup_labels(test.channels, run).index(label) for label in labels] for run in runs]
     first = averages[0]
     if len(averages) == 1:
         rows = places[0]
         sums = SpectrumSums(first.sums.force, first.sums.cross[rows], first.sums.responses[rows], first.sums.count)
         noise = None if first.response_noise is None else first.response_noise[rows]
-        return RunAverage(sums, first.independent, noise, first.force_noise)
+        return SetupAverage(sums, first.independent, noise, first.force_noise)
     parts = list(zip(averages, places, strict=True))
     sums = SpectrumSums(
         np.sum([one.sums.force for one in averages], axis=0),
@@ -135,10 +139,10 @@ def _pool(test: Test, averages: Sequence[RunAverage], runs: Sequence[Run], label
         np.sum([one.sums.responses[rows] for one, rows in parts], axis=0),
         sum(one.sums.count for one in averages),
     )
-    return RunAverage(sums, sum(one.independent for one in averages))
+    return SetupAverage(sums, sum(one.independent for one in averages))
 
 
-def _estimate(average: RunAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _Estimate]:
+def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _Estimate]:
     sums = average.sums
     values = estimate_frf(sums, estimator)
     coherence = estimate_coherence(sums)
@@ -154,7 +158,7 @@ def _estimate(average: RunAverage, labels: Sequence[FrfLabel], estimator: str) -
     }
 
 
-def _variance(average: RunAverage, values: ComplexArray) -> FloatArray:
+def _variance(average: SetupAverage, values: ComplexArray) -> FloatArray:
     """Take the scatter between blows, and of a single blow the noise in its own record."""
     if average.sums.count == 1 and average.response_noise is not None and average.force_noise is not None:
         power = average.response_noise.T + average.force_noise[:, None] * np.abs(values) ** 2

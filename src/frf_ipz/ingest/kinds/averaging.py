@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.ingest.frf_estimate import Recordings, Trace
-from frf_ipz.ingest.kinds.averages import RunAverage, about_variance, assemble_frfs
-from frf_ipz.ingest.kinds.record_table import blow_table
-from frf_ipz.ingest.kinds.traces import blow_traces
+from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
+from frf_ipz.ingest.kinds.averages import SetupAverage, about_variance, assemble_frfs
+from frf_ipz.ingest.kinds.record_table import record_table
+from frf_ipz.ingest.kinds.traces import record_traces
 from frf_ipz.ingest.recording_files import RecordingFiles
-from frf_ipz.ingest.records import read_blows, survey_blows
+from frf_ipz.ingest.records import read_records, survey_records
 from frf_ipz.ingest.spectra import empty_sums
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.records import Blow
+    from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey
     from frf_ipz.progress import Progress
 
@@ -28,13 +28,16 @@ SURVEYED = 0.6  # share of the work that the first look takes
 
 
 def average_recordings(
-    test: Test, options: IngestOptions, progress: Progress, add: Callable[[RunAverage, Blow, Survey], float]
-) -> Recordings:
+    test: VibrationTest,
+    options: IngestOptions,
+    progress: Progress,
+    add: Callable[[SetupAverage, Record, Survey], float],
+) -> FrfEstimate:
     """Average all blows or records of a test.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     options : IngestOptions
         The user's choice.
@@ -45,7 +48,7 @@ def average_recordings(
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs, table of blows, traces.
 
     Raises
@@ -54,19 +57,19 @@ def average_recordings(
         If a recording cannot be used.
     """
     files = RecordingFiles(test=test)
-    survey = survey_blows(files, options, lambda fraction, text: progress(SURVEYED * fraction, text))
+    survey = survey_records(files, options, lambda fraction, text: progress(SURVEYED * fraction, text))
     n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
-    averages = {run: RunAverage(empty_sums(n_lines, n_outputs)) for run in test.runs}
+    averages = {run: SetupAverage(empty_sums(n_lines, n_outputs)) for run in test.runs}
     energies: list[float] = []
     traces: tuple[Trace, ...] = ()
-    blows = read_blows(test, options, survey=survey, files=files, used_only=False)
-    for done, (facts, blow) in enumerate(zip(survey.blows, blows, strict=True)):
-        progress(SURVEYED + (1.0 - SURVEYED) * done / len(survey.blows), f"averaging {blow.name}")
-        traces = blow_traces(facts, blow, traces)
-        energies.append(add(averages[facts.run], blow, survey) if blow.used else 0.0)
-    return Recordings(
+    records = read_records(test, options, survey=survey, files=files, used_only=False)
+    for done, (facts, record) in enumerate(zip(survey.records, records, strict=True)):
+        progress(SURVEYED + (1.0 - SURVEYED) * done / len(survey.records), f"averaging {record.name}")
+        traces = record_traces(facts, record, traces)
+        energies.append(add(averages[facts.run], record, survey) if record.used else 0.0)
+    return FrfEstimate(
         frfs=assemble_frfs(test, survey, averages, options),
-        blows=blow_table(survey, energies),
+        records=record_table(survey, energies),
         traces=traces,
         choices=survey.choices,
         warnings=(*survey.warnings, *about_variance(averages)),

@@ -11,8 +11,8 @@ from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.campaign_file import frf_label
 from frf_ipz.ingest.formats.registry import read_frfs
-from frf_ipz.ingest.frf_estimate import Recordings
-from frf_ipz.ingest.kinds.record_table import empty_blow_table
+from frf_ipz.ingest.frf_estimate import FrfEstimate
+from frf_ipz.ingest.kinds.record_table import empty_record_table
 from frf_ipz.ingest.units import frf_factor
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
@@ -29,12 +29,12 @@ SAME_LINE = 0.01  # of the spacing: frequencies that differ by less are one line
 MOST_LOST = 0.5  # of the lines that two files could share: more than that is another grid
 
 
-def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -> Recordings:
+def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Read FRFs that were estimated elsewhere.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     options : IngestOptions
         Not used: there is nothing left to choose.
@@ -43,7 +43,7 @@ def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs in SI on the lines that all files share; no table of blows.
 
     Raises
@@ -62,7 +62,7 @@ def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -
     places = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
     nothing = [np.full(len(frf.frequency_hz), np.nan) for frf in frfs]
     pairs = list(zip(frfs, places, nothing, strict=True))
-    return Recordings(
+    return FrfEstimate(
         frfs=FrfSet(
             frequency_hz=lines,
             values=np.column_stack([frf.values[place] for frf, place, _ in pairs]),
@@ -72,7 +72,7 @@ def estimate_frf_files(test: Test, options: IngestOptions, progress: Progress) -
             averages=np.zeros(len(frfs), np.int64),
             unknown_scale=test.unknown_scale,
         ),
-        blows=empty_blow_table(),
+        records=empty_record_table(),
         warnings=warnings,
     )
 

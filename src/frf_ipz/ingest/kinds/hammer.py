@@ -11,21 +11,21 @@ from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.campaign_file import Test
-    from frf_ipz.ingest.frf_estimate import Recordings
-    from frf_ipz.ingest.kinds.averages import RunAverage
+    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.records import Blow
+    from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey
     from frf_ipz.progress import Progress
 
 
-def estimate_hammer(test: Test, options: IngestOptions, progress: Progress) -> Recordings:
+def estimate_hammer(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a hammer test.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     options : IngestOptions
         The user's choice.
@@ -34,7 +34,7 @@ def estimate_hammer(test: Test, options: IngestOptions, progress: Progress) -> R
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs, table of blows, traces.
 
     Raises
@@ -45,20 +45,20 @@ def estimate_hammer(test: Test, options: IngestOptions, progress: Progress) -> R
     return average_recordings(test, options, progress, _add)
 
 
-def _add(average: RunAverage, blow: Blow, survey: Survey) -> float:
+def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
     """Add a blow to its run's sums, and return the energy of its force."""
-    signals = blow.windowed(survey.decay_1_s, survey.n_samples)
+    signals = record.windowed(survey.decay_1_s, survey.n_samples)
     average.sums.add(signals[0], signals[1:])
     average.independent += 1.0
     if average.sums.count == 1:  # should it stay the only one, its own record has to tell the noise
-        _measure_noise(average, blow, survey)
+        _measure_noise(average, record, survey)
     return float(np.sum(signals[0] ** 2))
 
 
-def _measure_noise(average: RunAverage, blow: Blow, survey: Survey) -> None:
-    frequency = np.asarray(np.fft.rfftfreq(survey.n_samples, blow.step_s))
-    decay = exponential_window(blow.n_samples, blow.step_s, survey.decay_1_s, blow.trigger)
-    kept = decay * force_window(blow.n_samples, *blow.kept_force)
-    responses = [noise_power(response[blow.trigger :], blow.step_s, frequency) for response in blow.responses]
+def _measure_noise(average: SetupAverage, record: Record, survey: Survey) -> None:
+    frequency = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
+    decay = exponential_window(record.n_samples, record.step_s, survey.decay_1_s, record.trigger)
+    kept = decay * force_window(record.n_samples, *record.kept_force)
+    responses = [noise_power(response[record.trigger :], record.step_s, frequency) for response in record.responses]
     average.response_noise = np.array(responses) * np.sum(decay**2)
-    average.force_noise = noise_power(blow.force[blow.trigger :], blow.step_s, frequency) * np.sum(kept**2)
+    average.force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency) * np.sum(kept**2)

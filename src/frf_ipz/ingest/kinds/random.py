@@ -14,21 +14,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign_file import Test
-    from frf_ipz.ingest.frf_estimate import Recordings
-    from frf_ipz.ingest.kinds.averages import RunAverage
+    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.records import Blow
+    from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey
     from frf_ipz.progress import Progress
 
 
-def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> Recordings:
+def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a test with a shaker.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test.
     options : IngestOptions
         The user's choice.
@@ -37,7 +37,7 @@ def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> R
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs, table of records, traces.
 
     Raises
@@ -48,7 +48,7 @@ def estimate_random(test: Test, options: IngestOptions, progress: Progress) -> R
     return average_recordings(test, options, progress, _add)
 
 
-def _add(average: RunAverage, record: Blow, survey: Survey) -> float:
+def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
     """Add a record to its run's sums, and return the energy of its force."""
     before = average.sums.count
     if survey.piece:
@@ -63,13 +63,13 @@ def _add(average: RunAverage, record: Blow, survey: Survey) -> float:
     return energy
 
 
-def _add_pieces(average: RunAverage, record: Blow, length: int) -> float:
+def _add_pieces(average: SetupAverage, record: Record, length: int) -> float:
     for force, responses in pieces_without_transients(record.force, record.responses, length):
         average.sums.add_spectra(force, responses)
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 
 
-def _windowed(record: Blow, survey: Survey) -> Iterable[FloatArray]:
+def _windowed(record: Record, survey: Survey) -> Iterable[FloatArray]:
     if survey.segment:
         return segments_of(np.vstack([record.force, record.responses]), survey.segment)
     return [record.windowed(survey.decay_1_s, survey.n_samples)]

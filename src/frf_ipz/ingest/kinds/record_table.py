@@ -9,10 +9,10 @@ import pandas as pd
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.ingest.survey.record_info import BlowFacts, Survey
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
 
 COLUMNS = (
-    "blow",
+    "record",
     "input_dof",
     "peak_force_N",
     "pulse_s",
@@ -30,7 +30,7 @@ COLUMNS = (
 )
 
 
-def blow_table(survey: Survey, energies: Sequence[float]) -> pd.DataFrame:
+def record_table(survey: Survey, energies: Sequence[float]) -> pd.DataFrame:
     """Make the table of blows.
 
     Parameters
@@ -47,16 +47,16 @@ def blow_table(survey: Survey, energies: Sequence[float]) -> pd.DataFrame:
         Columns as `Recordings` documents them.
     """
     totals: dict[object, float] = {}
-    for blow, energy in zip(survey.blows, energies, strict=True):
-        totals[blow.run] = totals.get(blow.run, 0.0) + energy
+    for record, energy in zip(survey.records, energies, strict=True):
+        totals[record.run] = totals.get(record.run, 0.0) + energy
     rows = [
-        _row(blow, energy / totals[blow.run] if totals[blow.run] else 0.0)
-        for blow, energy in zip(survey.blows, energies, strict=True)
+        _row(record, energy / totals[record.run] if totals[record.run] else 0.0)
+        for record, energy in zip(survey.records, energies, strict=True)
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def empty_blow_table() -> pd.DataFrame:
+def empty_record_table() -> pd.DataFrame:
     """Make the table of a test without recordings.
 
     Returns
@@ -67,21 +67,21 @@ def empty_blow_table() -> pd.DataFrame:
     return pd.DataFrame([], columns=list(COLUMNS))
 
 
-def _row(blow: BlowFacts, weight: float) -> tuple[object, ...]:
+def _row(record: RecordInfo, weight: float) -> tuple[object, ...]:
     return (
-        blow.name,
-        str(blow.run.input_dof),
-        blow.peak_force,
-        blow.pulse_s,
-        blow.used,
+        record.name,
+        str(record.run.input_dof),
+        record.peak_force,
+        record.pulse_s,
+        record.used,
         weight,
-        "; ".join(blow.marks),
-        blow.second_pulse,
-        blow.left,
-        blow.left_hz,
-        blow.snr_db,
-        blow.force_noise,
-        blow.step_s,
-        blow.n_samples,
-        blow.trigger * blow.step_s,
+        "; ".join(record.marks),
+        record.second_pulse,
+        record.left,
+        record.left_hz,
+        record.snr_db,
+        record.force_noise,
+        record.step_s,
+        record.n_samples,
+        record.trigger * record.step_s,
     )

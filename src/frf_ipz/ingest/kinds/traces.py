@@ -13,8 +13,8 @@ from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.records import Blow
-    from frf_ipz.ingest.survey.record_info import BlowFacts
+    from frf_ipz.ingest.records import Record
+    from frf_ipz.ingest.survey.record_info import RecordInfo
 
 N_POINTS = 2000
 MARGIN = 0.5  # of the pulse's stretch that is drawn on each side
@@ -22,14 +22,14 @@ MOST_FORCES = 400
 MOST_RESPONSES = 16
 
 
-def blow_traces(facts: BlowFacts, blow: Blow, drawn: tuple[Trace, ...]) -> tuple[Trace, ...]:
+def record_traces(facts: RecordInfo, record: Record, drawn: tuple[Trace, ...]) -> tuple[Trace, ...]:
     """Add what is drawn of one blow or record.
 
     Parameters
     ----------
-    facts : BlowFacts
+    facts : RecordInfo
         Where its pulse is.
-    blow : Blow
+    record : Record
         Its signals.
     drawn : tuple of Trace
         What is drawn of those before it.
@@ -45,27 +45,29 @@ def blow_traces(facts: BlowFacts, blow: Blow, drawn: tuple[Trace, ...]) -> tuple
         start, stop = facts.pulse
         margin = int(MARGIN * (stop - start))
         new.append(
-            _trace(blow, blow.labels[0].input_channel, blow.force, _force_unit(blow), start - margin, stop + margin)
+            _trace(
+                record, record.labels[0].input_channel, record.force, _force_unit(record), start - margin, stop + margin
+            )
         )
-    if blow.used and len(drawn) - forces < MOST_RESPONSES:
+    if record.used and len(drawn) - forces < MOST_RESPONSES:
         room = MOST_RESPONSES - (len(drawn) - forces)
-        for label, response in list(zip(blow.labels, blow.responses, strict=True))[:room]:
+        for label, response in list(zip(record.labels, record.responses, strict=True))[:room]:
             unit = si_unit(RESPONSES[label.quantity.power], rotational=label.output_dof.direction.startswith("r"))
-            new.append(_trace(blow, label.output_channel, response, unit, 0, blow.n_samples))
+            new.append(_trace(record, label.output_channel, response, unit, 0, record.n_samples))
     return (*drawn, *new)
 
 
-def _force_unit(blow: Blow) -> str:
-    return si_unit("force", rotational=blow.labels[0].input_dof.direction.startswith("r"))
+def _force_unit(record: Record) -> str:
+    return si_unit("force", rotational=record.labels[0].input_dof.direction.startswith("r"))
 
 
-def _trace(blow: Blow, channel: str, values: FloatArray, unit: str, start: int, stop: int) -> Trace:
+def _trace(record: Record, channel: str, values: FloatArray, unit: str, start: int, stop: int) -> Trace:
     start, stop = max(start, 0), min(stop, len(values))
     places, kept = thin(values[start:stop], N_POINTS)
     return Trace(
-        name=blow.name,
+        name=record.name,
         channel=channel,
         unit=unit,
-        time_s=np.asarray((places + start) * blow.step_s),
+        time_s=np.asarray((places + start) * record.step_s),
         values=np.array(kept),
     )

@@ -9,15 +9,15 @@ import numpy as np
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
 from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
-from frf_ipz.ingest.survey.record_info import BlowFacts
+from frf_ipz.ingest.survey.record_info import RecordInfo
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign_file import Test
+    from frf_ipz.ingest.campaign_file import VibrationTest
     from frf_ipz.ingest.signals.pulses import Pulse
-    from frf_ipz.ingest.survey.file_index import FileScan
+    from frf_ipz.ingest.survey.file_index import FileIndex
 
 SECOND_PULSE = 0.04  # of the first: smaller ones are no second blow
 CUT_OFF = 1e-3  # share of a mode's amplitude at the end of the record that is worth a window
@@ -29,22 +29,22 @@ OFFSET = 0.01  # of the highest value: an offset that is worth a word
 FEWEST_BEFORE = 16  # samples before the pulse that tell an offset
 
 
-def check_blow(
-    test: Test,
-    scan: FileScan,
+def check_impact(
+    test: VibrationTest,
+    scan: FileIndex,
     name: str,
     rows: tuple[int, int],
     signals: FloatArray,
     *,
     offsets: tuple[float, ...] | None = None,
-) -> BlowFacts:
+) -> RecordInfo:
     """Measure one blow and find what is wrong with it.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         Its channels.
-    scan : FileScan
+    scan : FileIndex
         Its file.
     name : str
         What it is called.
@@ -57,7 +57,7 @@ def check_blow(
 
     Returns
     -------
-    BlowFacts
+    RecordInfo
         Everything but what depends on other blows.
     """
     force, responses = signals[1], signals[2:]
@@ -72,7 +72,7 @@ def check_blow(
     decays = _decays(test, scan.step_s, responses - np.array(offsets)[:, None], trigger)
     worst = max(decays, key=lambda decay: decay.left)
     snr_db = _snr_db(responses - np.array(offsets)[:, None], trigger, decays)
-    return BlowFacts(
+    return RecordInfo(
         name=name,
         run=scan.run,
         path=scan.path,
@@ -101,14 +101,14 @@ def check_blow(
     )
 
 
-def check_record(test: Test, scan: FileScan, name: str, signals: FloatArray, *, rested: bool) -> BlowFacts:
+def check_record(test: VibrationTest, scan: FileIndex, name: str, signals: FloatArray, *, rested: bool) -> RecordInfo:
     """Measure one record of a shaker and find what is wrong with it.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         Its channels.
-    scan : FileScan
+    scan : FileIndex
         Its file.
     name : str
         What it is called.
@@ -119,14 +119,14 @@ def check_record(test: Test, scan: FileScan, name: str, signals: FloatArray, *, 
 
     Returns
     -------
-    BlowFacts
+    RecordInfo
         Everything but what depends on other records.
     """
     force, responses = signals[1], signals[2:]
     means = signals[1:].mean(axis=1)
     spread = signals[1:].std(axis=1)
     offsets = np.where(np.abs(means) > 0.1 * spread, means, 0.0)
-    return BlowFacts(
+    return RecordInfo(
         name=name,
         run=scan.run,
         path=scan.path,
@@ -156,7 +156,7 @@ def _double_hit(pulse: Pulse, step_s: float) -> tuple[str, ...]:
     return (f"double hit: {100 * pulse.ratios[strongest]:.0f} % of the pulse {1e3 * abs(delay):.3g} ms {side} it",)
 
 
-def _clipped(test: Test, force: FloatArray, responses: FloatArray) -> tuple[str, ...]:
+def _clipped(test: VibrationTest, force: FloatArray, responses: FloatArray) -> tuple[str, ...]:
     found = [f"clipping of {test.input_channel.column}"] if is_clipped(force) else []
     found += [
         f"overload of {channel.column}"
@@ -166,7 +166,7 @@ def _clipped(test: Test, force: FloatArray, responses: FloatArray) -> tuple[str,
     return tuple(found)
 
 
-def _decays(test: Test, step_s: float, responses: FloatArray, trigger: int) -> list[Decay]:
+def _decays(test: VibrationTest, step_s: float, responses: FloatArray, trigger: int) -> list[Decay]:
     return [
         measure_decay(response[trigger:], step_s, RESPONSES.index(channel.quantity))
         for channel, response in zip(test.output_channels, responses, strict=True)
@@ -204,7 +204,7 @@ def _offset(before: FloatArray) -> float:
     return mean if abs(mean) > SURE * spread / np.sqrt(len(before)) else 0.0
 
 
-def _restless(test: Test, responses: FloatArray, offsets: tuple[float, ...], start: int) -> tuple[str, ...]:
+def _restless(test: VibrationTest, responses: FloatArray, offsets: tuple[float, ...], start: int) -> tuple[str, ...]:
     if start < FEWEST_BEFORE:
         return ()
     before = np.sqrt(np.mean((responses[:, :start] - np.array(offsets)[:, None]) ** 2, axis=1))
@@ -217,7 +217,7 @@ def _restless(test: Test, responses: FloatArray, offsets: tuple[float, ...], sta
     return (f"not at rest before the blow: {100 * share[worst]:.2g} % of {test.output_channels[worst].column}",)
 
 
-def _shifted(test: Test, signals: FloatArray, offsets: tuple[float, ...]) -> tuple[str, ...]:
+def _shifted(test: VibrationTest, signals: FloatArray, offsets: tuple[float, ...]) -> tuple[str, ...]:
     highest = np.abs(signals - np.array(offsets)[:, None]).max(axis=1)
     return tuple(
         f"DC offset of {channel.column}: {offset:.3g} {si_unit(channel.quantity)}, taken off"

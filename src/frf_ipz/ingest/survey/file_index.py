@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.campaign_file import Run
+from frf_ipz.ingest.campaign_file import TestSetup
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -25,12 +25,12 @@ CROWDED = 0.5  # of the longest stretch between pulses: closer ones are one blow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FileScan:
+class FileIndex:
     """What one pass through a file tells.
 
     Parameters
     ----------
-    run : Run
+    run : TestSetup
         What the file belongs to.
     path : Path
         The file.
@@ -42,7 +42,7 @@ class FileScan:
         Row, to within a cell, at which each pulse of the force begins.
     """
 
-    run: Run
+    run: TestSetup
     path: Path
     n_rows: int
     step_s: float
@@ -79,14 +79,14 @@ class _Envelope:
         return np.asarray(np.maximum(highest - base, base - lowest))
 
 
-def scan_file(files: RecordingFiles, run: Run, path: Path, *, for_blows: bool) -> FileScan:
+def index_file(files: RecordingFiles, run: TestSetup, path: Path, *, for_records: bool) -> FileIndex:
     """Look through a file.
 
     Parameters
     ----------
     files : RecordingFiles
         The recordings.
-    run : Run
+    run : TestSetup
         What the file belongs to.
     path : Path
         The file.
@@ -95,7 +95,7 @@ def scan_file(files: RecordingFiles, run: Run, path: Path, *, for_blows: bool) -
 
     Returns
     -------
-    FileScan
+    FileIndex
         Length, step and pulses.
 
     Raises
@@ -111,16 +111,16 @@ def scan_file(files: RecordingFiles, run: Run, path: Path, *, for_blows: bool) -
         last = float(block[-1, 0])
         n_rows += len(block)
         envelope.add(block[:, 1])
-    onsets = _onsets(path, files.test.input_channel.column, envelope.size()) if for_blows else ()
-    return FileScan(run=run, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
+    onsets = _onsets(path, files.test.input_channel.column, envelope.size()) if for_records else ()
+    return FileIndex(run=run, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
 
 
-def split_blows(scan: FileScan, usual_length: int) -> tuple[tuple[int, int], ...]:
+def split_records(scan: FileIndex, usual_length: int) -> tuple[tuple[int, int], ...]:
     """Split a file at its blows.
 
     Parameters
     ----------
-    scan : FileScan
+    scan : FileIndex
         The file.
     usual_length : int
         Rows from a pulse to the next in this test.

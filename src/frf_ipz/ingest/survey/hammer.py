@@ -9,18 +9,18 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
-from frf_ipz.ingest.survey.checks import CUT_OFF, FEWEST_BEFORE, check_blow
-from frf_ipz.ingest.survey.file_index import scan_file, split_blows
+from frf_ipz.ingest.survey.checks import CUT_OFF, FEWEST_BEFORE, check_impact
+from frf_ipz.ingest.survey.file_index import index_file, split_records
 from frf_ipz.ingest.survey.record_info import Survey
-from frf_ipz.ingest.survey.selection import blow_name, check_names, choose, is_named
+from frf_ipz.ingest.survey.selection import check_names, is_named, record_name, select_records
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.survey.file_index import FileScan
-    from frf_ipz.ingest.survey.record_info import BlowFacts
+    from frf_ipz.ingest.survey.file_index import FileIndex
+    from frf_ipz.ingest.survey.record_info import RecordInfo
     from frf_ipz.progress import Progress
 
 LEFT = 3e-4  # share of the slowest mode that an automatic window leaves at the end: below the noise of good recordings
@@ -53,21 +53,21 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     """
     scans = _scan(files, options, progress)
     usual = int(np.median([scan.longest for scan in scans]))
-    blows: list[BlowFacts] = []
+    records: list[RecordInfo] = []
     for done, scan in enumerate(scans):
         progress(0.5 + 0.5 * done / len(scans), f"checking {scan.path.name}")
-        blows += _check_file(files, scan, usual)
-    files_named = [blow_name(files.test, path, 1, 1) for path in files.test.files]
-    check_names([*files_named, *(blow.name for blow in blows if "#" in blow.name)], options)
-    verdict = choose(blows, options)
-    used = [blow for blow in verdict.blows if blow.used]
+        records += _check_file(files, scan, usual)
+    files_named = [record_name(files.test, path, 1, 1) for path in files.test.files]
+    check_names([*files_named, *(record.name for record in records if "#" in record.name)], options)
+    verdict = select_records(records, options)
+    used = [record for record in verdict.records if record.used]
     _check_lengths(scans, used, options)
     n_samples = _common_length(used)
     decay_1_s, about_decay = _decay(used, options)
-    decided, about_force = _keep_force(verdict.blows, options)
+    decided, about_force = _keep_force(verdict.records, options)
     choices = (*about_decay, *about_force, *_about_lines(decay_1_s * n_samples * verdict.step_s))
     return Survey(
-        blows=tuple(replace(blow, stop=min(blow.stop, blow.start + n_samples)) for blow in decided),
+        records=tuple(replace(record, stop=min(record.stop, record.start + n_samples)) for record in decided),
         step_s=verdict.step_s,
         n_samples=n_samples,
         decay_1_s=decay_1_s,
@@ -77,56 +77,56 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     )
 
 
-def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> list[FileScan]:
+def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> list[FileIndex]:
     """Scan all files; one that the user drops may be anything."""
     test, scans = files.test, []
     wanted = [(run, path) for run in test.runs for path in run.files]
     for done, (run, path) in enumerate(wanted):
         progress(0.5 * done / len(test.files), f"reading {path.name}")
         try:
-            scans.append(scan_file(files, run, path, for_blows=True))
+            scans.append(index_file(files, run, path, for_records=True))
         except InputError:
-            if not is_named(blow_name(test, path, 1, 1), [text for text in options.drop if "#" not in text]):
+            if not is_named(record_name(test, path, 1, 1), [text for text in options.drop if "#" not in text]):
                 raise
     if not scans:
         raise InputError("[ingest] drop leaves no file to read; keep at least one")
     return scans
 
 
-def _check_file(files: RecordingFiles, scan: FileScan, usual: int) -> list[BlowFacts]:
+def _check_file(files: RecordingFiles, scan: FileIndex, usual: int) -> list[RecordInfo]:
     """Check the blows of a file: its channels are as far from zero as before the first one, at rest."""
-    bounds = split_blows(scan, usual)
+    bounds = split_records(scan, usual)
     stretches = files.stretches(scan.run, scan.path, bounds)
-    blows: list[BlowFacts] = []
+    records: list[RecordInfo] = []
     offsets = None
     for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
-        name = blow_name(files.test, scan.path, number, len(bounds))
-        facts = check_blow(files.test, scan, name, rows, signals, offsets=offsets)
-        blows.append(_without_long_lead(replace(facts, number=number)))
+        name = record_name(files.test, scan.path, number, len(bounds))
+        facts = check_impact(files.test, scan, name, rows, signals, offsets=offsets)
+        records.append(_without_long_lead(replace(facts, number=number)))
         if facts.pulse[0] >= FEWEST_BEFORE:
             offsets = offsets or facts.offsets[1:]
-    return blows
+    return records
 
 
-def _without_long_lead(blow: BlowFacts) -> BlowFacts:
+def _without_long_lead(record: RecordInfo) -> RecordInfo:
     """Begin a blow shortly before its pulse where the recording begins long before."""
-    if blow.trigger <= LONG_BEFORE * blow.n_samples:
-        return blow
-    start, stop = blow.pulse
-    lead = max(int(SHORT_BEFORE * blow.n_samples), 2 * (blow.trigger - start))
-    cut = max(blow.trigger - lead, 0)
+    if record.trigger <= LONG_BEFORE * record.n_samples:
+        return record
+    start, stop = record.pulse
+    lead = max(int(SHORT_BEFORE * record.n_samples), 2 * (record.trigger - start))
+    cut = max(record.trigger - lead, 0)
     return replace(
-        blow,
-        start=blow.start + cut,
-        trigger=blow.trigger - cut,
+        record,
+        start=record.start + cut,
+        trigger=record.trigger - cut,
         pulse=(start - cut, stop - cut),
-        kept_force=(0, blow.n_samples - cut),
+        kept_force=(0, record.n_samples - cut),
     )
 
 
-def _check_lengths(scans: Sequence[FileScan], used: Sequence[BlowFacts], options: IngestOptions) -> None:
+def _check_lengths(scans: Sequence[FileIndex], used: Sequence[RecordInfo], options: IngestOptions) -> None:
     """Refuse recordings of one blow whose lengths differ: one that was cut short would pass as a decay."""
-    names = {blow.path: blow.name for blow in used if "#" not in blow.name}
+    names = {record.path: record.name for record in used if "#" not in record.name}
     whole = [scan for scan in scans if scan.path in names]
     usual = int(np.median([scan.n_rows for scan in whole])) if whole else 0
     for scan in whole:
@@ -138,14 +138,14 @@ def _check_lengths(scans: Sequence[FileScan], used: Sequence[BlowFacts], options
             )
 
 
-def _common_length(used: Sequence[BlowFacts]) -> int:
+def _common_length(used: Sequence[RecordInfo]) -> int:
     """Take the longest of equally long recordings; of pieces of a longer one, what is usual."""
-    lengths = [blow.n_samples for blow in used]
+    lengths = [record.n_samples for record in used]
     longest, usual = max(lengths), int(np.median(lengths))
     return longest if longest <= (1.0 + ALIKE) * usual else usual - usual % 2
 
 
-def _decay(used: Sequence[BlowFacts], options: IngestOptions) -> tuple[float, tuple[str, ...]]:
+def _decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[float, tuple[str, ...]]:
     """Choose the exponential window: as asked for, or just what the slowest mode needs."""
     if options.exponential_window_s is not None:
         if options.exponential_window_s < 0.0:
@@ -154,7 +154,7 @@ def _decay(used: Sequence[BlowFacts], options: IngestOptions) -> tuple[float, tu
             return 0.0, ()
         rate = 1.0 / options.exponential_window_s
         return rate, (f"exponential window of {options.exponential_window_s:g} s on force and response, as asked for",)
-    rates = [(np.log(blow.left / LEFT) / blow.ringing_s, blow) for blow in used if blow.left > CUT_OFF]
+    rates = [(np.log(record.left / LEFT) / record.ringing_s, record) for record in used if record.left > CUT_OFF]
     if not rates:
         return 0.0, ()
     rate, worst = max(rates, key=lambda pair: float(pair[0]))
@@ -166,30 +166,32 @@ def _decay(used: Sequence[BlowFacts], options: IngestOptions) -> tuple[float, tu
     return float(rate), (text,)
 
 
-def _keep_force(blows: Sequence[BlowFacts], options: IngestOptions) -> tuple[tuple[BlowFacts, ...], tuple[str, ...]]:
+def _keep_force(
+    records: Sequence[RecordInfo], options: IngestOptions
+) -> tuple[tuple[RecordInfo, ...], tuple[str, ...]]:
     """Choose what is kept of the force: the pulse with its ringing, the same stretch for all blows."""
-    used = [blow for blow in blows if blow.used]
-    lead = max(blow.trigger - blow.pulse[0] for blow in used)
-    tail = max(blow.pulse[1] - blow.trigger for blow in used)
+    used = [record for record in records if record.used]
+    lead = max(record.trigger - record.pulse[0] for record in used)
+    tail = max(record.pulse[1] - record.trigger for record in used)
     step_s, asked = used[0].step_s, options.force_window_s
     if asked is not None and asked < 0.0:
         raise InputError(f"[ingest] force_window_s is {asked:g}; it is a time, or 0 for none")
     if asked is not None:
         tail = max(int(np.ceil(asked / step_s)), 1)
-    silent = all(blow.force_noise == 0.0 for blow in used)
-    gains = 2 * (lead + tail + 2 * taper_length(0, lead + tail)) < min(blow.n_samples for blow in used)
+    silent = all(record.force_noise == 0.0 for record in used)
+    gains = 2 * (lead + tail + 2 * taper_length(0, lead + tail)) < min(record.n_samples for record in used)
     if asked == 0.0 or (asked is None and (silent or not gains)):
-        return tuple(blows), ()
-    kept = tuple(replace(blow, kept_force=_stretch(blow, lead, tail)) for blow in blows)
+        return tuple(records), ()
+    kept = tuple(replace(record, kept_force=_stretch(record, lead, tail)) for record in records)
     why = "as asked for" if asked is not None else "the pulse and its ringing, as far as they stand out from the noise"
     text = f"force window from {1e3 * lead * step_s:.3g} ms before the blow to {1e3 * tail * step_s:.3g} ms after it: "
     return kept, (text + why,)
 
 
-def _stretch(blow: BlowFacts, lead: int, tail: int) -> tuple[int, int]:
+def _stretch(record: RecordInfo, lead: int, tail: int) -> tuple[int, int]:
     """Take the stretch of all blows, longer only for one that hit twice and is used nevertheless."""
-    stop = blow.trigger + tail
-    return blow.trigger - lead, max(stop, blow.pulse[1]) if blow.second_pulse else stop
+    stop = record.trigger + tail
+    return record.trigger - lead, max(stop, record.pulse[1]) if record.second_pulse else stop
 
 
 def _about_lines(decay: float) -> tuple[str, ...]:
@@ -199,9 +201,9 @@ def _about_lines(decay: float) -> tuple[str, ...]:
     return (f"the exponential window correlates the noise of neighbouring lines: one in {step} is independent",)
 
 
-def _about_rest(used: Sequence[BlowFacts], decay_1_s: float) -> tuple[str, ...]:
+def _about_rest(used: Sequence[RecordInfo], decay_1_s: float) -> tuple[str, ...]:
     """Warn where a window that the user chose, or ruled out, leaves more than the automatic one would."""
-    left = [(blow.left * float(np.exp(-decay_1_s * blow.ringing_s)), blow) for blow in used]
+    left = [(record.left * float(np.exp(-decay_1_s * record.ringing_s)), record) for record in used]
     most, worst = max(left, key=lambda pair: pair[0])
     if most <= CUT_OFF:
         return ()

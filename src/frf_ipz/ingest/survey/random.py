@@ -17,9 +17,9 @@ import numpy as np
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.survey.checks import check_record
-from frf_ipz.ingest.survey.file_index import scan_file
+from frf_ipz.ingest.survey.file_index import index_file
 from frf_ipz.ingest.survey.record_info import Survey
-from frf_ipz.ingest.survey.selection import blow_name, check_names, choose
+from frf_ipz.ingest.survey.selection import check_names, record_name, select_records
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.survey.file_index import FileScan
-    from frf_ipz.ingest.survey.record_info import BlowFacts
+    from frf_ipz.ingest.survey.file_index import FileIndex
+    from frf_ipz.ingest.survey.record_info import RecordInfo
     from frf_ipz.progress import Progress
 
 QUIET_SAMPLES = 2
@@ -61,15 +61,15 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
     InputError
         If a file cannot be used, or the user's choice makes no sense.
     """
-    check_names([blow_name(files.test, path, 1, 1) for path in files.test.files], options)
+    check_names([record_name(files.test, path, 1, 1) for path in files.test.files], options)
     records = []
     wanted = [(run, path) for run in files.test.runs for path in run.files]
     for done, (run, path) in enumerate(wanted):
         progress(0.5 * done / len(files.test.files), f"reading {path.name}")
-        records.append(_look(files, scan_file(files, run, path, for_blows=False)))
-    verdict = choose(records, options)
+        records.append(_look(files, index_file(files, run, path, for_records=False)))
+    verdict = select_records(records, options)
     survey = Survey(
-        blows=verdict.blows, step_s=verdict.step_s, n_samples=max(record.n_samples for record in verdict.blows)
+        records=verdict.records, step_s=verdict.step_s, n_samples=max(record.n_samples for record in verdict.records)
     )
     survey = replace(survey, n_samples=max(record.n_samples for record in survey.used), warnings=verdict.warnings)
     if options.segment_s is not None:
@@ -115,9 +115,9 @@ def independent_segments(count: int) -> float:
     return count / (1.0 + HANN_HALF_OVERLAP * (count - 1) / count) if count else 0.0
 
 
-def _look(files: RecordingFiles, scan: FileScan) -> BlowFacts:
+def _look(files: RecordingFiles, scan: FileIndex) -> RecordInfo:
     (signals,) = files.stretches(scan.run, scan.path, [(0, scan.n_rows)])
-    name = blow_name(files.test, scan.path, 1, 1)
+    name = record_name(files.test, scan.path, 1, 1)
     return check_record(files.test, scan, name, signals, rested=_is_rested(signals[1:]))
 
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from frf_ipz.ingest.campaign_file import Run
+from frf_ipz.ingest.campaign_file import TestSetup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BlowFacts:
+class RecordInfo:
     """One blow or record: where it is, what was measured, what is wrong with it.
 
     Parameters
     ----------
     name : str
         Its file, relative to the test, with ``#2`` for the second blow of a file.
-    run : Run
+    run : TestSetup
         What it belongs to.
     path : Path
         Its file.
@@ -61,7 +61,7 @@ class BlowFacts:
     """
 
     name: str
-    run: Run
+    run: TestSetup
     path: Path
     start: int
     stop: int
@@ -106,7 +106,7 @@ class Survey:
 
     Parameters
     ----------
-    blows : tuple of BlowFacts
+    records : tuple of RecordInfo
         All blows or records, also those that are left out.
     step_s : float
         Time step that those that are used have in common, s.
@@ -126,7 +126,7 @@ class Survey:
         What the user has to know.
     """
 
-    blows: tuple[BlowFacts, ...]
+    records: tuple[RecordInfo, ...]
     step_s: float
     n_samples: int
     decay_1_s: float = 0.0
@@ -137,6 +137,6 @@ class Survey:
     warnings: tuple[str, ...] = ()
 
     @property
-    def used(self) -> tuple[BlowFacts, ...]:
+    def used(self) -> tuple[RecordInfo, ...]:
         """The blows or records that enter the FRFs."""
-        return tuple(blow for blow in self.blows if blow.used)
+        return tuple(record for record in self.records if record.used)

@@ -15,20 +15,20 @@ from frf_ipz.ingest.signals.clipping import share_a_rail
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.ingest.campaign_file import Run, Test
+    from frf_ipz.ingest.campaign_file import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
-    from frf_ipz.ingest.survey.record_info import BlowFacts
+    from frf_ipz.ingest.survey.record_info import RecordInfo
 
 SAME_STEP = 1e-3  # relative difference up to which two files have one time step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class Selection:
     """Blows with what was decided about each.
 
     Parameters
     ----------
-    blows : tuple of BlowFacts
+    records : tuple of RecordInfo
         All of them.
     step_s : float
         The step that those that are used have in common, s.
@@ -36,17 +36,17 @@ class Verdict:
         What was left out, and what is used although it is bad.
     """
 
-    blows: tuple[BlowFacts, ...]
+    records: tuple[RecordInfo, ...]
     step_s: float
     warnings: tuple[str, ...]
 
 
-def blow_name(test: Test, path: Path, number: int, count: int) -> str:
+def record_name(test: VibrationTest, path: Path, number: int, count: int) -> str:
     """Name a blow after its file.
 
     Parameters
     ----------
-    test : Test
+    test : VibrationTest
         The test; the name is relative to its folder.
     path : Path
         The file.
@@ -111,19 +111,19 @@ def check_names(names: Sequence[str], options: IngestOptions) -> None:
             raise InputError(f"[ingest]: '{name}' is named by both keep and drop; decide for one")
 
 
-def choose(blows: Sequence[BlowFacts], options: IngestOptions) -> Verdict:
+def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Selection:
     """Decide which blows are used.
 
     Parameters
     ----------
-    blows : sequence of BlowFacts
+    records : sequence of RecordInfo
         As the checks left them.
     options : IngestOptions
         The user's choice, which overrules the checks.
 
     Returns
     -------
-    Verdict
+    Selection
         Blows with all marks and decisions.
 
     Raises
@@ -131,21 +131,23 @@ def choose(blows: Sequence[BlowFacts], options: IngestOptions) -> Verdict:
     InputError
         If the user drops all blows of a DOF, or all of them have another time step than the rest of the test.
     """
-    candidates = [blow for blow in blows if not is_named(blow.name, options.drop)]
-    step_s = _usual_step([blow.step_s for blow in candidates or blows])
-    marked = _mark_rails([_mark_step(blow, step_s) for blow in blows])
-    decided = [_decide(blow, options) for blow in marked]
+    candidates = [record for record in records if not is_named(record.name, options.drop)]
+    step_s = _usual_step([record.step_s for record in candidates or records])
+    marked = _mark_rails([_mark_step(record, step_s) for record in records])
+    decided = [_decide(record, options) for record in marked]
     warnings = [
-        f"{blow.name} is left out: {'; '.join(blow.faults)}" for blow in decided if not blow.used and blow.faults
+        f"{record.name} is left out: {'; '.join(record.faults)}"
+        for record in decided
+        if not record.used and record.faults
     ]
-    for run in dict.fromkeys(blow.run for blow in blows):
-        if not any(blow.used for blow in decided if blow.run == run):
+    for run in dict.fromkeys(record.run for record in records):
+        if not any(record.used for record in decided if record.run == run):
             saved = _least_bad(run, decided, options, step_s)
-            decided = [replace(blow, used=True) if blow is saved else blow for blow in decided]
+            decided = [replace(record, used=True) if record is saved else record for record in decided]
             warnings = [text for text in warnings if not text.startswith(f"{saved.name} is left out")]
             reason = "; ".join(saved.faults)
             warnings.append(f"{saved.name} is used although it is bad ({reason}): no better blow at {run.input_dof}")
-    return Verdict(blows=tuple(decided), step_s=step_s, warnings=tuple(warnings))
+    return Selection(records=tuple(decided), step_s=step_s, warnings=tuple(warnings))
 
 
 def _usual_step(steps: Sequence[float]) -> float:
@@ -155,46 +157,48 @@ def _usual_step(steps: Sequence[float]) -> float:
     return float(np.mean(max(groups, key=len)))
 
 
-def _mark_step(blow: BlowFacts, step_s: float) -> BlowFacts:
-    if abs(blow.step_s / step_s - 1.0) <= SAME_STEP:
-        return blow
-    fault = f"wrong sampling step: {blow.step_s:.6g} s where the others have {step_s:.6g} s"
-    return replace(blow, faults=(*blow.faults, fault))
+def _mark_step(record: RecordInfo, step_s: float) -> RecordInfo:
+    if abs(record.step_s / step_s - 1.0) <= SAME_STEP:
+        return record
+    fault = f"wrong sampling step: {record.step_s:.6g} s where the others have {step_s:.6g} s"
+    return replace(record, faults=(*record.faults, fault))
 
 
-def _mark_rails(blows: Sequence[BlowFacts]) -> list[BlowFacts]:
+def _mark_rails(records: Sequence[RecordInfo]) -> list[RecordInfo]:
     """Mark blows whose peaks are equal to the last digit: they met the end of the force's range."""
-    fine = [blow for blow in blows if not blow.digital_force]
-    peaks = np.array([blow.peak_force + blow.offsets[0] for blow in fine])
-    equal = share_a_rail(peaks, np.array([blow.pulse_s for blow in fine]))
-    cut = {blow.name for blow, is_equal in zip(fine, equal, strict=True) if is_equal}
+    fine = [record for record in records if not record.digital_force]
+    peaks = np.array([record.peak_force + record.offsets[0] for record in fine])
+    equal = share_a_rail(peaks, np.array([record.pulse_s for record in fine]))
+    cut = {record.name for record, is_equal in zip(fine, equal, strict=True) if is_equal}
     return [
-        replace(blow, faults=(*blow.faults, "clipping of the force: its peak equals another blow's to the last digit"))
-        if blow.name in cut and not any(fault.startswith("clipping") for fault in blow.faults)
-        else blow
-        for blow in blows
+        replace(
+            record, faults=(*record.faults, "clipping of the force: its peak equals another blow's to the last digit")
+        )
+        if record.name in cut and not any(fault.startswith("clipping") for fault in record.faults)
+        else record
+        for record in records
     ]
 
 
-def _decide(blow: BlowFacts, options: IngestOptions) -> BlowFacts:
-    if is_named(blow.name, options.drop):
-        return replace(blow, used=False, remarks=(*blow.remarks, "dropped by the user"))
-    if is_named(blow.name, options.keep):
-        kept = ("kept by the user",) if blow.faults else ()
-        return replace(blow, used=True, remarks=(*blow.remarks, *kept))
-    return replace(blow, used=not blow.faults)
+def _decide(record: RecordInfo, options: IngestOptions) -> RecordInfo:
+    if is_named(record.name, options.drop):
+        return replace(record, used=False, remarks=(*record.remarks, "dropped by the user"))
+    if is_named(record.name, options.keep):
+        kept = ("kept by the user",) if record.faults else ()
+        return replace(record, used=True, remarks=(*record.remarks, *kept))
+    return replace(record, used=not record.faults)
 
 
-def _least_bad(run: Run, blows: Sequence[BlowFacts], options: IngestOptions, step_s: float) -> BlowFacts:
-    mine = [blow for blow in blows if blow.run == run and not is_named(blow.name, options.drop)]
+def _least_bad(run: TestSetup, records: Sequence[RecordInfo], options: IngestOptions, step_s: float) -> RecordInfo:
+    mine = [record for record in records if record.run == run and not is_named(record.name, options.drop)]
     if not mine:
         raise InputError(
             f"[ingest] drop leaves no blow at {run.input_dof}; keep one, or take its entry out of test.toml"
         )
-    usable = [blow for blow in mine if abs(blow.step_s / step_s - 1.0) <= SAME_STEP]
+    usable = [record for record in mine if abs(record.step_s / step_s - 1.0) <= SAME_STEP]
     if not usable:
         raise InputError(
             f"all blows at {run.input_dof} have the time step {mine[0].step_s:.6g} s, but the others of the test have "
             f"{step_s:.6g} s; export them with one step, or make a test of their own"
         )
-    return min(usable, key=lambda blow: (len(blow.faults), blow.second_pulse, -abs(blow.peak_force)))
+    return min(usable, key=lambda record: (len(record.faults), record.second_pulse, -abs(record.peak_force)))

@@ -18,21 +18,21 @@ from frf_ipz.rational import without_window
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.frf_estimate import Recordings
-    from frf_ipz.pipeline.stage_runner import Desk
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.pipeline.stage_runner import StageRunner
 
 
-def ingest(desk: Desk) -> Recordings:
+def ingest(desk: StageRunner) -> FrfEstimate:
     """Turn recordings into FRFs.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
 
     Returns
     -------
-    Recordings
+    FrfEstimate
         FRFs and the table of blows.
     """
     options = desk.job.pipeline.file.ingest
@@ -43,17 +43,19 @@ def ingest(desk: Desk) -> Recordings:
         lambda progress: estimate_frfs(desk.job.test, options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
-            "blows.parquet": partial(write_table, tables.frame_table(result.blows, {}, meaning="quality of a blow")),
+            "records.parquet": partial(
+                write_table, tables.frame_table(result.records, {}, meaning="quality of a blow")
+            ),
         },
     )
 
 
-def fit(desk: Desk, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
+def fit(desk: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
     """Turn FRFs into poles, residues and zeros.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     frfs : FrfSet
         The measured FRFs.

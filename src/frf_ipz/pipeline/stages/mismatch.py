@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.pipeline.stage_runner import Desk
+    from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
 
-def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
+def diagnose(desk: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
     """Say what the model left out.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     model : StructuralModel
         The FE model.
@@ -61,12 +61,12 @@ def diagnose(desk: Desk, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
     )
 
 
-def levels(desk: Desk, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
+def levels(desk: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     """Compare weak blows with strong ones.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     fit : ModalFit
         The fitted model.
@@ -87,13 +87,13 @@ def levels(desk: Desk, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
 
 
 def apply_diagnosis(
-    desk: Desk, model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis
+    desk: StageRunner, model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis
 ) -> tuple[StructuralModel, FrfSet]:
     """Put what was found missing into the model, and take what was wrong in the measuring chain off the FRFs.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     model : StructuralModel
         The FE model.
@@ -113,12 +113,12 @@ def apply_diagnosis(
     return apply_to_model(model, diagnosis, effects), apply_to_frfs(frfs, diagnosis, effects)
 
 
-def effects_of(desk: Desk) -> dict[str, Effect]:
+def effects_of(desk: StageRunner) -> dict[str, Effect]:
     """Give the effects that were looked for, users' own among them.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
 
     Returns

@@ -29,18 +29,18 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
-    from frf_ipz.pipeline.stage_runner import Desk
+    from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
-def outline(desk: Desk, model: StructuralModel, *, corrected_by: Diagnosis | None = None) -> None:
+def outline(desk: StageRunner, model: StructuralModel, *, corrected_by: Diagnosis | None = None) -> None:
     """Keep where the nodes are, and what joins them: pictures of the structure need no more of a model.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     model : StructuralModel
         The FE model.
@@ -52,13 +52,13 @@ def outline(desk: Desk, model: StructuralModel, *, corrected_by: Diagnosis | Non
 
 
 def reduce(
-    desk: Desk, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+    desk: StageRunner, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
 ) -> ReducedModel:
     """Turn the FE model into a reduced model in physical DOFs.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     model : StructuralModel
         The FE model.
@@ -94,12 +94,12 @@ def reduce(
     )
 
 
-def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
+def pair(desk: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
     """Set measured poles and zeros against those of the model.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     modal_fit : ModalFit
         The fitted model.
@@ -124,7 +124,7 @@ def pair(desk: Desk, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
 
 
 def update(
-    desk: Desk,
+    desk: StageRunner,
     model: StructuralModel,
     reduced: ReducedModel,
     modal_fit: ModalFit,
@@ -136,7 +136,7 @@ def update(
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     model : StructuralModel
         The FE model, whose parts may be softer or stiffer than they should be.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.pipeline.stage_runner import Desk
+    from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import Writers
     from frf_ipz.updating.updated_model import UpdatedModel
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
 
 
-def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
+def predict(desk: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
     """Predict FRFs at the points of interest, on the measured lines of the band.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     updated : UpdatedModel
         The updated model.
@@ -67,13 +67,13 @@ def predict(desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet
 
 
 def export(
-    desk: Desk, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+    desk: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
 ) -> StateSpaceModel:
     """Turn the updated model into a state space; and, for robust design, into members of its posterior.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     updated : UpdatedModel
         The updated model.
@@ -101,12 +101,12 @@ def export(
     )
 
 
-def report(desk: Desk) -> None:
+def report(desk: StageRunner) -> None:
     """Put everything that the folder holds on one page.
 
     Parameters
     ----------
-    desk : Desk
+    desk : StageRunner
         The work.
     """
     key = desk.sign("report", {"after": sorted(desk.keys.values())})

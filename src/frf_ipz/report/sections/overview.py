@@ -60,7 +60,7 @@ def build(run: RunContents) -> Section:
     frfs = run.frfs
     marks = Marks(
         sensors=() if frfs is None else frfs.output_dofs,
-        blows=() if frfs is None else frfs.input_dofs,
+        records=() if frfs is None else frfs.input_dofs,
         points=run.points,
         missing=marked_nodes(run.diagnosis, frfs),
         mismatch=mismatch_nodes(run.diagnosis, frfs),

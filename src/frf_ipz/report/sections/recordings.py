@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from frf_ipz.ingest.frf_estimate import Recordings
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.frf_estimate import Trace as Recorded
     from frf_ipz.report.contents import RunContents
 
@@ -40,42 +40,42 @@ def build(run: RunContents) -> Section | None:
         None for FRFs that were estimated elsewhere.
     """
     recordings = run.recordings
-    if recordings is None or not len(recordings.blows):
+    if recordings is None or not len(recordings.records):
         return None
-    blows = recordings.blows
-    used = int(blows["used"].astype(bool).sum())
-    lead = f"{counted(len(blows), 'blow or record', 'blows or records')}, {used} used."
+    records = recordings.records
+    used = int(records["used"].astype(bool).sum())
+    lead = f"{counted(len(records), 'blow or record', 'blows or records')}, {used} used."
     return Section(
         anchor="recordings",
         title="Blows",
         lead=lead,
-        blocks=(*_pictures(recordings), _table(blows)),
+        blocks=(*_pictures(recordings), _table(records)),
         notes=recordings.warnings,
         choices=recordings.choices,
     )
 
 
-def _pictures(recordings: Recordings) -> list[Picture]:
+def _pictures(recordings: FrfEstimate) -> list[Picture]:
     traces = recordings.traces[:MOST_TRACES]
     if not traces:
         return []
     force = traces[0].channel
     pulses = [trace for trace in traces if trace.channel == force]
     responses = [trace for trace in traces if trace.channel != force]
-    return [_pulses(pulses, recordings.blows), *([_responses(responses, recordings.blows)] if responses else [])]
+    return [_pulses(pulses, recordings.records), *([_responses(responses, recordings.records)] if responses else [])]
 
 
-def _pulses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
-    triggers = dict(zip(blows["blow"], blows["trigger_s"], strict=True)) if "trigger_s" in blows else {}
+def _pulses(traces: Sequence[Recorded], records: pd.DataFrame) -> Picture:
+    triggers = dict(zip(records["record"], records["trigger_s"], strict=True)) if "trigger_s" in records else {}
     shifts = {name: float(time) for name, time in triggers.items() if np.isfinite(time)}
     aligned = all(shifts.get(trace.name, 0.0) > 0 for trace in traces)
     drawn = [
-        _curve(trace, place, blows, shift_s=shifts[trace.name] if aligned else 0.0, unit="ms")
+        _curve(trace, place, records, shift_s=shifts[trace.name] if aligned else 0.0, unit="ms")
         for place, trace in enumerate(traces)
     ]
     names = "; ".join(trace["name"] for trace in drawn[:SHOWN_AT_FIRST])
     return Picture(
-        name="blows",
+        name="records",
         title="Forces as recorded" + (", aligned where they set in" if aligned else ""),
         alt=f"Force over time of {counted(len(traces), 'blow or record', 'blows or records')}: {names}.",
         traces=tuple(drawn),
@@ -85,7 +85,7 @@ def _pulses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
     )
 
 
-def _responses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
+def _responses(traces: Sequence[Recorded], records: pd.DataFrame) -> Picture:
     channels = list(dict.fromkeys(trace.channel for trace in traces))
     units = {trace.channel: trace.unit for trace in traces}
     names = list(dict.fromkeys(trace.name for trace in traces))
@@ -93,7 +93,7 @@ def _responses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
     drawn = []
     for trace in traces:
         rank = channels.index(trace.channel) if stacked else 0
-        curve = _curve(trace, names.index(trace.name), blows, shift_s=0.0, unit="s")
+        curve = _curve(trace, names.index(trace.name), records, shift_s=0.0, unit="s")
         drawn.append({**curve, "yaxis": f"y{rank + 1}" if rank else "y", "showlegend": trace.channel == channels[0]})
     axes = [Axis(title=f"{channel}, {units[channel]}") for channel in channels]
     axes = axes if stacked else [Axis(title=f"responses, {' or '.join(dict.fromkeys(units.values()))}")]
@@ -110,8 +110,8 @@ def _responses(traces: Sequence[Recorded], blows: pd.DataFrame) -> Picture:
     )
 
 
-def _curve(trace: Recorded, place: int, blows: pd.DataFrame, *, shift_s: float, unit: str) -> Trace:
-    used = dict(zip(blows["blow"], blows["used"].astype(bool), strict=True))
+def _curve(trace: Recorded, place: int, records: pd.DataFrame, *, shift_s: float, unit: str) -> Trace:
+    used = dict(zip(records["record"], records["used"].astype(bool), strict=True))
     out = not used.get(trace.name, True)
     name = f"{trace.name} (left out)" if out else trace.name
     factor = 1e3 if unit == "ms" else 1.0
@@ -129,7 +129,7 @@ def _curve(trace: Recorded, place: int, blows: pd.DataFrame, *, shift_s: float, 
     )
 
 
-def _table(blows: pd.DataFrame) -> Table:
+def _table(records: pd.DataFrame) -> Table:
     columns: dict[str, tuple[str, Callable[[Any], str]]] = {
         "input_dof": ("struck at", str),
         "peak_force_N": ("peak force, N", number),
@@ -140,16 +140,16 @@ def _table(blows: pd.DataFrame) -> Table:
         "used": ("used", lambda value: "yes" if value else "no"),
         "marks": ("what is wrong", lambda value: str(value or "")),
     }
-    known = {name: entry for name, entry in columns.items() if name in blows}
+    known = {name: entry for name, entry in columns.items() if name in records}
     rows = [
-        [str(blow), *[write(value) for (_, write), value in zip(known.values(), values, strict=True)]]
-        for blow, *values in blows[["blow", *known]].itertuples(index=False)
+        [str(record), *[write(value) for (_, write), value in zip(known.values(), values, strict=True)]]
+        for record, *values in records[["record", *known]].itertuples(index=False)
     ]
-    used = blows["used"].astype(bool).to_numpy()
+    used = records["used"].astype(bool).to_numpy()
     return Table(
         caption="Blows and their quality",
-        columns=("blow", *[title for title, _ in known.values()]),
+        columns=("record", *[title for title, _ in known.values()]),
         rows=rows,
         marked=frozenset(np.flatnonzero(~used).tolist()),
-        file="blows.parquet",
+        file="records.parquet",
     )

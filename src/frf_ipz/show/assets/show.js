@@ -354,7 +354,7 @@
     document.addEventListener("click", click);
     document.addEventListener("change", (event) => {
       const { blow } = event.target.dataset;
-      if (blow) change({ kind: "blow", name: blow, use: event.target.value });
+      if (blow) change({ kind: "record", name: blow, use: event.target.value });
     });
     if (remembered.blows && find("#blow-choices")) find("#blow-choices").open = true;
     restoreLook();

@@ -61,7 +61,7 @@ class Pin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Strike:
+class Reject:
     """There is no mode at this frequency.
 
     Parameters

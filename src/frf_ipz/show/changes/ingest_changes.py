@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Blow:
+class RecordChoice:
     """A blow is used, or left out, whatever the checks say.
 
     Parameters

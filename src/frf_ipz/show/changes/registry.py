@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.show.changes.fit_changes import Band, Leave, Pin, Strike
-from frf_ipz.show.changes.ingest_changes import Blow, Sensor
+from frf_ipz.show.changes.fit_changes import Band, Leave, Pin, Reject
+from frf_ipz.show.changes.ingest_changes import RecordChoice, Sensor
 from frf_ipz.show.changes.model_changes import Point, Retain
 from frf_ipz.toml_files import to_options
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 KINDS: Mapping[str, type[Change]] = {
     "pin": Pin,
-    "strike": Strike,
+    "strike": Reject,
     "leave": Leave,
     "band": Band,
-    "blow": Blow,
+    "record": RecordChoice,
     "sensor": Sensor,
     "point": Point,
     "retain": Retain,

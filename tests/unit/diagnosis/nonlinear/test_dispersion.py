@@ -31,11 +31,13 @@ def recorded(observations, *, is_fast):
         whole = np.apply_along_axis(np.convolve, -1, values, chosen)
         return whole[..., late : late + values.shape[-1] : EVERY]
 
-    blows = tuple(
-        replace(blow, step_s=EVERY * blow.step_s, force=filtered(blow.force), responses=filtered(blow.responses))
-        for blow in observations.blows
+    records = tuple(
+        replace(
+            record, step_s=EVERY * record.step_s, force=filtered(record.force), responses=filtered(record.responses)
+        )
+        for record in observations.records
     )
-    return replace(observations, blows=blows)
+    return replace(observations, records=records)
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +70,12 @@ def test_a_law_that_no_phase_explains_is_as_unknown_as_before(chain, strike):
 
 
 def test_what_is_taken_back_is_what_such_a_filter_does_beyond_a_delay(struck):
-    blow = struck.blows[0]
-    impulse = np.zeros(blow.n_samples)
+    record = struck.records[0]
+    impulse = np.zeros(record.n_samples)
     impulse[600] = 1.0
-    shown = np.convolve(impulse, taps(is_fast=True))[: blow.n_samples : EVERY]
-    test = replace(struck, blows=(replace(blow, force=shown, responses=np.tile(shown, (2, 1)), step_s=1.0),))
-    back = without_dispersion(test, TYPICAL).blows[0].force
+    shown = np.convolve(impulse, taps(is_fast=True))[: record.n_samples : EVERY]
+    test = replace(struck, records=(replace(record, force=shown, responses=np.tile(shown, (2, 1)), step_s=1.0),))
+    back = without_dispersion(test, TYPICAL).records[0].force
     lines = np.fft.rfft(back)
     frequency = np.fft.rfftfreq(len(back))
     inside = (frequency > 0.01) & (frequency < 0.36)
@@ -87,8 +89,10 @@ def test_what_is_taken_back_is_what_such_a_filter_does_beyond_a_delay(struck):
 
 def test_all_channels_are_turned_alike(struck):
     turned = without_dispersion(struck, TYPICAL)
-    for new, old in zip(turned.blows, struck.blows, strict=True):
-        lines = [np.fft.rfft(np.vstack([blow.force, blow.responses]), 4 * blow.n_samples) for blow in (new, old)]
+    for new, old in zip(turned.records, struck.records, strict=True):
+        lines = [
+            np.fft.rfft(np.vstack([record.force, record.responses]), 4 * record.n_samples) for record in (new, old)
+        ]
         inside = slice(200, 1200)
         ratios = [each[1:, inside] / each[0, inside] for each in lines]
         assert np.median(np.abs(ratios[0] / ratios[1] - 1)) < 0.005  # where a record ends they are not quite the same

@@ -8,13 +8,13 @@ import pytest
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
 from frf_ipz.diagnosis.nonlinear.fitting import force_localisation as module
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import free_force, neighbours, start_at, whereabouts
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import fit_linear
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.gap_contact import GapContact
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
-from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_nuisance_prior
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -28,9 +28,9 @@ READ = 0.3  # relative: by the nearest of a few gaps
 
 
 def prepared(model, observations, *, duration_s=2.0, floor=2e-3):
-    plant = make_plant(model, observations)
+    plant = make_modal_model(model, observations)
     stretches = transform(observations, plant, read_noise(observations), Window(duration_s=duration_s, floor=floor))
-    return stretches, fit_linear(stretches, make_freedom(plant, stretches, 75.0, DiagnoseOptions()))
+    return stretches, fit_linear(stretches, make_nuisance_prior(plant, stretches, 75.0, DiagnoseOptions()))
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -64,7 +64,7 @@ def test_any_force_leaves_less_than_a_law_at_its_place_however_far_off_the_model
     model = chain_like(ratio=0.006, stiffness_n_m=0.99 * 4e4)
     stretches, linear = prepared(model, strike(*LAWS["cubic"][:2]), duration_s=3.0, floor=5e-4)
     start = Start(law=CubicStiffness(), place=2, strength=2e10, shape=0.0, unknowns=linear.as_stated)
-    law = shoot(stretches, linear.freedom, start, iterations=20)
+    law = fit_output_error(stretches, linear.freedom, start, iterations=20)
     assert law.cost < linear.n_rows
     assert free_force(stretches, linear, 2).cost < law.cost
     assert whereabouts(stretches, linear).equal == (2,)
@@ -73,8 +73,10 @@ def test_any_force_leaves_less_than_a_law_at_its_place_however_far_off_the_model
 def test_one_sensor_places_nothing(chain, strike):
     law, where, _ = LAWS["cubic"]
     observations = strike(law, where)
-    blows = tuple(replace(blow, sensors=blow.sensors[:1], responses=blow.responses[:1]) for blow in observations.blows)
-    stretches, linear = prepared(chain.model, replace(observations, blows=blows))
+    records = tuple(
+        replace(record, sensors=record.sensors[:1], responses=record.responses[:1]) for record in observations.records
+    )
+    stretches, linear = prepared(chain.model, replace(observations, records=records))
     found = whereabouts(stretches, linear)
     assert found.equal == found.possible == tuple(range(len(linear.freedom.plant.places)))
     assert found.forces == ()
@@ -94,7 +96,7 @@ def test_the_numbers_of_a_law_are_read_from_the_force(chain, strike, name, law, 
 @pytest.mark.parametrize("far_off", [True, False])
 def test_a_law_that_refining_leads_astray_is_simulated_as_it_was_read(chain, strike, monkeypatch, far_off):
     stretches, linear = prepared(chain.model, strike(*LAWS["gap"][:2]))
-    track = candidates.Track(stretches=stretches, linear=linear, where=whereabouts(stretches, linear))
+    track = candidates.LawFitProgress(stretches=stretches, linear=linear, where=whereabouts(stretches, linear))
     refined = candidates.refine
 
     def led_astray(*given, **options):
@@ -113,11 +115,11 @@ def test_a_place_whose_force_reaches_the_sensors_best_is_simulated_whatever_refi
     stretches, linear = prepared(chain.model, strike(*LAWS["cubic"][:2]))
     where = whereabouts(stretches, linear)
     everywhere = tuple(range(len(linear.freedom.plant.places)))
-    track = candidates.Track(stretches=stretches, linear=linear, where=replace(where, possible=everywhere))
+    track = candidates.LawFitProgress(stretches=stretches, linear=linear, where=replace(where, possible=everywhere))
     refined, read = candidates._refined, candidates._read
     monkeypatch.setattr(candidates, "_refined", lambda *given: [fit for fit in refined(*given) if fit.place != 2])
     monkeypatch.setattr(candidates, "_read", lambda *given: [replace(fit, cost=np.inf) for fit in read(*given)])
-    monkeypatch.setattr(candidates.Track, "beside", lambda *_: [])
+    monkeypatch.setattr(candidates.LawFitProgress, "beside", lambda *_: [])
     monkeypatch.setattr(candidates, "FEW", 0)
     monkeypatch.setattr(candidates, "FAR_OFF", np.inf)
     assert where.equal[0] == 2

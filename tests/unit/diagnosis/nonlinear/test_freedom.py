@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
-from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_nuisance_prior
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -16,9 +16,9 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 def freedom(chain, strike, random_records):
     """Of stretches in motion, with the first mode taken for a rigid-body mode."""
     observations = random_records(strike(), 2.0)
-    plant = replace(make_plant(chain.model, observations), n_rigid=1)
+    plant = replace(make_modal_model(chain.model, observations), n_rigid=1)
     stretches = transform(observations, plant, read_noise(observations), Window(duration_s=1.0))
-    return make_freedom(plant, stretches, observations.band_hz[1], DiagnoseOptions())
+    return make_nuisance_prior(plant, stretches, observations.band_hz[1], DiagnoseOptions())
 
 
 def test_a_rigid_body_is_not_thought_to_start_as_fast_as_a_resonance(freedom):

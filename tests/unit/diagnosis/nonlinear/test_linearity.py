@@ -33,11 +33,16 @@ def test_blows_are_compared_where_sensors_rove(strike, law):
     """Each layout of sensors has blows of several levels of its own."""
     observations = strike(law)
     layouts = [
-        replace(blow, name=f"{blow.name} {row}", sensors=blow.sensors[row : row + 1], responses=blow.responses[[row]])
+        replace(
+            record,
+            name=f"{record.name} {row}",
+            sensors=record.sensors[row : row + 1],
+            responses=record.responses[[row]],
+        )
         for row in range(2)
-        for blow in observations.blows
+        for record in observations.records
     ]
-    found = assess_linearity(replace(observations, blows=tuple(layouts)))
+    found = assess_linearity(replace(observations, records=tuple(layouts)))
     assert found.score > 0
     assert found.is_nonlinear == (law is not None)
 
@@ -46,31 +51,31 @@ def test_blows_are_compared_where_sensors_rove(strike, law):
 def test_what_a_blow_before_has_left_is_no_nonlinearity(strike, follows):
     """A slow motion that goes on from blow to blow, of which too little is seen to take it off."""
     observations = strike()
-    first, *others = observations.blows
+    first, *others = observations.records
     slow = (
         STEPS * np.abs(first.responses).max() * np.cos(2 * np.pi * SLOW_HZ * first.step_s * np.arange(first.n_samples))
     )
-    late = [replace(blow, responses=blow.responses + slow, number=2 if follows else 1) for blow in others]
-    found = assess_linearity(replace(observations, blows=(first, *late)))
+    late = [replace(record, responses=record.responses + slow, number=2 if follows else 1) for record in others]
+    found = assess_linearity(replace(observations, records=(first, *late)))
     assert found.is_nonlinear == (not follows)
 
 
 def test_a_law_shows_beside_what_a_blow_before_has_left(strike):
     observations = strike(lambda w, _: 2e10 * w**3)
-    first, *others = observations.blows
-    blows = (first, *(replace(blow, number=2) for blow in others))
-    assert assess_linearity(replace(observations, blows=blows)).is_nonlinear
+    first, *others = observations.records
+    records = (first, *(replace(record, number=2) for record in others))
+    assert assess_linearity(replace(observations, records=records)).is_nonlinear
 
 
 def test_a_channel_whose_noise_is_below_its_steps_is_not_taken_for_nonlinear(strike):
     """What has decayed below half a step is not recorded at all: as if there were no noise."""
     observations = strike()
-    step = STEPS * np.abs(observations.blows[0].responses).max()
+    step = STEPS * np.abs(observations.records[0].responses).max()
     rounded = replace(
         observations,
-        blows=tuple(
-            replace(blow, responses=step * np.round(blow.responses * decayed(blow) / step))
-            for blow in observations.blows
+        records=tuple(
+            replace(record, responses=step * np.round(record.responses * decayed(record) / step))
+            for record in observations.records
         ),
     )
     found = assess_linearity(rounded)
@@ -117,9 +122,9 @@ def test_three_close_resonances_agree():
     assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, 1e-6)])) < 1.0
 
 
-def decayed(blow):
+def decayed(record):
     """(n_samples,) window that makes a response die out within its record."""
-    return np.exp(-4.0 * blow.step_s * np.arange(blow.n_samples))
+    return np.exp(-4.0 * record.step_s * np.arange(record.n_samples))
 
 
 def drawn(rng, *shape):

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import Yielding, follow, make_modes, march
+from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import Yielding, make_modes, step_in_time, step_tangent
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
 
 OMEGA, RATIO, STEP_S, N_TIMES = 2 * np.pi * 5.0, 0.02, 1e-4, 6000
@@ -26,7 +26,7 @@ def linear_motion():
 
 def test_hardening_oscillator_is_integrated():
     k3 = 3e6
-    done = march(shipped_laws()["cubic_stiffness"], (k3, 0.0), oscillator(), *linear_motion())
+    done = step_in_time(shipped_laws()["cubic_stiffness"], (k3, 0.0), oscillator(), *linear_motion())
 
     def derivative(_, y):
         return [y[1], -2 * RATIO * OMEGA * y[1] - OMEGA**2 * y[0] - k3 * y[0] ** 3]
@@ -43,7 +43,7 @@ def test_friction_takes_the_same_off_every_half_swing_and_then_sticks():
     time = STEP_S * np.arange(N_TIMES)
     motion, velocity = np.cos(OMEGA * time)[None] * 3e-3, -OMEGA * np.sin(OMEGA * time)[None] * 3e-3
     place = Yielding(modes=modes, weights=np.ones(1))
-    done = march(shipped_laws()["dry_friction"], (friction, 0.0), place, motion, velocity)
+    done = step_in_time(shipped_laws()["dry_friction"], (friction, 0.0), place, motion, velocity)
     drop, half = 2 * friction / OMEGA**2, np.pi / OMEGA
     turns = np.array([np.interp(half * k, time, done.motion[0]) for k in range(3)])
     expected = [3e-3, -(3e-3 - drop), 3e-3 - 2 * drop]
@@ -58,12 +58,12 @@ def test_friction_takes_the_same_off_every_half_swing_and_then_sticks():
 def test_small_changes_are_followed(name, numbers):
     law = shipped_laws()[name]
     place, (w, v) = oscillator(constant=law.holds), linear_motion()
-    done = march(law, numbers, place, w, v)
+    done = step_in_time(law, numbers, place, w, v)
     change = np.stack([0.3 * w, 0.3 * v])[None]
-    found = follow(law, place, done, change)
+    found = step_tangent(law, place, done, change)
 
     def force(scale=0.0, strength=0.0):
-        return march(
+        return step_in_time(
             law, (numbers[0] * (1 + strength), numbers[1]), place, w * (1 + 0.3 * scale), v * (1 + 0.3 * scale)
         ).force
 
@@ -94,10 +94,10 @@ def test_a_small_force_besides_a_law_is_followed():
     def force(part):
         both = Both()
         both.part = part
-        return march(both, (k3, 0.0), place, w, v).force
+        return step_in_time(both, (k3, 0.0), place, w, v).force
 
-    done = march(law, (k3, 0.0), place, w, v)
-    found = follow(law, place, done, np.zeros((0, 2, *w.shape)), spring * done.motion[None])[-1]
+    done = step_in_time(law, (k3, 0.0), place, w, v)
+    found = step_tangent(law, place, done, np.zeros((0, 2, *w.shape)), spring * done.motion[None])[-1]
     h = 1e-5
     expected = (force(h) - force(-h)) / (2 * h)
     assert np.linalg.norm(expected) > 0
@@ -126,7 +126,7 @@ def test_a_stop_is_hit_as_hard_with_long_steps_as_in_truth():
     pole = OMEGA * (-RATIO + 1j * np.sqrt(1 - RATIO**2))
     z = np.exp(pole * time)
     modes = make_modes(np.array([OMEGA]), np.array([RATIO]), step)
-    done = march(
+    done = step_in_time(
         shipped_laws()["gap_contact"],
         numbers,
         Yielding(modes=modes, weights=np.ones(1)),
@@ -149,7 +149,7 @@ def test_held_friction_is_neither_early_nor_late(per_period):
     modes = make_modes(np.array([OMEGA]), np.array([1e-9]), step, constant=True)
     motion, velocity = first * np.cos(OMEGA * time)[None], -first * OMEGA * np.sin(OMEGA * time)[None]
     place = Yielding(modes=modes, weights=np.ones(1))
-    done = march(shipped_laws()["dry_friction"], (friction, 0.0), place, motion, velocity)
+    done = step_in_time(shipped_laws()["dry_friction"], (friction, 0.0), place, motion, velocity)
     swing, drop = np.floor(OMEGA * time / np.pi), friction / OMEGA**2
     exact = (first - (2 * swing + 1) * drop) * np.cos(OMEGA * time) + drop * (-1) ** swing
     assert np.linalg.norm(done.motion[0] - exact) < 0.02 * np.linalg.norm(exact - motion[0])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting import rescoring as reweighted
-from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FittedSegments
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.fitting.rescoring import tell_apart
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
@@ -22,10 +22,10 @@ GUESSED = 0.3  # of the response: far more than the model misses
 def track(chain, strike):
     """Blows on the chain with friction at node 3."""
     observations = strike(lambda _, v: FRICTION_N * np.tanh(v / 1e-4))
-    recordings = Recordings(
+    recordings = FittedSegments(
         training=observations,
         held_out=observations,
-        plant=make_plant(chain.model, observations),
+        plant=make_modal_model(chain.model, observations),
         noise=read_noise(observations),
         options=DiagnoseOptions(),
     )
@@ -42,7 +42,9 @@ def fit_at(track, node):
         shape=0.0,
         unknowns=track.linear.as_stated,
     )
-    return track.shoot(SimpleNamespace(start=lambda _: start, unknowns=start.unknowns, n_rows=track.linear.n_rows), 12)
+    return track.fit_output_error(
+        SimpleNamespace(start=lambda _: start, unknowns=start.unknowns, n_rows=track.linear.n_rows), 12
+    )
 
 
 def test_data_that_are_better_than_guessed_tell_places_apart(track, monkeypatch):

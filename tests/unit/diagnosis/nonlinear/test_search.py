@@ -67,10 +67,10 @@ def test_whole_records_of_all_levels_are_simulated(solved):
 def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
     *_, observations, found = solved
     law = found.at_work
-    assert (law.blow, law.is_held_out, law.response, law.unit) == ("blow 55 N", True, "acceleration", "m/s^2")
-    blow = next(blow for blow in observations.blows if blow.name == law.blow)
-    row = [sensor.channel for sensor in blow.sensors].index(law.channel)
-    assert set(law.measured) <= set(blow.responses[row])
+    assert (law.record, law.is_held_out, law.response, law.unit) == ("blow 55 N", True, "acceleration", "m/s^2")
+    record = next(record for record in observations.records if record.name == law.record)
+    row = [sensor.channel for sensor in record.sensors].index(law.channel)
+    assert set(law.measured) <= set(record.responses[row])
     left, without = (np.linalg.norm(law.measured - model) for model in (law.simulated, law.without))
     assert left < 2 * HELD_OUT * np.linalg.norm(law.measured)
     assert without > 5 * left
@@ -81,10 +81,10 @@ def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
 
 def test_blows_that_start_in_motion_show_the_force_alone(solved):
     *_, observations, found = solved
-    moving = replace(observations, blows=tuple(replace(blow, number=2) for blow in observations.blows))
-    recordings = SimpleNamespace(training=moving, held_out=replace(moving, blows=()))
+    moving = replace(observations, records=tuple(replace(record, number=2) for record in observations.records))
+    recordings = SimpleNamespace(training=moving, held_out=replace(moving, records=()))
     law = show_law(recordings, None, found.fit)
-    assert (law.blow, len(law.time_s)) == ("", 0)
+    assert (law.record, len(law.time_s)) == ("", 0)
     assert np.abs(law.force_N).max() > 0
 
 
@@ -165,7 +165,9 @@ def test_a_law_is_taken_out_of_whole_records_from_rest_that_are_loudest_late(sol
     *_, observations, found = solved
     records = random_records(observations, 2.0)
     rest = without_law(records, found.freedom, found.fit)
-    changed = [np.abs(one.responses - was.responses).max() for one, was in zip(rest.blows, records.blows, strict=True)]
+    changed = [
+        np.abs(one.responses - was.responses).max() for one, was in zip(rest.records, records.records, strict=True)
+    ]
     assert min(changed) > 0
 
 
@@ -193,7 +195,7 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     monkeypatch, strain, alone, again, doubt, has_dynamics, early, both
 ):
     """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
-    seen = SimpleNamespace(blows=())
+    seen = SimpleNamespace(records=())
     cause = SimpleNamespace(effect=SimpleNamespace(has_dynamics=has_dynamics))
     hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,), causes=(cause,))
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)

@@ -9,7 +9,7 @@ import pytest
 from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
 from frf_ipz.diagnosis.nonlinear.fitting import simple_laws as anywhere
-from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, Recordings
+from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, FittedSegments
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import Whereabouts, neighbours
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 
@@ -25,7 +25,7 @@ def recordings(missed, most=float("inf"), *, kind="hammer"):
             missed=missed, floor=floor, loudest=loudest, stretches=SimpleNamespace(n_samples=n_samples)
         )
 
-    return SimpleNamespace(track=cut, training=SimpleNamespace(band_hz=(0.1, 1.0), kind=kind, blows=()))
+    return SimpleNamespace(track=cut, training=SimpleNamespace(band_hz=(0.1, 1.0), kind=kind, records=()))
 
 
 def lengths(found):
@@ -37,11 +37,11 @@ def lengths(found):
     [(30.0, 1e9, [80, 320]), (0.8, 1e9, [320, 640]), (0.8, 330, [80, 320])],
 )
 def test_stretches_are_longer_where_a_linear_model_leaves_little(missed, most, expected):
-    assert lengths(Recordings._tracks(recordings(missed, most))) == expected
+    assert lengths(FittedSegments._tracks(recordings(missed, most))) == expected
 
 
 def test_a_record_that_starts_linear_is_looked_at_where_it_is_loudest():
-    short, long = Recordings._tracks(recordings(0.3, kind="random"))
+    short, long = FittedSegments._tracks(recordings(0.3, kind="random"))
     assert short.loudest
     assert long.loudest
     assert lengths((short, long)) == [320, 640]
@@ -57,14 +57,14 @@ def test_the_best_law_is_fitted_until_it_settles():
         return a_fit(fit.cost - 1, settled=fit.cost < 9)
 
     fits = [a_fit(20.0, settled=False), a_fit(10.0, settled=False)]
-    candidates._settle(SimpleNamespace(shoot=further), fits)
+    candidates._settle(SimpleNamespace(fit_output_error=further), fits)
     assert [(fit.cost, fit.settled) for fit in fits] == [(20.0, False), (7.0, True)]
 
 
 @pytest.mark.parametrize(("left", "expected"), [(500.0, 60.0), (90.0, 90.0), (110.0, 60.0), (50.0, 50.0)])
 def test_a_law_that_leaves_much_is_fitted_afresh(left, expected):
     fits = [a_fit(left, settled=True)]
-    candidates._settle(SimpleNamespace(shoot_afresh=lambda *_: a_fit(60.0, settled=True)), fits)
+    candidates._settle(SimpleNamespace(fit_output_error_afresh=lambda *_: a_fit(60.0, settled=True)), fits)
     assert fits[0].cost == expected
 
 
@@ -241,7 +241,7 @@ def test_the_numbers_of_the_best_place_are_tried_at_the_next_best_and_beside_it(
     monkeypatch.setattr(candidates, "_moved", lambda _, fit, there: SimpleNamespace(law=fit.law, place=there))
     track = SimpleNamespace(
         beside=lambda _: [9],
-        shoot=lambda fit, _: SimpleNamespace(
+        fit_output_error=lambda fit, _: SimpleNamespace(
             law=law, place=fit.place, cost=costs[fit.place], strength=1.0, settled=True
         ),
     )
@@ -260,8 +260,8 @@ def test_fits_that_come_close_to_the_best_are_settled_before_they_are_compared(m
     monkeypatch.setattr(candidates, "_climb", lambda *_: None)
     monkeypatch.setattr(candidates, "_exchange", lambda *_, **__: False)
     track = SimpleNamespace(
-        shoot=lambda fit, _: a_fit(fit.cost - 20, settled=True),
-        shoot_afresh=lambda fit, _: a_fit(fit.cost, settled=True),
+        fit_output_error=lambda fit, _: a_fit(fit.cost - 20, settled=True),
+        fit_output_error_afresh=lambda fit, _: a_fit(fit.cost, settled=True),
     )
     assert [fit.cost for fit in candidates._finished(track, fits)] == [90.0, 100.0, 150.0]
 
@@ -329,8 +329,8 @@ def a_first_track(left: float, *, afresh: float, is_moving: bool = False) -> Sim
     return SimpleNamespace(
         stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: is_moving)),
         linear=SimpleNamespace(cost=1e4, freedom=None),
-        shoot=lambda *_: shoot(left),
-        shoot_afresh=lambda *_: shoot(afresh),
+        fit_output_error=lambda *_: shoot(left),
+        fit_output_error_afresh=lambda *_: shoot(afresh),
     )
 
 

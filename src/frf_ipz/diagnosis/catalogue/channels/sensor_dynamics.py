@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 HIGHPASS, LOWPASS = "highpass", "lowpass"
@@ -26,7 +26,7 @@ class SensorDynamics(Effect):
     name = "sensor_dynamics"
     imitators = ("time_delay", "sensor_gain")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every channel, with a high-pass or a low-pass."""
         return [
             Place(key=(channel, kind), location={"channels": [channel]}, text={"kind": kind})
@@ -34,13 +34,13 @@ class SensorDynamics(Effect):
             for kind in (HIGHPASS, LOWPASS)
         ]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Corner."""
         low, high = (bound * _edge(specimen, place) for bound in BOUNDS[str(place.key[1])])
         neutral = 0.0 if place.key[1] == HIGHPASS else np.inf
         return (Parameter(name="corner_hz", low=low, high=high, neutral=neutral),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Filter the channel."""
         del specimen
         return self.chain(place)
@@ -50,11 +50,11 @@ class SensorDynamics(Effect):
         channel, kind = str(place.key[0]), str(place.key[1])
         return lambda values: Change(channels={channel: lambda s: first_order(s, kind, values[0])})
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """From outside the band to within."""
         return TRIED[str(place.key[1])][:, None] * _edge(specimen, place)
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which channel, which filter."""
         del specimen
         corner = values["corner_hz"]
@@ -85,5 +85,5 @@ def first_order(s: ComplexArray, kind: str, corner_hz: float) -> ComplexArray:
     return np.asarray((s if kind == HIGHPASS else corner) / (s + corner))
 
 
-def _edge(specimen: Specimen, place: Place) -> float:
+def _edge(specimen: ModelContext, place: Place) -> float:
     return specimen.band_hz[0] if place.key[1] == HIGHPASS else specimen.band_hz[1]

@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 0.02, 50.0
@@ -27,7 +27,7 @@ class SensorGain(Effect):
     name = "sensor_gain"
     imitators = ("global_stiffness",)
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every channel, with either sign."""
         return [
             Place(key=(channel, sign), location={"channels": [channel]})
@@ -35,13 +35,13 @@ class SensorGain(Effect):
             for sign in (1, -1)
         ]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Give the size of the ratio."""
         neutral = 1.0 if place.key[1] == 1 else 0.0
         tolerance = specimen.options.gain_tolerance
         return (Parameter(name="gain_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=neutral, tolerance=tolerance),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Multiply the channel."""
         del specimen
         return self.chain(place)
@@ -51,7 +51,7 @@ class SensorGain(Effect):
         channel, sign = str(place.key[0]), float(str(place.key[1]))
         return lambda values: Change(channels={channel: lambda s: np.full(len(s), sign * values[0] + 0j)})
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """From much less to much more."""
         del specimen, place
         return TRIED[:, None]
@@ -61,7 +61,7 @@ class SensorGain(Effect):
         del name
         return value * float(str(place.key[1]))
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
         del specimen
         ratio = values["gain_ratio"]

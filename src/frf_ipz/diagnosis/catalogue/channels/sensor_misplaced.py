@@ -9,7 +9,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 
@@ -19,7 +19,7 @@ class SensorMisplaced(Effect):
     name = "sensor_misplaced"
     imitators = ("sensor_gain",)
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every other node for every channel that stays at one node."""
         channels = [channel for channel, _ in specimen.layout.outputs]
         return [
@@ -30,12 +30,12 @@ class SensorMisplaced(Effect):
             if other.direction == dof.direction and other.node != dof.node
         ]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """None: the node says it all."""
         del specimen, place
         return ()
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Move the sensor."""
         del specimen
         return self.chain(place)
@@ -45,13 +45,13 @@ class SensorMisplaced(Effect):
         change = Change(moved={str(place.key[0]): int(str(place.key[1]))})
         return lambda _: change
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside."""
         channel, node = str(place.key[0]), int(str(place.key[1]))
         dof = next(dof for name, dof in specimen.layout.outputs if name == channel)
         return [_place(channel, other) for other in specimen.nodes_near(node, dof.direction) if other != dof.node]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which sensor, and where it is."""
         del values
         channel, node = str(place.key[0]), int(str(place.key[1]))

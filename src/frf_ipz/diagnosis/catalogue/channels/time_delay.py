@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 SHORTEST, LONGEST = 1e-4, 1.5  # periods of the band's upper edge
@@ -25,7 +25,7 @@ class TimeDelay(Effect):
     name = "time_delay"
     imitators = ("sensor_dynamics",)
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every channel, and all sensors together."""
         sensors = tuple(dict.fromkeys(channel for channel, _ in specimen.layout.outputs))
         late = [(channel,) for channel in specimen.layout.channels]
@@ -33,13 +33,13 @@ class TimeDelay(Effect):
             Place(key=channels, location={"channels": list(channels)}) for channels in dict.fromkeys([*late, sensors])
         ]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Delay."""
         del place
         period = 1 / specimen.band_hz[1]
         return (Parameter(name="delay_s", low=SHORTEST * period, high=LONGEST * period),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Turn the phase."""
         del specimen
         return self.chain(place)
@@ -53,12 +53,12 @@ class TimeDelay(Effect):
 
         return change
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """From little to much."""
         del place
         return TRIED[:, None] / specimen.band_hz[1]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
         del specimen
         delay = values["delay_s"]

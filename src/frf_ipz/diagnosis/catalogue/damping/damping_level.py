@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.physics.change import NOTHING, Change
 from frf_ipz.diagnosis.physics.modified import LEAST_RATIO, modify
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 1e-5, 0.5
@@ -27,12 +27,12 @@ class DampingLevel(Effect):
     name = "damping_level"
     imitators = ("structural_damping", "local_damper")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Everywhere."""
         del specimen
         return [Place(key=())]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Damping ratio."""
         del place
         stated = _stated(specimen)
@@ -46,17 +46,17 @@ class DampingLevel(Effect):
             ),
         )
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Give it to all modes."""
         del specimen, place
         return lambda values: Change(modal_ratio=float(values[0]))
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Less and more than stated."""
         del place
         return np.clip(_stated(specimen) * TRIED, *BOUNDS)[:, None]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much."""
         del place
         ratio = values["modal_ratio"]
@@ -66,7 +66,7 @@ class DampingLevel(Effect):
         )
 
 
-def _stated(specimen: Specimen) -> float:
+def _stated(specimen: ModelContext) -> float:
     """Typical damping ratio of the nominal modes of the band, whichever way the model states it."""
     basis, low_high = specimen.basis, 2 * np.pi * np.array(specimen.band_hz)
     modified = modify(basis, NOTHING)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 WEAKEST, STRONGEST = 1e-6, 1e2  # of the structure's own stiffness over the lowest frequency
@@ -25,16 +25,16 @@ class LocalDamper(Effect):
     imitators = ("attached_resonator", "viscoelastic_joint", "damping_level")
     has_dynamics = True
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that moves."""
         return at_nodes(specimen)
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Damping constant."""
         scale = specimen.stiffness_against(_motion(specimen, place)) / (2 * np.pi * specimen.band_hz[0])
         return (Parameter(name="damping_Ns_m", low=WEAKEST * scale, high=STRONGEST * scale),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Attach it."""
         motion = _motion(specimen, place)[:, None]
         none = np.zeros((1, 1))
@@ -47,15 +47,15 @@ class LocalDamper(Effect):
 
         return change
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """Proportional to s."""
-        return Sketch(motion=_motion(specimen, place), shapes=specimen.contour[None], values=np.ones((1, 1)))
+        return Signature(motion=_motion(specimen, place), shapes=specimen.contour[None], values=np.ones((1, 1)))
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside."""
         return beside_node(specimen, place)
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much, and where."""
         damping = values["damping_Ns_m"]
         return (
@@ -64,5 +64,5 @@ class LocalDamper(Effect):
         )
 
 
-def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
     return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 1e-5, 1.0
@@ -33,17 +33,17 @@ class StructuralDamping(Effect):
     name = "structural_damping"
     imitators = ("damping_level", "viscoelastic_joint", "local_damper")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Everywhere, in four forms."""
         del specimen
         return [Place(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Loss factor."""
         del specimen, place
         return (Parameter(name="loss_factor", low=BOUNDS[0], high=BOUNDS[1]),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Give it to the stiffness, or half of it to the ratio of each mode."""
         if place.key == (OF_MODES,):
             return lambda values: Change(added_ratio=float(values[0]) / 2)
@@ -52,17 +52,17 @@ class StructuralDamping(Effect):
         middle = 2 * np.pi * float(np.sqrt(specimen.band_hz[0] * specimen.band_hz[1])) if place.key else 0.0
         return lambda values: Change(loss_factor=float(values[0]), reference_rad_s=middle)
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """From little to much."""
         del specimen, place
         return TRIED[:, None]
 
-    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
         """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""
         del specimen, values
         return LESS_LIKELY if place.key == (OF_MODES,) else 0.0
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much."""
         del specimen, place
         loss = values["loss_factor"]

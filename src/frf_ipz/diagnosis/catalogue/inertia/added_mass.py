@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 SMALLEST, LARGEST = 1e-5, 2.0  # of the mass of the structure
@@ -24,39 +24,39 @@ class AddedMass(Effect):
     name = "added_mass"
     imitators = ("local_stiffness", "attached_resonator", "boundary_compliance")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that moves."""
         return _once_a_node(at_nodes(specimen))
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Mass."""
         del place
         total = specimen.mass_kg
         return (Parameter(name="mass_kg", low=SMALLEST * total, high=LARGEST * total),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Mass in all translational directions of the node."""
         model = specimen.model
         unit = with_point_masses(model, {int(str(place.key[0])): 1.0}).mass_all - model.mass_all
         return lambda values: Change(mass=values[0] * unit)
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """s^2 m against the direction of the test."""
         node, direction = place.key
         dof = next(d for d in specimen.moving_dofs if (d.node, d.direction) == (node, direction))
         amplitudes = np.geomspace(3e-4, 1.0, 14) * specimen.mass_kg
-        return Sketch(
+        return Signature(
             motion=specimen.unit(dof),
             shapes=specimen.contour[None] ** 2,
             values=np.ones((1, 1)),
             amplitudes=amplitudes,
         )
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside."""
         return beside_node(specimen, place)
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how much sits where."""
         mass = values["mass_kg"]
         return (

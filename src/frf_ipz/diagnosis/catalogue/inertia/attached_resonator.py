@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
@@ -32,11 +32,11 @@ class AttachedResonator(Effect):
     imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
     has_dynamics = True
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that moves."""
         return at_nodes(specimen)
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Mass, frequency, damping ratio."""
         del place
         low, high = specimen.band_hz
@@ -46,7 +46,7 @@ class AttachedResonator(Effect):
             Parameter(name="damping_ratio", low=RATIOS[0], high=RATIOS[1]),
         )
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Attach its dynamic stiffness."""
         motion = _motion(specimen, place)[:, None]
 
@@ -63,23 +63,23 @@ class AttachedResonator(Effect):
 
         return change
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """All frequencies and some damping ratios."""
         low, high = specimen.band_hz
         count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
         pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), TRIED_RATIOS))
-        return Sketch(
+        return Signature(
             motion=_motion(specimen, place),
             shapes=np.array([dynamic_mass(specimen.contour, frequency, ratio) for frequency, ratio in pairs]),
             values=np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
             amplitudes=np.geomspace(3e-4, 0.3, 9) * specimen.mass_kg,
         )
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside."""
         return beside_node(specimen, place)
 
-    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
         """Expect what swings by itself to be little damped: with much damping it is a damper with a mass behind it."""
         del specimen, place
         beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
@@ -95,7 +95,7 @@ class AttachedResonator(Effect):
             "more than what swings by itself: it rather is another way to lose energy"
         )
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say what swings where."""
         return (
             f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at {specimen.where(int(str(place.key[0])))} and "
@@ -124,5 +124,5 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
     return np.asarray(s**2 * spring / (s**2 + spring))
 
 
-def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
     return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))

@@ -12,7 +12,7 @@ from frf_ipz.fe.beams.beam_options import BeamFile
 from frf_ipz.fe.beams.variants import with_formulation
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import StructuralModel
 
@@ -23,24 +23,24 @@ class ShearRotaryInertia(Effect):
     name = "shear_rotary_inertia"
     imitators = ("global_stiffness", "axial_load", "added_mass")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Return a beam that was modelled by Euler-Bernoulli."""
         source = specimen.model.source
         applies = isinstance(source, BeamFile) and source.beam.formulation == "euler-bernoulli"
         return [Place(key=())] if applies else []
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """None: dimensions and material are known."""
         del specimen, place
         return ()
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Exchange the elements."""
         del place
         change = Change(model=_exchanged(specimen.model))
         return lambda _: change
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say what the model lacks."""
         del specimen, place, values
         return (

@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 BOUNDS = 0.2, 5.0
@@ -25,29 +25,29 @@ class GlobalStiffness(Effect):
     name = "global_stiffness"
     imitators = ("viscoelastic_joint", "axial_load", "shear_rotary_inertia")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Everywhere."""
         del specimen
         return [Place(key=())]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Real stiffness over the model's."""
         del place
         tolerance = specimen.options.stiffness_tolerance
         return (Parameter(name="stiffness_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=1.0, tolerance=tolerance),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Scale the matrix."""
         del place
         whole = specimen.model.stiffness_all
         return lambda values: Change(stiffness=(values[0] - 1) * whole)
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Softer and stiffer, by little and by much."""
         del specimen, place
         return np.concatenate([TRIED, 1 / TRIED])[:, None]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say by how much."""
         del specimen, place
         ratio = values["stiffness_ratio"]

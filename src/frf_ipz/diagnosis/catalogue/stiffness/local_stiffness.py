@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import part_matrices
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
     from frf_ipz.structure import Part
 
@@ -33,7 +33,7 @@ class LocalStiffness(Effect):
     name = "local_stiffness"
     imitators = ("boundary_compliance", "added_mass", "coupling_spring")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Stretches of some lengths; every spring; every group."""
         parts = [part for part in specimen.model.parts if part.kind in KEYS and _has_stiffness(part)]
         elements = [part for part in parts if part.kind == "element"]
@@ -47,23 +47,23 @@ class LocalStiffness(Effect):
             for first in range(1, len(elements) - length + 2, max(length // 4, 1))
         ]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Real stiffness over the model's."""
         del place
         tolerance = specimen.options.stiffness_tolerance
         return (Parameter(name="stiffness_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=1.0, tolerance=tolerance),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Scale the parts' share of the matrix."""
         _, stiffness = part_matrices(specimen.model, str(place.key[0]), _names(place))
         return lambda values: Change(stiffness=(values[0] - 1) * stiffness)
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Softer and stiffer, by little and by much."""
         del specimen, place
         return TRIED[:, None]
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch | None:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
         """Bend a stretch with constant curvature, draw out a spring; a group has no such single motion."""
         kind = place.key[0]
         if kind == "group":
@@ -71,9 +71,9 @@ class LocalStiffness(Effect):
         motion, stiffness = (_curvature if kind == "element" else _extension)(specimen, place)
         changes = (TRIED - 1) * stiffness
         shapes = np.repeat(changes[:, None] + 0j, len(specimen.contour), 1)
-        return Sketch(motion=motion, shapes=shapes, values=TRIED[:, None], amplitudes=np.ones(1))
+        return Signature(motion=motion, shapes=shapes, values=TRIED[:, None], amplitudes=np.ones(1))
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Stretches that begin or end an element earlier or later; all other springs or groups are searched anyway."""
         if place.key[0] != "element":
             return []
@@ -84,7 +84,7 @@ class LocalStiffness(Effect):
         tried = [(first + a, last + b) for a, b in sorted(moves)]
         return [_stretch(a, b) for a, b in tried if 1 <= a <= b <= total and b - a < max(total // LONGEST, 1)]
 
-    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
         """Expect some length, and the size of the change in flexibility to be known by its logarithm only.
 
         A short stretch that changes much and a longer one that changes little look alike. Without this the short one
@@ -97,7 +97,7 @@ class LocalStiffness(Effect):
         length = int(str(place.key[2])) - int(str(place.key[1])) + 1
         return by_size - 0.5 * float(np.log(length / usual) / np.log(WITHIN)) ** 2
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which part, and by how much."""
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
@@ -121,7 +121,7 @@ def _names(place: Place) -> list[str]:
     return [str(number) for number in range(int(str(place.key[1])), int(str(place.key[2])) + 1)]
 
 
-def _called(specimen: Specimen, place: Place) -> str:
+def _called(specimen: ModelContext, place: Place) -> str:
     if place.key[0] != "element":
         return f"The {place.key[0]} '{place.key[1]}' is"
     first, last = int(str(place.key[1])), int(str(place.key[2]))
@@ -130,7 +130,7 @@ def _called(specimen: Specimen, place: Place) -> str:
     return f"{what[:-3] if first == last else what[:-4]} (x = {ends[0]:.3f} to {ends[1]:.3f} m) {what.split()[-1]}"
 
 
-def _curvature(specimen: Specimen, place: Place) -> tuple[FloatArray, float]:
+def _curvature(specimen: ModelContext, place: Place) -> tuple[FloatArray, float]:
     """Rotation of a stretch's right end against its left one, and the bending stiffness against that."""
     first, last = int(str(place.key[1])), int(str(place.key[2]))
     model = specimen.model
@@ -144,7 +144,7 @@ def _curvature(specimen: Specimen, place: Place) -> tuple[FloatArray, float]:
     return motion, 1 / flexibility
 
 
-def _extension(specimen: Specimen, place: Place) -> tuple[FloatArray, float]:
+def _extension(specimen: ModelContext, place: Place) -> tuple[FloatArray, float]:
     part = next(part for part in specimen.model.parts if part.kind == "spring" and part.name == place.key[1])
     motion = np.zeros(len(specimen.model.all_dofs))
     motion[part.indices] = (-1.0, 1.0)

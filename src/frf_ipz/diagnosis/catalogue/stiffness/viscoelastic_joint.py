@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.beam_options import BeamFile
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e2  # of the structure's own stiffness there
@@ -30,7 +30,7 @@ class ViscoelasticJoint(Effect):
     imitators = ("local_damper", "grounded_spring", "attached_resonator", "global_stiffness")
     has_dynamics = True
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that moves, every spring, the rotation of every pinned end."""
         found = [Place(key=("node", *place.key), location=place.location) for place in at_nodes(specimen)]
         springs = [part for part in specimen.model.parts if part.kind == "spring"]
@@ -39,7 +39,7 @@ class ViscoelasticJoint(Effect):
         found += [Place(key=("spring", part.name), location={"springs": [part.name]}) for part in springs]
         return found + _ends(specimen)
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
         own = specimen.stiffness_against(motion_at(specimen, place))
         low, high = (2 * np.pi * edge for edge in specimen.band_hz)
@@ -49,7 +49,7 @@ class ViscoelasticJoint(Effect):
             Parameter(name="relaxation_time_s", low=1 / (FASTEST * high), high=1 / (SLOWEST * low)),
         )
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Attach its dynamic stiffness."""
         motion = motion_at(specimen, place)[:, None]
         light = 1 / (LIGHT * 2 * np.pi * specimen.band_hz[1]) ** 2
@@ -70,17 +70,17 @@ class ViscoelasticJoint(Effect):
 
         return change
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """Draw some relaxation times."""
         low, high = (2 * np.pi * edge for edge in specimen.band_hz)
         times = np.geomspace(1 / (2 * high), 1 / (0.5 * low), N_TIMES)
-        return Sketch(
+        return Signature(
             motion=motion_at(specimen, place),
             shapes=np.array([relaxing(specimen.contour, time) for time in times]),
             values=np.stack([np.ones(N_TIMES), times], 1),
         )
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside, and ends, which look like the nodes beside them; for others nothing."""
         if place.key[0] != "node":
             return []
@@ -88,12 +88,12 @@ class ViscoelasticJoint(Effect):
         beside = [Place(key=("node", *other.key), location=other.location) for other in beside_node(specimen, inner)]
         return beside + _ends(specimen)
 
-    def log_prior(self, specimen: Specimen, place: Place, values: FloatArray) -> float:
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
         """Joints sit at ends: one of them is as likely as one at any node between."""
         del values
         return float(np.log(len(at_nodes(specimen)) / len(_ends(specimen)))) if place.key[0] == "end" else 0.0
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, how fast, where."""
         where = {
             "node": lambda: f"between {specimen.where(int(str(place.key[1])))} and the ground",
@@ -126,7 +126,7 @@ def relaxing(s: ComplexArray, time_s: float) -> ComplexArray:
     return np.asarray(s * time_s / (1 + s * time_s))
 
 
-def _ends(specimen: Specimen) -> list[Place]:
+def _ends(specimen: ModelContext) -> list[Place]:
     """Pinned ends of a beam."""
     source = specimen.model.source
     if not isinstance(source, BeamFile):
@@ -138,12 +138,12 @@ def _ends(specimen: Specimen) -> list[Place]:
     ]
 
 
-def motion_at(specimen: Specimen, place: Place) -> FloatArray:
+def motion_at(specimen: ModelContext, place: Place) -> FloatArray:
     """Weights of all DOFs in what a joint sees.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     place : Place
         A node, a spring, or a pinned end.

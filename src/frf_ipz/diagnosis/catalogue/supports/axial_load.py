@@ -16,7 +16,7 @@ from frf_ipz.fe.beams.beam_options import BeamFile
 from frf_ipz.fe.beams.variants import geometric_stiffness
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 NEARLY_BUCKLED, STRONGEST = 0.97, 10.0  # of the buckling load: compression and tension
@@ -29,31 +29,31 @@ class AxialLoad(Effect):
     name = "axial_load"
     imitators = ("grounded_spring", "global_stiffness", "boundary_compliance", "shear_rotary_inertia")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Return a beam that is held at both ends."""
         source = specimen.model.source
         applies = isinstance(source, BeamFile) and "free" not in (source.beam.left, source.beam.right)
         return [Place(key=())] if applies else []
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Force, from near buckling to strong tension."""
         del place
         load = buckling_load(specimen)
         return (Parameter(name="force_N", low=-NEARLY_BUCKLED * load, high=STRONGEST * load, is_log=False),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Add geometric stiffness."""
         del place
         unit = geometric_stiffness(specimen.model)
         return lambda values: Change(stiffness=values[0] * unit)
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Both signs, from weak to strong."""
         del place
         load = buckling_load(specimen)
         return load * np.concatenate([-TRIED, TRIED, [1.2, 2.0, 3.5, 6.0]])[:, None]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how strong."""
         del specimen, place
         force = values["force_N"]
@@ -64,12 +64,12 @@ class AxialLoad(Effect):
 
 
 @lru_cache(maxsize=2)  # a search asks for it with every hypothesis
-def buckling_load(specimen: Specimen) -> float:
+def buckling_load(specimen: ModelContext) -> float:
     """Find the axial compression at which the beam buckles.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         A beam.
 
     Returns

@@ -15,7 +15,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.beams.beam_options import BeamFile
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 ROTATION, TRANSLATION = "rotational_stiffness_Nm_rad", "translational_stiffness_N_m"
@@ -31,7 +31,7 @@ class BoundaryCompliance(Effect):
     name = "boundary_compliance"
     imitators = ("local_stiffness", "added_mass", "axial_load")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Each held end of a beam: its rotation, its translation, or both."""
         source = specimen.model.source
         if not isinstance(source, BeamFile):
@@ -43,7 +43,7 @@ class BoundaryCompliance(Effect):
             found += [Place(key=(end, way), location={"end": end, "nodes": [node]}) for way in ways if way]
         return found
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Stiffness of each spring."""
         stiffness, length = _bending(specimen)
         scale = {"ry": stiffness / length, "z": stiffness / length**3}
@@ -54,7 +54,7 @@ class BoundaryCompliance(Effect):
             for way in _ways(place)
         )
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Release the held DOFs and put springs there."""
         model = specimen.model
         node = model.source.beam.elements + 1 if place.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
@@ -67,16 +67,16 @@ class BoundaryCompliance(Effect):
 
         return change
 
-    def starts(self, specimen: Specimen, place: Place) -> FloatArray:
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
         """Spread a grid, finer where there is one spring."""
         parameters = self.parameters(specimen, place)
         return grid(parameters, ONE_ALONE if len(parameters) == 1 else OF_TWO)
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Give the other ways in which that end may give way."""
         return [other for other in self.places(specimen) if other.key[0] == place.key[0] and other.key != place.key]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say which end gives way, and how much."""
         del specimen
         texts = {ROTATION: "{:.4g} N m/rad in rotation", TRANSLATION: "{:.4g} N/m in translation"}
@@ -89,7 +89,7 @@ def _ways(place: Place) -> tuple[str, ...]:
     return ways if isinstance(ways, tuple) else ()
 
 
-def _bending(specimen: Specimen) -> tuple[float, float]:
+def _bending(specimen: ModelContext) -> tuple[float, float]:
     source = specimen.model.source
     if not isinstance(source, BeamFile):
         raise TypeError("only a beam has ends")

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Sketch, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Change
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.finding import Estimate
 
 FLOATING = "floating"
@@ -25,32 +25,32 @@ class GroundedSpring(Effect):
     name = "grounded_spring"
     imitators = ("coupling_spring", "axial_load", "viscoelastic_joint", "boundary_compliance")
 
-    def places(self, specimen: Specimen) -> Sequence[Place]:
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
         """Every node that moves; not where a lumped model has such a spring already, which is then stiffer."""
         springs = [part for part in specimen.model.parts if part.kind == "spring"]
         taken = {node for part in springs if 0 in part.nodes for node in part.nodes}
         return [place for place in at_nodes(specimen) if place.key[0] not in taken]
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Stiffness."""
         own = specimen.stiffness_against(_motion(specimen, place))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Add it to the diagonal."""
         unit = sparse.csr_array(sparse.diags_array(_motion(specimen, place)))
         floats = is_floating(place)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch | None:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
         """Draw a constant."""
-        return Sketch(
+        return Signature(
             motion=_motion(specimen, place),
             shapes=np.ones((1, len(specimen.contour)), complex),
             values=np.ones((1, 1)),
         )
 
-    def neighbours(self, specimen: Specimen, place: Place) -> Sequence[Place]:
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
         """Nodes beside; what a free structure touches may also hang as softly as the structure does."""
         if is_floating(place):
             return [
@@ -58,7 +58,7 @@ class GroundedSpring(Effect):
             ]
         return [*beside_node(specimen, place), *([floating(place)] if specimen.basis.modes.n_rigid else [])]
 
-    def statement(self, specimen: Specimen, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and where."""
         stiffness = values["stiffness_N_m"]
         where = specimen.where(int(str(place.key[0])))
@@ -101,5 +101,5 @@ def is_floating(place: Place) -> bool:
     return FLOATING in place.key
 
 
-def _motion(specimen: Specimen, place: Place) -> np.ndarray:
+def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
     return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key[:2]))

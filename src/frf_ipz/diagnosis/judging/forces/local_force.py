@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Place, Sketch
+from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Place, Signature
 from frf_ipz.diagnosis.catalogue.stiffness.viscoelastic_joint import SOFTEST, STIFFEST, ViscoelasticJoint, motion_at
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 
 
 class LocalForce(ViscoelasticJoint):
@@ -36,12 +36,12 @@ class LocalForce(ViscoelasticJoint):
     def words(self, where: str, second: float) -> str:
         """Say what explains the measurement better than the catalogue."""
 
-    def parameters(self, specimen: Specimen, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
         """Stiffness in the middle of the band, and the second one."""
         own = specimen.stiffness_against(motion_at(specimen, place))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own), self.second_parameter())
 
-    def build(self, specimen: Specimen, place: Place) -> Builder:
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
         """Attach its dynamic stiffness; no matrices have it."""
         motion, middle = motion_at(specimen, place)[:, None], _middle(specimen)
         none = np.zeros((1, 1))
@@ -57,22 +57,22 @@ class LocalForce(ViscoelasticJoint):
 
         return change
 
-    def sketch(self, specimen: Specimen, place: Place) -> Sketch:
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
         """Draw some values of the second parameter."""
         unit = specimen.contour / _middle(specimen)
-        return Sketch(
+        return Signature(
             motion=motion_at(specimen, place),
             shapes=np.array([self.per_stiffness(unit, second) for second in self.tried]),
             values=np.stack([np.ones(len(self.tried)), self.tried], 1),
         )
 
 
-def where_of(specimen: Specimen, place: Place) -> str:
+def where_of(specimen: ModelContext, place: Place) -> str:
     """Say in words where a force acts.
 
     Parameters
     ----------
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
     place : Place
         Of a joint.
@@ -88,5 +88,5 @@ def where_of(specimen: Specimen, place: Place) -> str:
     return f"spring {place.key[1]}"
 
 
-def _middle(specimen: Specimen) -> float:
+def _middle(specimen: ModelContext) -> float:
     return float(2 * np.pi * np.sqrt(np.prod(specimen.band_hz)))

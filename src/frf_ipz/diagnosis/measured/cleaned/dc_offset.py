@@ -16,13 +16,13 @@ from frf_ipz.diagnosis.measured.forces import isolate_pulse
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 SHORTEST = 256  # samples after a blow that tell a mean
 SURE = 3.0  # times the difference between the means of the whole record and of its second half
 
 
-def without_quiet_constants(observations: Observations) -> Observations:
+def without_dc_offset(observations: Observations) -> Observations:
     """Take off what velocities and accelerations show where nothing moves.
 
     Parameters
@@ -38,21 +38,23 @@ def without_quiet_constants(observations: Observations) -> Observations:
     if not observations.are_from_rest:
         return observations
     is_hammer = observations.kind == "hammer"
-    return replace(observations, blows=tuple(_without(blow, is_hammer=is_hammer) for blow in observations.blows))
+    return replace(
+        observations, records=tuple(_without(record, is_hammer=is_hammer) for record in observations.records)
+    )
 
 
-def _without(blow: Blow, *, is_hammer: bool) -> Blow:
-    start = isolate_pulse(blow).start if is_hammer else 0
-    if blow.n_samples - start < SHORTEST:
-        return blow
-    middle = (start + blow.n_samples) // 2
+def _without(record: ObservedRecord, *, is_hammer: bool) -> ObservedRecord:
+    start = isolate_pulse(record).start if is_hammer else 0
+    if record.n_samples - start < SHORTEST:
+        return record
+    middle = (start + record.n_samples) // 2
     constants = np.array(
         [
             _mean(response, start, middle) if sensor.quantity.power else 0.0
-            for sensor, response in zip(blow.sensors, blow.responses, strict=True)
+            for sensor, response in zip(record.sensors, record.responses, strict=True)
         ]
     )
-    return replace(blow, responses=blow.responses - constants[:, None])
+    return replace(record, responses=record.responses - constants[:, None])
 
 
 def _mean(response: FloatArray, start: int, middle: int) -> float:

@@ -26,7 +26,7 @@ from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_p
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 DECAYS = 8.0  # sigma times the shortest record
 LARGEST = 0.05  # of a channel's highest value: a larger constant has been taken off already
@@ -48,7 +48,7 @@ FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolv
 class _Group:
     """Blows at one place, and what may be in each: a constant, first samples and, after another, decaying modes."""
 
-    blows: tuple[Blow, ...]
+    records: tuple[ObservedRecord, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
     lines: Lines
     poles: ComplexArray
@@ -59,50 +59,50 @@ class _Group:
     @property
     def n_samples(self) -> int:
         """Samples that are transformed."""
-        return min(blow.n_samples for blow in self.blows)
+        return min(record.n_samples for record in self.records)
 
-    def count(self, blow: Blow) -> int:
+    def count(self, record: ObservedRecord) -> int:
         """Count what may be left in a blow: a constant, first samples; after another one also cosines and sines."""
-        return 1 + INSTEAD + (2 * len(self.poles) if blow.follows else 0)
+        return 1 + INSTEAD + (2 * len(self.poles) if record.follows else 0)
 
-    def shapes(self, blow: Blow) -> ComplexArray:
+    def shapes(self, record: ObservedRecord) -> ComplexArray:
         """Transform unit leftovers, (n_lines / FINER, count)."""
-        step, s, n = blow.step_s, self.lines.s[::FINER, None], self.n_samples
+        step, s, n = record.step_s, self.lines.s[::FINER, None], self.n_samples
 
         def transformed(rates: ComplexArray) -> ComplexArray:
             turn = np.exp((rates - s) * step)
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
         first = np.hstack([transformed(np.zeros(1, complex)), step * np.exp(-s * step * np.arange(INSTEAD))])
-        if not blow.follows:
+        if not record.follows:
             return first
         up, down = transformed(self.poles), transformed(self.poles.conj())
         return np.hstack([first, (up + down) / 2, (up - down) / 2j])
 
-    def unit_signals(self, blow: Blow) -> FloatArray:
+    def unit_signals(self, record: ObservedRecord) -> FloatArray:
         """Give unit leftovers in time, (count, n_samples); first samples stay: FRFs allow for what they lack."""
-        first = np.vstack([np.ones(blow.n_samples), np.zeros((INSTEAD, blow.n_samples))])
-        if not blow.follows:
+        first = np.vstack([np.ones(record.n_samples), np.zeros((INSTEAD, record.n_samples))])
+        if not record.follows:
             return first
-        turning = np.exp(np.outer(self.poles, blow.step_s * np.arange(blow.n_samples)))
+        turning = np.exp(np.outer(self.poles, record.step_s * np.arange(record.n_samples)))
         return np.concatenate([first, turning.real, turning.imag])
 
-    def kicks(self, blow: Blow) -> tuple[ComplexArray, FloatArray] | None:
+    def kicks(self, record: ObservedRecord) -> tuple[ComplexArray, FloatArray] | None:
         """Give what unit residues leave at the first sample, (n_poles,), and its error; None if a force is unknown."""
-        if not blow.follows:
+        if not record.follows:
             return None
         before = [
-            (one, pulse.blow.force)
-            for one, pulse in zip(self.blows, self.pulses, strict=True)
-            if one.recording == blow.recording and one.number < blow.number
+            (one, pulse.record.force)
+            for one, pulse in zip(self.records, self.pulses, strict=True)
+            if one.recording == record.recording and one.number < record.number
         ]
-        if len(before) != blow.number - 1:
+        if len(before) != record.number - 1:
             return None
         left, by_pole = np.zeros((2, len(self.poles)), complex)
         for one, force in before:
             touched = np.flatnonzero(force)
-            later = blow.start_s - one.start_s - blow.step_s * touched
-            decaying = blow.step_s * np.exp(np.outer(self.poles, later))
+            later = record.start_s - one.start_s - record.step_s * touched
+            decaying = record.step_s * np.exp(np.outer(self.poles, later))
             left += decaying @ force[touched]
             by_pole += decaying @ (later * force[touched])
         return left, np.hypot(ASTRAY * np.abs(left), self.pole_stds * np.abs(by_pole))
@@ -123,7 +123,7 @@ class _Told:
         return np.cumsum((0, *self.counts[:-1]))
 
 
-def without_leftovers(observations: Observations) -> Observations:
+def without_residual_motion(observations: Observations) -> Observations:
     """Take off what no linear system answers to a blow with: constants, and motion left from a blow before.
 
     Parameters
@@ -141,54 +141,57 @@ def without_leftovers(observations: Observations) -> Observations:
     places = same_places(observations)
     if observations.kind != "hammer" and min(len(records) for records in places) < LEAST_RECORDS:
         return observations
-    decay = DECAYS / min(blow.duration_s for blow in observations.blows)
-    groups = [_group(blows, observations, decay) for blows in places]
+    decay = DECAYS / min(record.duration_s for record in observations.records)
+    groups = [_group(records, observations, decay) for records in places]
     found: dict[tuple[str, str], tuple[FloatArray, float]] = {}
-    for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.blows[0].sensors):
+    for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.records[0].sensors):
         rows = [
             (group, row)
             for group in groups
-            for row, sensor in enumerate(group.blows[0].sensors)
+            for row, sensor in enumerate(group.records[0].sensors)
             if sensor.channel == channel
         ]
         found |= {(name, channel): left for name, left in _leftovers(rows).items()}
-    return replace(observations, blows=tuple(_without(blow, found) for blow in observations.blows))
+    return replace(observations, records=tuple(_without(record, found) for record in observations.records))
 
 
-def _group(blows: tuple[Blow, ...], observations: Observations, decay: float) -> _Group:
+def _group(records: tuple[ObservedRecord, ...], observations: Observations, decay: float) -> _Group:
     is_hammer = observations.kind == "hammer"
-    pulses = tuple(isolate_pulse(blow) if is_hammer else _whole(blow) for blow in blows)
-    transformed = tuple(pulse.blow for pulse in pulses)
+    pulses = tuple(isolate_pulse(record) if is_hammer else _whole(record) for record in records)
+    transformed = tuple(pulse.record for pulse in pulses)
     lines = lines_of_band(transformed, observations.band_hz, decay)
     found: list[LocalPole] = []
-    residues = np.zeros((0, len(blows[0].sensors)))
-    if any(blow.follows for blow in blows):
-        from_rest = tuple(blow for blow in transformed if not blow.follows)
+    residues = np.zeros((0, len(records[0].sensors)))
+    if any(record.follows for record in records):
+        from_rest = tuple(record for record in transformed if not record.follows)
         told = lines_of_band(from_rest, observations.band_hz, decay) if from_rest else lines
         found = _poles(told, decay)
         nearest = [int(np.argmin(np.abs(told.s - one.pole))) for one in found]
         away = np.array([np.abs(told.s[line] - one.pole) for line, one in zip(nearest, found, strict=True)])
         residues = np.abs(told.values[nearest]) * away[:, None]
     return _Group(
-        blows=blows,
+        records=records,
         pulses=pulses,
         lines=lines,
         poles=np.array([one.pole for one in found], complex),
         pole_stds=np.array([one.std_rad_s for one in found]),
         residues=residues,
-        lacking=np.array([cut_off(pulse, pulse.blow.responses)[1:] * is_hammer for pulse in pulses]) * np.sqrt(CUT_OFF),
+        lacking=np.array([cut_off(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
+        * np.sqrt(CUT_OFF),
     )
 
 
-def _whole(blow: Blow) -> Pulse:
+def _whole(record: ObservedRecord) -> Pulse:
     """Give a shaker's record, which begins where its force does: the structure moves from there on."""
-    size = np.abs(blow.force)
-    return Pulse(blow=blow, start=max(int(np.argmax(size > SHAKEN * size.max())) - RINGING, 0), stop=blow.n_samples)
+    size = np.abs(record.force)
+    return Pulse(
+        record=record, start=max(int(np.argmax(size > SHAKEN * size.max())) - RINGING, 0), stop=record.n_samples
+    )
 
 
-def _without(blow: Blow, found: dict[tuple[str, str], tuple[FloatArray, float]]) -> Blow:
-    left, stds = zip(*(found[blow.name, sensor.channel] for sensor in blow.sensors), strict=True)
-    return replace(blow, responses=blow.responses - np.array(left), constant_std=np.array(stds))
+def _without(record: ObservedRecord, found: dict[tuple[str, str], tuple[FloatArray, float]]) -> ObservedRecord:
+    left, stds = zip(*(found[record.name, sensor.channel] for sensor in record.sensors), strict=True)
+    return replace(record, responses=record.responses - np.array(left), constant_std=np.array(stds))
 
 
 def _poles(lines: Lines, decay: float) -> list[LocalPole]:
@@ -208,9 +211,9 @@ def _poles(lines: Lines, decay: float) -> list[LocalPole]:
 
 def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
     """Give the leftovers of all blows in one channel, as signals, and the standard deviations of the constants."""
-    largest = max(float(np.abs(blow.responses[row]).max()) for group, row in rows for blow in group.blows)
+    largest = max(float(np.abs(record.responses[row]).max()) for group, row in rows for record in group.records)
     faintest = FAINTEST * (largest or 1.0)  # of a channel that shows nothing at all, nothing is taken off
-    sizes = [[np.zeros(group.count(blow)) for blow in group.blows] for group, _ in rows]
+    sizes = [[np.zeros(group.count(record)) for record in group.records] for group, _ in rows]
     priors = [_prior(group, row) for group, row in rows]
     stds = np.zeros(0)
     for _ in range(ROUNDS):
@@ -218,7 +221,7 @@ def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, fl
         before = np.cumsum([0, *(len(one.slope) for one in told)])
         constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
         wandering = [
-            WANDERS * one.noise * _unlike_levels(group.blows) for (group, _), one in zip(rows, told, strict=True)
+            WANDERS * one.noise * _unlike_levels(group.records) for (group, _), one in zip(rows, told, strict=True)
         ]
         of_constants = np.zeros((before[-1], 1 + len(constants)))
         of_constants[constants] = np.hstack([np.full((len(constants), 1), LARGEST * largest), block_diag(*wandering)])
@@ -230,18 +233,18 @@ def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, fl
             np.split(part, one.constants[1:]) for part, one in zip(np.split(found, before[1:-1]), told, strict=True)
         ]
         stds = np.sqrt(np.maximum(np.diag(covariance)[constants], 0.0))
-    blows = [(group, blow) for group, _ in rows for blow in group.blows]
+    records = [(group, record) for group, _ in rows for record in group.records]
     return {
-        blow.name: (size @ group.unit_signals(blow), float(std))
-        for (group, blow), size, std in zip(blows, chain.from_iterable(sizes), stds, strict=True)
+        record.name: (size @ group.unit_signals(record), float(std))
+        for (group, record), size, std in zip(records, chain.from_iterable(sizes), stds, strict=True)
     }
 
 
 def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> _Told:
-    shapes = [group.shapes(blow) for blow in group.blows]
+    shapes = [group.shapes(record) for record in group.records]
     response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
     left = response - np.stack([shape @ size for shape, size in zip(shapes, sizes, strict=True)], 1)
-    per_square = 2 * group.lines.s.real[0] / group.blows[0].step_s
+    per_square = 2 * group.lines.s.real[0] / group.records[0].step_s
     energy = _unshared(force, left) + faintest**2 / per_square
     noise = float(np.sqrt(np.median(energy) * per_square))
     weight = 1 / (energy[:, None] + (MISSED * np.abs(left)) ** 2)
@@ -249,8 +252,8 @@ def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> 
     across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
     along = np.sum(shared.conj() * response, 1)
     own = [(shape.conj() * part[:, None]).T for shape, part in zip(shapes, weight.T, strict=True)]
-    before = [blow.responses[row, : pulse.start] for blow, pulse in zip(group.blows, group.pulses, strict=True)]
-    quiet = [_quiet(group, blow, samples, noise) for blow, samples in zip(group.blows, before, strict=True)]
+    before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
+    quiet = [_quiet(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)]
     straight = [(one @ shape).real + more for one, shape, (more, _) in zip(own, shapes, quiet, strict=True)]
     slopes = [(one @ values).real + more for one, values, (_, more) in zip(own, response.T, quiet, strict=True)]
     return _Told(
@@ -261,39 +264,43 @@ def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> 
     )
 
 
-def _quiet(group: _Group, blow: Blow, before: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
+def _quiet(group: _Group, record: ObservedRecord, before: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
     """Give the curvature and slope that the samples before the blow add."""
     n = len(before)
-    shapes = group.unit_signals(blow)[:, :n]
+    shapes = group.unit_signals(record)[:, :n]
     variance = noise**2 * (1 + AKIN * n)
     return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ before / variance)
 
 
 def _prior(group: _Group, row: int) -> FloatArray:
     """Give a square root of the covariance of leftovers, (n, any), but for constants in common and their wandering."""
-    kicks = [group.kicks(blow) for blow in group.blows]
+    kicks = [group.kicks(record) for record in group.records]
     motions = [
-        LEFT * float(np.sqrt(2 * np.mean(blow.responses[row, : max(pulse.start, LEAST_BEFORE)] ** 2)))
-        for blow, pulse in zip(group.blows, group.pulses, strict=True)
+        LEFT * float(np.sqrt(2 * np.mean(record.responses[row, : max(pulse.start, LEAST_BEFORE)] ** 2)))
+        for record, pulse in zip(group.records, group.pulses, strict=True)
     ]
     residues = LEFT * group.residues[:, row]
     for kick, motion in zip(kicks, motions, strict=True):
         if kick is not None:  # no mode has left more than moves
             residues = np.fmin(residues, motion / np.maximum(np.abs(kick[0]), np.finfo(float).tiny))
     parts = [
-        _parts(blow, kick, residues, motion, lacking)
-        for blow, kick, motion, lacking in zip(group.blows, kicks, motions, group.lacking[:, row], strict=True)
+        _parts(record, kick, residues, motion, lacking)
+        for record, kick, motion, lacking in zip(group.records, kicks, motions, group.lacking[:, row], strict=True)
     ]
     shared = np.concatenate([of_residues for _, of_residues in parts])
     return np.hstack([np.diag(np.concatenate([own for own, _ in parts])), shared])
 
 
 def _parts(
-    blow: Blow, kick: tuple[ComplexArray, FloatArray] | None, residues: FloatArray, motion: float, lacking: float
+    record: ObservedRecord,
+    kick: tuple[ComplexArray, FloatArray] | None,
+    residues: FloatArray,
+    motion: float,
+    lacking: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Give deviations of a blow's own leftovers, (count,), and what residues leave, (count, 2 n_poles)."""
     n = len(residues)
-    if not blow.follows:
+    if not record.follows:
         return np.array([0.0, *[lacking] * INSTEAD]), np.zeros((1 + INSTEAD, 2 * n))
     if kick is None:
         own = np.array([motion, *[lacking] * INSTEAD, *[motion] * 2 * n])
@@ -304,10 +311,10 @@ def _parts(
     return np.concatenate([[motion, *[lacking] * INSTEAD], error, error]), shared
 
 
-def _unlike_levels(blows: tuple[Blow, ...]) -> FloatArray:
+def _unlike_levels(records: tuple[ObservedRecord, ...]) -> FloatArray:
     """Project on what differs from the levels of blows: what is like them may as well be their response."""
-    levels = np.array([blow.level for blow in blows])
-    return np.asarray(np.eye(len(blows)) - np.outer(levels, levels) / np.sum(levels**2))
+    levels = np.array([record.level for record in records])
+    return np.asarray(np.eye(len(records)) - np.outer(levels, levels) / np.sum(levels**2))
 
 
 def _unshared(force: ComplexArray, response: ComplexArray) -> FloatArray:

@@ -12,7 +12,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
     from frf_ipz.diagnosis.physics.change import Change
 
 LEAST_SHOWN = 0.05  # of what a channel shows at other frequencies: what it shows less of is left as it is
@@ -35,25 +35,25 @@ def restore(observations: Observations, change: Change) -> Observations:
     """
     if not (change.channels or change.moved):
         return observations
-    return replace(observations, blows=tuple(_restored(blow, change) for blow in observations.blows))
+    return replace(observations, records=tuple(_restored(record, change) for record in observations.records))
 
 
-def _restored(blow: Blow, change: Change) -> Blow:
-    channels = [sensor.channel for sensor in blow.sensors]
-    shown = [_unfiltered(blow, values, name, change) for values, name in zip(blow.responses, channels, strict=True)]
+def _restored(record: ObservedRecord, change: Change) -> ObservedRecord:
+    channels = [sensor.channel for sensor in record.sensors]
+    shown = [_unfiltered(record, values, name, change) for values, name in zip(record.responses, channels, strict=True)]
     return replace(
-        blow,
-        force=_unfiltered(blow, blow.force, blow.input_channel, change),
+        record,
+        force=_unfiltered(record, record.force, record.input_channel, change),
         responses=np.stack(shown),
-        sensors=tuple(_where_it_is(sensor, change) for sensor in blow.sensors),
+        sensors=tuple(_where_it_is(sensor, change) for sensor in record.sensors),
     )
 
 
-def _unfiltered(blow: Blow, values: FloatArray, channel: str, change: Change) -> FloatArray:
+def _unfiltered(record: ObservedRecord, values: FloatArray, channel: str, change: Change) -> FloatArray:
     if channel not in change.channels:
         return values
     padded = next_fast_len(2 * len(values), real=True)  # zeros beyond the end: nothing comes round to the start
-    s = np.asarray(2j * np.pi * np.fft.rfftfreq(padded, blow.step_s), np.complex128)
+    s = np.asarray(2j * np.pi * np.fft.rfftfreq(padded, record.step_s), np.complex128)
     shown = change.channels[channel](s)
     faint = np.abs(shown) < LEAST_SHOWN * np.abs(shown).max()
     spectrum = np.fft.rfft(values, padded) / np.where(faint, 1.0, shown)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import neighbours, start_at
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start, refine
-from frf_ipz.diagnosis.nonlinear.fitting.score_test import LinearFit, linear_motion_of_place, screen
+from frf_ipz.diagnosis.nonlinear.fitting.score_test import LinearFit, linear_motion_of_place, score_laws
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import Whereabouts
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 OF_EACH_LAW = 3  # places that are refined
 OF_ALL = 5
@@ -48,12 +48,12 @@ ROUNDS, FRESH = 4, 12  # of further steps that the best fit may take until it se
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Track:
-    """Stretches of one length, and the linear model fitted to them.
+class LawFitProgress:
+    """SegmentSet of one length, and the linear model fitted to them.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
@@ -61,7 +61,7 @@ class Track:
         Where a force may sit.
     """
 
-    stretches: Stretches
+    stretches: SegmentSet
     linear: LinearFit
     where: Whereabouts
 
@@ -80,28 +80,32 @@ class Track:
         near = neighbours(self.linear.freedom.plant, place, NEIGHBOURS)
         return [other for other in near if other in self.where.possible]
 
-    def shoot(self, fit: LawFit, iterations: int) -> LawFit:
+    def fit_output_error(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other stretches."""
         known = self.linear.freedom.n_lasting
         unknowns = fit.unknowns
         if len(unknowns) != len(self.linear.unknowns) or fit.n_rows != self.linear.n_rows:
             unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
-        return shoot(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
+        return fit_output_error(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
 
-    def shoot_afresh(self, fit: LawFit, iterations: int) -> LawFit:
+    def fit_output_error_afresh(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation from its numbers, with the linear model as it starts without a law."""
         start = fit.start(self.linear.as_stated)
-        return shoot(self.stretches, self.linear.freedom, start, iterations=iterations)
+        return fit_output_error(self.stretches, self.linear.freedom, start, iterations=iterations)
 
 
 def find_candidates(
-    short: Track, long: Track, laws: Sequence[Law], *, first: Callable[[], Track] | None = None
+    short: LawFitProgress,
+    long: LawFitProgress,
+    laws: Sequence[Law],
+    *,
+    first: Callable[[], LawFitProgress] | None = None,
 ) -> list[LawFit]:
     """Find the laws and places that explain stretches best.
 
     Parameters
     ----------
-    short, long : Track
+    short, long : LawFitProgress
         The data.
     laws : sequence of Law
         To be tried.
@@ -144,7 +148,7 @@ def _explain(fits: Sequence[LawFit]) -> bool:
     return bool(fits) and is_explained(fits[0])
 
 
-def _first(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+def _first(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     """Fit the first moments, and keep of each law what explains most of what nothing linear does."""
     refined = _refined(track, laws)
     fits = _climbed(track, [fit for law in laws for fit in _of(law, refined)[:SIMULATED]])
@@ -159,14 +163,14 @@ def _others(fits: Sequence[LawFit], known: Sequence[LawFit]) -> list[LawFit]:
     return new if new[:1] == list(fits[:1]) else []
 
 
-def _climbed(track: Track, starts: Iterable[LawFit]) -> list[LawFit]:
+def _climbed(track: LawFitProgress, starts: Iterable[LawFit]) -> list[LawFit]:
     """Fit by simulation, and the neighbours of the best too; the smallest cost first."""
     fits = _simulated(track, _different(starts))
     _climb(track, fits)
     return sorted(fits, key=lambda fit: fit.cost)
 
 
-def _finished(track: Track, finalists: Iterable[LawFit]) -> list[LawFit]:
+def _finished(track: LawFitProgress, finalists: Iterable[LawFit]) -> list[LawFit]:
     """Fit to the long stretches, the best until it settles; the smallest cost first."""
     fits = _simulated(track, _different(finalists), hopeless=HOPELESS_LATE)
     _climb(track, fits)
@@ -201,8 +205,8 @@ def _different(fits: Iterable[LawFit]) -> list[LawFit]:
     return list(found.values())
 
 
-def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
-    guesses = screen(track.stretches, track.linear, laws, places=track.where.possible)
+def _refined(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
+    guesses = score_laws(track.stretches, track.linear, laws, places=track.where.possible)
     unknowns = track.linear.as_stated
     chosen = [guess for law in laws for guess in [g for g in guesses if g.law is law][:OF_EACH_LAW]]
     chosen += [guess for guess in guesses[:OF_ALL] if guess not in chosen]
@@ -214,54 +218,57 @@ def _refined(track: Track, laws: Sequence[Law]) -> list[LawFit]:
     return sorted(fits, key=lambda fit: fit.cost)
 
 
-def _read(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+def _read(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     """Fit the laws from numbers that are read from the force."""
     return [refine(track.stretches, track.linear.freedom, start, n_turns=TURNS) for start in _starts(track, laws)]
 
 
-def _as_read(track: Track, laws: Sequence[Law]) -> list[LawFit]:
+def _as_read(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     """Simulate the laws with the numbers read, which refining may have led astray."""
-    return [shoot(track.stretches, track.linear.freedom, start, iterations=FIRST) for start in _starts(track, laws)]
+    return [
+        fit_output_error(track.stretches, track.linear.freedom, start, iterations=FIRST)
+        for start in _starts(track, laws)
+    ]
 
 
-def _starts(track: Track, laws: Sequence[Law]) -> list[Start]:
+def _starts(track: LawFitProgress, laws: Sequence[Law]) -> list[Start]:
     """Read the laws from the force itself at the likeliest places, whatever its law."""
     starts = [start_at(track.stretches, track.linear, free, law) for free in track.where.forces[:READ] for law in laws]
     return [start for start in starts if start.strength]
 
 
 def _simulated(
-    track: Track, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
+    track: LawFitProgress, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
 ) -> list[LawFit]:
     """Fit by simulation; those that stay hopeless after a few steps, against the least cost, only so far."""
-    found = [track.shoot(fit, FIRST) for fit in fits]
+    found = [track.fit_output_error(fit, FIRST) for fit in fits]
     least = min(least, *(fit.cost for fit in found)) if found else least
-    return [fit if fit.settled or fit.cost > hopeless * least else track.shoot(fit, MORE) for fit in found]
+    return [fit if fit.settled or fit.cost > hopeless * least else track.fit_output_error(fit, MORE) for fit in found]
 
 
-def _settle(track: Track, fits: list[LawFit]) -> None:
+def _settle(track: LawFitProgress, fits: list[LawFit]) -> None:
     """Fit the best law further, as long as it gets better, and once more with the linear model as at first."""
     best, is_fresh = min(range(len(fits)), key=lambda i: fits[i].cost), False
     for _ in range(ROUNDS):
         fit = fits[best]
         if not fit.settled:
-            fits[best] = track.shoot(fit, MORE)
+            fits[best] = track.fit_output_error(fit, MORE)
         elif is_fresh or fit.cost < fit.n_rows:
             return
         else:  # what is strongly nonlinear has other minima, in which starts of stretches are taken for the law
-            again, is_fresh = track.shoot_afresh(fit, FRESH), True
+            again, is_fresh = track.fit_output_error_afresh(fit, FRESH), True
             fits[best] = min(fit, again, key=lambda one: one.cost)
 
 
-def _settle_ties(track: Track, fits: list[LawFit]) -> None:
+def _settle_ties(track: LawFitProgress, fits: list[LawFit]) -> None:
     """Fit further what comes so close to the best fit that where it was given up might decide between the two."""
     least = min(fit.cost for fit in fits)
     for number, fit in enumerate(fits):
         if not fit.settled and fit.cost < least + TIED:
-            fits[number] = min(fit, track.shoot(fit, MORE), key=lambda one: one.cost)
+            fits[number] = min(fit, track.fit_output_error(fit, MORE), key=lambda one: one.cost)
 
 
-def _exchange(track: Track, fits: list[LawFit], *, beside: bool) -> bool:
+def _exchange(track: LawFitProgress, fits: list[LawFit], *, beside: bool) -> bool:
     """Fit a law once more at its next best places, and at those beside the best if asked, from its numbers there.
 
     They were fitted from numbers that were less good, and may have been led astray. True if one is better than all.
@@ -275,7 +282,7 @@ def _exchange(track: Track, fits: list[LawFit], *, beside: bool) -> bool:
     return fits[0] is not best
 
 
-def _climb(track: Track, fits: list[LawFit]) -> None:
+def _climb(track: LawFitProgress, fits: list[LawFit]) -> None:
     """Fit the neighbours of the best fit, as long as one of them is better."""
     done = {(fit.law.name, fit.place) for fit in fits}
     for _ in range(CLIMBS if fits else 0):
@@ -289,7 +296,7 @@ def _climb(track: Track, fits: list[LawFit]) -> None:
         fits += _simulated(track, moved, hopeless=hopeless, least=best.cost)
 
 
-def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
+def _moved(track: LawFitProgress, fit: LawFit, place: int) -> LawFit:
     """Bring a law to another place, where it moves as much and does as much work as at its own."""
     freedom = track.linear.freedom
     here, there = freedom.plant.at_places.shapes[[fit.place, place]]
@@ -300,7 +307,7 @@ def _moved(track: Track, fit: LawFit, place: int) -> LawFit:
     return replace(moved, shape=fit.shape * ratio, strength=fit.strength / ratio**fit.law.degree)
 
 
-def _size(track: Track, fit: LawFit) -> float:
+def _size(track: LawFitProgress, fit: LawFit) -> float:
     """How much the place of a law moves in all stretches, with the linear model of its fit but without its force."""
     stretches, freedom = track.stretches, track.linear.freedom
     response = respond(freedom.plant, stretches.s, freedom.deviations(fit.unknowns, fit.place))

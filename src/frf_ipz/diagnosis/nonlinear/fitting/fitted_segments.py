@@ -1,6 +1,6 @@
-"""Stretches of recordings as laws are fitted to them, and whether their converters turned the phase.
+"""SegmentSet of recordings as laws are fitted to them, and whether their converters turned the phase.
 
-Stretches are longer where a linear model leaves little. Where no law explains the recordings as they are, they are
+SegmentSet are longer where a linear model leaves little. Where no law explains the recordings as they are, they are
 looked at again without the dispersion of their converters (`recorded.dispersion`).
 """
 
@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import anywhere, whereabouts
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import fit_linear
-from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_nuisance_prior
 from frf_ipz.diagnosis.nonlinear.recorded.dispersion import without_dispersion
 from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, starts_at_rest, transform
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
     from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
 
@@ -41,14 +41,14 @@ NEAR = 0.5  # rad: how far from the best of them others are tried
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Recordings:
+class FittedSegments:
     """What laws are fitted to.
 
     Parameters
     ----------
     training, held_out : Observations
         What is fitted, and what is not shown.
-    plant : Plant
+    plant : ModalModel
         The structure.
     noise : ChannelNoise
         Of all recordings.
@@ -60,44 +60,44 @@ class Recordings:
 
     training: Observations
     held_out: Observations
-    plant: Plant
+    plant: ModalModel
     noise: ChannelNoise
     options: DiagnoseOptions
     dispersion_rad: float = 0.0
 
-    def without(self, dispersion_rad: float) -> Recordings:
+    def without(self, dispersion_rad: float) -> FittedSegments:
         """Take back a dispersion of the converters, rad."""
         training, held_out = (
             without_dispersion(part, dispersion_rad - self.dispersion_rad) for part in (self.training, self.held_out)
         )
         return replace(self, training=training, held_out=held_out, dispersion_rad=dispersion_rad)
 
-    def track(self, duration_s: float, floor: float, *, loudest: bool) -> Track:
+    def track(self, duration_s: float, floor: float, *, loudest: bool) -> LawFitProgress:
         """Cut stretches, with room for a force anywhere."""
         window = Window(duration_s=duration_s, floor=floor, loudest=loudest)
         stretches = transform(self.training, self.plant, self.noise, window)
-        freedom = make_freedom(self.plant, stretches, self.training.band_hz[1], self.options)
-        return Track(stretches=stretches, linear=fit_linear(stretches, freedom), where=anywhere(self.plant))
+        freedom = make_nuisance_prior(self.plant, stretches, self.training.band_hz[1], self.options)
+        return LawFitProgress(stretches=stretches, linear=fit_linear(stretches, freedom), where=anywhere(self.plant))
 
-    def tracks(self) -> tuple[Track, Track]:
+    def tracks(self) -> tuple[LawFitProgress, LawFitProgress]:
         """Cut short and long stretches, and look where a force may sit."""
         short, long = self._tracks()
         where = whereabouts(long.stretches, long.linear)
         return replace(short, where=where), replace(long, where=where)
 
-    def held_out_as(self, long: Track) -> Stretches | None:
+    def held_out_as(self, long: LawFitProgress) -> SegmentSet | None:
         """Cut what is held out as what was fitted; nothing where no place has blows to spare."""
-        if not self.held_out.blows:
+        if not self.held_out.records:
             return None
         window = Window(duration_s=long.stretches.duration_s, floor=FINE)
         return transform(self.held_out, self.plant, self.noise, window)
 
-    def best_dispersion(self, long: Track, fit: LawFit) -> float:
+    def best_dispersion(self, long: LawFitProgress, fit: LawFit) -> float:
         """Say with which dispersion of the converters a law explains best, rad; 0 where none does better.
 
         Parameters
         ----------
-        long : Track
+        long : LawFitProgress
             Of these recordings.
         fit : LawFit
             To them.
@@ -116,13 +116,13 @@ class Recordings:
         near = [about - NEAR, about, about + NEAR]
         return max(_lowest(near, [self._cost_without(dispersion, long, fit) for dispersion in near]), 0.0)
 
-    def _cost_without(self, dispersion_rad: float, long: Track, fit: LawFit) -> float:
+    def _cost_without(self, dispersion_rad: float, long: LawFitProgress, fit: LawFit) -> float:
         again = transform(self.without(dispersion_rad).training, self.plant, self.noise, long.stretches.window)
-        return shoot(again, long.linear.freedom, fit.start(), iterations=STEPS).cost
+        return fit_output_error(again, long.linear.freedom, fit.start(), iterations=STEPS).cost
 
-    def _tracks(self) -> tuple[Track, Track]:
+    def _tracks(self) -> tuple[LawFitProgress, LawFitProgress]:
         """Both are longer where a linear model leaves little."""
-        from_rest = self.training.kind != "hammer" and all(starts_at_rest(blow) for blow in self.training.blows)
+        from_rest = self.training.kind != "hammer" and all(starts_at_rest(record) for record in self.training.records)
         period = 1 / self.training.band_hz[1]
         duration = (LONGER if from_rest else LONG) * period
         long = self.track(duration, FINE, loudest=False)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.score_test import LinearFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant, PlantResponse
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel, ModalResponse
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 TURNS, SETTLED = 16, 0.01  # the unknowns change how a place reaches the sensors; relative drop that is worth a turn
 TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a turn: shorter and shorter steps until one lowers the cost
@@ -40,7 +40,7 @@ class FreeForce:
     Parameters
     ----------
     place : int
-        Index in `Plant.places`.
+        Index in `ModalModel.places`.
     cost : float
         Weighted sum of squares that is left, and of the unknowns.
     force : (n_blows, n_used) complex array
@@ -62,7 +62,7 @@ class Whereabouts:
     Parameters
     ----------
     possible, equal : tuple of int
-        Indices in `Plant.places` that are worth a look, and those of them that nothing but a law tells apart.
+        Indices in `ModalModel.places` that are worth a look, and those of them that nothing but a law tells apart.
     forces : tuple of FreeForce
         At the equal places, the best first; none where one sensor alone can tell no place from another.
     """
@@ -72,23 +72,23 @@ class Whereabouts:
     forces: tuple[FreeForce, ...] = ()
 
 
-def anywhere(plant: Plant) -> Whereabouts:
+def anywhere(plant: ModalModel) -> Whereabouts:
     """Leave all places of a structure possible."""
     every = tuple(range(len(plant.places)))
     return Whereabouts(possible=every, equal=every)
 
 
-def free_force(stretches: Stretches, linear: LinearFit, place: int, unknowns: FloatArray | None = None) -> FreeForce:
+def free_force(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: FloatArray | None = None) -> FreeForce:
     """Fit the linear model with any force at a place.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
     place : int
-        Index in `Plant.places`.
+        Index in `ModalModel.places`.
     unknowns : (n_unknowns,) array, optional
         Where to start; with the linear model as it is stated otherwise.
 
@@ -116,12 +116,12 @@ def free_force(stretches: Stretches, linear: LinearFit, place: int, unknowns: Fl
     return FreeForce(place=place, cost=best.cost, force=-best.along, unknowns=best.unknowns)
 
 
-def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
+def whereabouts(stretches: SegmentSet, linear: LinearFit) -> Whereabouts:
     """Say where a force may sit.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
@@ -143,7 +143,7 @@ def whereabouts(stretches: Stretches, linear: LinearFit) -> Whereabouts:
     return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
 
 
-def _spread(stretches: Stretches, linear: LinearFit, found: dict[int, FreeForce]) -> None:
+def _spread(stretches: SegmentSet, linear: LinearFit, found: dict[int, FreeForce]) -> None:
     """Fit places beside possible ones from what explains there: by themselves some end where little is explained."""
     plant, waiting = linear.freedom.plant, sorted(found, key=lambda place: found[place].cost)
     while waiting:
@@ -164,15 +164,15 @@ def _is_possible(free: FreeForce, least: float) -> bool:
     return free.cost < least + POSSIBLE + PART * least
 
 
-def neighbours(plant: Plant, place: int, count: int) -> list[int]:
+def neighbours(plant: ModalModel, place: int, count: int) -> list[int]:
     """List the places whose mode shapes are most like those of a place, or most like their opposite.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
     place : int
-        Index in `Plant.places`.
+        Index in `ModalModel.places`.
     count : int
         How many.
 
@@ -187,12 +187,12 @@ def neighbours(plant: Plant, place: int, count: int) -> list[int]:
     return [int(i) for i in nearest if i != place][:count]
 
 
-def start_at(stretches: Stretches, linear: LinearFit, free: FreeForce, law: Law) -> Start:
+def start_at(stretches: SegmentSet, linear: LinearFit, free: FreeForce, law: Law) -> Start:
     """Read the numbers of a law from a force that follows none yet.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
@@ -208,7 +208,7 @@ def start_at(stretches: Stretches, linear: LinearFit, free: FreeForce, law: Law)
     """
     clock, used = Clock(stretches), stretches.used
     nothing = Start(law=law, place=free.place, strength=0.0, shape=0.0, unknowns=free.unknowns)
-    force = np.zeros((stretches.n_blows, len(stretches.s)), complex)
+    force = np.zeros((stretches.n_records, len(stretches.s)), complex)
     force[:, used] = free.force
     response, w, v = motion_at(stretches, linear.freedom, nothing, clock, force)
     reach = np.abs(response.to_sensors(free.place)[:, used]) ** 2
@@ -232,7 +232,7 @@ class _Across:
 
     Parameters
     ----------
-    response : PlantResponse
+    response : ModalResponse
         Of the linear model with its unknowns.
     reach : (n_blows, n_sensors, n_used) complex array
         How the place reaches the sensors, weighted.
@@ -246,7 +246,7 @@ class _Across:
         Sum of squares of what is left, and of the unknowns.
     """
 
-    response: PlantResponse
+    response: ModalResponse
     reach: ComplexArray
     along: ComplexArray
     left: FloatArray
@@ -254,7 +254,7 @@ class _Across:
     cost: float
 
 
-def _across(stretches: Stretches, linear: LinearFit, place: int, unknowns: FloatArray) -> _Across:
+def _across(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: FloatArray) -> _Across:
     freedom, used = linear.freedom, stretches.used
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns, place))

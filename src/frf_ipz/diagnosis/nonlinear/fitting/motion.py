@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 OVERSAMPLING = 4
 FADE = (0.76, 0.86)  # part of the stretch over which the end is faded out: exp(sigma t) blows up errors there
@@ -32,7 +32,7 @@ class Clock:
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         Which lines.
     oversampling : int
         Times per sample.
@@ -40,7 +40,7 @@ class Clock:
         The end is faded out: needed for what comes from noisy lines, not for what is simulated.
     """
 
-    stretches: Stretches
+    stretches: SegmentSet
     oversampling: int = OVERSAMPLING
     fades: bool = True
 
@@ -101,7 +101,7 @@ class Clock:
 
 
 def place_motion(
-    stretches: Stretches,
+    stretches: SegmentSet,
     beyond: ComplexArray,
     linear: ComplexArray,
     ratio: ComplexArray,
@@ -111,7 +111,7 @@ def place_motion(
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     beyond : (n_blows, n_sensors, n_lines) complex array
         What the sensors show beyond the linear response, m s.

@@ -17,14 +17,14 @@ from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
-from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import AHEAD, March, Yielding, follow, march
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import PlantResponse, respond
+from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import AHEAD, TimeSteps, Yielding, step_in_time, step_tangent
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, respond
 from frf_ipz.diagnosis.nonlinear.linear.place_in_time import PlaceInTime
 from frf_ipz.diagnosis.nonlinear.recorded.segments import FINER
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
 FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
@@ -41,10 +41,10 @@ class _Shot:
     """A simulation of all stretches."""
 
     start: Start
-    response: PlantResponse
+    response: ModalResponse
     place: PlaceInTime
     yielding: Yielding
-    done: March
+    done: TimeSteps
     force: ComplexArray
     misfit: FloatArray
 
@@ -55,14 +55,14 @@ class _Shot:
         return cost if np.isfinite(cost) else np.inf
 
 
-def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: int = 6) -> LawFit:
+def fit_output_error(stretches: SegmentSet, freedom: NuisancePrior, start: Start, *, iterations: int = 6) -> LawFit:
     """Fit a law at a place.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     start : Start
         Law, place, and first values; the strength is not zero.
@@ -96,14 +96,14 @@ def shoot(stretches: Stretches, freedom: Freedom, start: Start, *, iterations: i
     return _finish(shot, rows, settled=settled)
 
 
-def gain_of_further(stretches: Stretches, freedom: Freedom, start: Start, kinds: Kinds) -> float:
+def gain_of_further(stretches: SegmentSet, freedom: NuisancePrior, start: Start, kinds: Kinds) -> float:
     """Say how far forces of other kinds at a law's place, free in all their strengths, would lower the cost.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     start : Start
         The law as it was fitted.
@@ -126,13 +126,13 @@ def gain_of_further(stretches: Stretches, freedom: Freedom, start: Start, kinds:
     return float(drops[1] - drops[0])
 
 
-def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
+def _fire(stretches: SegmentSet, freedom: NuisancePrior, start: Start) -> _Shot:
     place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
     yielding = place.yielding(constant=start.law.holds)
     response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns, start.place))
     used = stretches.used
     with np.errstate(all="ignore"):  # a step too far may run away: its cost is infinite
-        done = march(start.law, (start.strength, start.shape), yielding, *place.without_law())
+        done = step_in_time(start.law, (start.strength, start.shape), yielding, *place.without_law())
         force = _lines(stretches, done.force, holds=start.law.holds)
         shown = linear_motion(stretches, freedom, response) - response.to_sensors(start.place) * force[:, None]
         shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
@@ -140,7 +140,7 @@ def _fire(stretches: Stretches, freedom: Freedom, start: Start) -> _Shot:
     return _Shot(start=start, response=response, place=place, yielding=yielding, done=done, force=force, misfit=misfit)
 
 
-def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexArray:
+def _lines(stretches: SegmentSet, force: FloatArray, *, holds: bool) -> ComplexArray:
     """Transform a law's force; one that is constant for a step acts around its time as `make_modes` has it."""
     clock = Clock(stretches, oversampling=FINER, fades=False)
     lines = clock.at_lines(np.where(np.isfinite(force), force, 0.0))
@@ -149,12 +149,12 @@ def _lines(stretches: Stretches, force: FloatArray, *, holds: bool) -> ComplexAr
     return lines * (np.expm1(AHEAD * way) - np.expm1((AHEAD - 1) * way)) / way if holds else lines
 
 
-def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
+def _slopes(stretches: SegmentSet, freedom: NuisancePrior, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
     """Derive the weighted responses by unknowns, strength and shape (times their size), and further forces."""
     start, used, n_free = shot.start, stretches.used, len(freedom.modes)
     changes = shot.place.changes(shot.done.force)
     with np.errstate(all="ignore"):  # changes that run away are taken for none below
-        by_force = follow(start.law, shot.yielding, shot.done, changes, added)
+        by_force = step_tangent(start.law, shot.yielding, shot.done, changes, added)
     to_sensors = shot.response.to_sensors(start.place)[:, used]
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
@@ -171,8 +171,8 @@ def _slopes(stretches: Stretches, freedom: Freedom, shot: _Shot, added: FloatArr
     rows[first : first + n_free] += seen[3 * n_free : 4 * n_free]
     first += n_free
     for which in range(2 if len(freedom.moving) else 0):
-        for blow in freedom.moving:
-            rows[first : first + n_free, blow] += seen[(4 + which) * n_free : (5 + which) * n_free, blow]
+        for record in freedom.moving:
+            rows[first : first + n_free, record] += seen[(4 + which) * n_free : (5 + which) * n_free, record]
             first += n_free
     found = np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
     return np.where(np.abs(found).max(axis=1, keepdims=True) < RUNAWAY, found, 0.0)

@@ -15,12 +15,12 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion, linear_motion_of_place
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import PlantResponse, respond
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, respond
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 SETTLED = 1e-3  # relative change of the cost between turns
 DIFFERENCE = 1e-4  # of the shape: its derivative; kinks average out over many samples
@@ -114,14 +114,16 @@ class Start:
     unknowns: FloatArray
 
 
-def refine(stretches: Stretches, freedom: Freedom, start: Start, *, n_turns: int = 4, known: bool = True) -> LawFit:
+def refine(
+    stretches: SegmentSet, freedom: NuisancePrior, start: Start, *, n_turns: int = 4, known: bool = True
+) -> LawFit:
     """Fit a law at a place.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     start : Start
         Law, place, and first values.
@@ -149,22 +151,22 @@ def refine(stretches: Stretches, freedom: Freedom, start: Start, *, n_turns: int
     return best
 
 
-def _first_force(stretches: Stretches, freedom: Freedom, start: Start, clock: Clock) -> ComplexArray:
+def _first_force(stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock) -> ComplexArray:
     """Force of the law in the motion that follows without knowing it."""
     _, w, v = motion_at(stretches, freedom, start, clock, None)
     return clock.at_lines(start.strength * start.law.unit_force(w, v, start.shape))
 
 
 def motion_at(
-    stretches: Stretches, freedom: Freedom, start: Start, clock: Clock, force: ComplexArray | None
-) -> tuple[PlantResponse, FloatArray, FloatArray]:
+    stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
+) -> tuple[ModalResponse, FloatArray, FloatArray]:
     """Estimate how the place of a law moves.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     start : Start
         The place, and the values of the unknowns.
@@ -175,7 +177,7 @@ def motion_at(
 
     Returns
     -------
-    response : PlantResponse
+    response : ModalResponse
         With these unknowns.
     w, v : (n_blows, n_times) array
         Motion and velocity, m and m/s.
@@ -191,7 +193,7 @@ def motion_at(
 
 
 def _turn(
-    stretches: Stretches, freedom: Freedom, start: Start, clock: Clock, force: ComplexArray | None
+    stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[LawFit, Start, ComplexArray]:
     law = start.law
     response, w, v = motion_at(stretches, freedom, start, clock, force)
@@ -233,7 +235,7 @@ def _unit_forces(start: Start, clock: Clock, w: FloatArray, v: FloatArray) -> li
 
 
 def _rows(
-    stretches: Stretches, freedom: Freedom, start: Start, response: PlantResponse, forces: list[ComplexArray]
+    stretches: SegmentSet, freedom: NuisancePrior, start: Start, response: ModalResponse, forces: list[ComplexArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Give derivatives by unknowns, strength and shape, and the misfit without the law; weighted, (.., n_rows)."""
     used = stretches.used

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import FloatArray, IntArray
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 ALIKE, MOST = 0.1, 4  # relative difference of the costs of fits that are compared, and how many of them
 BANDS = 8  # in which the variance is read: wide enough for tens of numbers
@@ -30,12 +30,12 @@ STEPS, ROUNDS = 12, 2  # of each fit under a new variance, and of new variances
 FAR_OFF = 4.0  # mean square over the expected one: with more, the model is wrong, not its variance
 
 
-def tell_apart(track: Track, fits: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
+def tell_apart(track: LawFitProgress, fits: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
     """Compare the best fits once more.
 
     Parameters
     ----------
-    track : Track
+    track : LawFitProgress
         The data.
     fits : sequence of LawFit
         Fitted to them, the smallest cost first.
@@ -56,24 +56,24 @@ def tell_apart(track: Track, fits: Sequence[LawFit]) -> tuple[list[LawFit], Floa
     return near, evidence.max() - evidence
 
 
-def _reweighted(track: Track, fit: LawFit) -> LawFit:
+def _reweighted(track: LawFitProgress, fit: LawFit) -> LawFit:
     """Fit with the variance that is left, and see what then is left of the data as they are."""
     stretches, freedom = track.stretches, track.linear.freedom
     for _ in range(ROUNDS):
         own = replace(stretches, variance=stretches.variance * _along_lines(stretches, _left(stretches, fit)))
-        again = shoot(own, freedom, fit.start(), iterations=STEPS)
-        fit = shoot(stretches, freedom, again.start(), iterations=0)
+        again = fit_output_error(own, freedom, fit.start(), iterations=STEPS)
+        fit = fit_output_error(stretches, freedom, again.start(), iterations=0)
     return fit
 
 
-def _evidence(stretches: Stretches, fit: LawFit) -> float:
+def _evidence(stretches: SegmentSet, fit: LawFit) -> float:
     """Logarithm of the likelihood with the best variance of each channel and band, and of the prior, nats."""
     seen = np.isfinite(stretches.variance).any(2)
     logarithms = np.log(_left(stretches, fit)[seen])
     return float(-np.sum(logarithms * np.diff(_edges(stretches))) - fit.unknowns @ fit.unknowns / 2)
 
 
-def _left(stretches: Stretches, fit: LawFit) -> FloatArray:
+def _left(stretches: SegmentSet, fit: LawFit) -> FloatArray:
     """(n_blows, n_sensors, n_bands) mean square that a fit leaves, over the expected one."""
     shape = (*stretches.variance.shape[:2], len(stretches.used))
     square = np.abs(fit.misfit.view(complex).reshape(shape)) ** 2 / 2
@@ -81,12 +81,12 @@ def _left(stretches: Stretches, fit: LawFit) -> FloatArray:
     return np.asarray(np.maximum(left, LEAST))
 
 
-def _edges(stretches: Stretches) -> IntArray:
+def _edges(stretches: SegmentSet) -> IntArray:
     """(n_bands + 1,) edges of the bands, numbers of used lines."""
     return np.unique(np.linspace(0, len(stretches.used), BANDS + 1).astype(int))
 
 
-def _along_lines(stretches: Stretches, of_bands: FloatArray) -> FloatArray:
+def _along_lines(stretches: SegmentSet, of_bands: FloatArray) -> FloatArray:
     """(n_blows, n_sensors, n_lines) smooth course of positive numbers of the bands."""
     edges, lines = _edges(stretches), np.arange(len(stretches.s))
     middle = stretches.used[(edges[:-1] + edges[1:]) // 2]

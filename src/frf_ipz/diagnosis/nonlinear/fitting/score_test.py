@@ -16,15 +16,15 @@ from scipy import linalg
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, nominal_values, respond
 from frf_ipz.numerics.regularised_cholesky import factor_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 STEPS, SETTLED = 6, 0.01  # of the linear model: at most, and the relative drop of the cost that is worth a step
 LEAST_MOTION = 1e-9  # of the largest motion of all places: nothing can be said of a place that rests
@@ -59,7 +59,7 @@ class LinearFit:
 
     Parameters
     ----------
-    response : PlantResponse
+    response : ModalResponse
         Of the nominal model, on all lines.
     beyond : (n_blows, n_sensors, n_lines) complex array
         Data minus nominal model with the starts of the best linear model, m s.
@@ -71,19 +71,19 @@ class LinearFit:
         Lower Cholesky factor of columns columns^T + 1.
     cost : float
         Of the best linear model, its prior included.
-    freedom : Freedom
+    freedom : NuisancePrior
         The unknowns.
     unknowns : (n_unknowns,) array
         Of the best linear model.
     """
 
-    response: PlantResponse
+    response: ModalResponse
     beyond: ComplexArray
     misfit: FloatArray
     columns: FloatArray
     factor: FloatArray
     cost: float
-    freedom: Freedom
+    freedom: NuisancePrior
     unknowns: FloatArray
 
     @property
@@ -97,14 +97,14 @@ class LinearFit:
         return self.freedom.as_stated(self.unknowns)
 
 
-def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
+def fit_linear(stretches: SegmentSet, freedom: NuisancePrior) -> LinearFit:
     """Fit the linear model alone.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Its unknowns.
 
     Returns
@@ -113,10 +113,10 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
         One step from the nominal model; its cost is what further steps come down to.
     """
     plant, used = freedom.plant, stretches.used
-    response = respond(plant, stretches.s, no_deviations(plant))
+    response = respond(plant, stretches.s, nominal_values(plant))
     beyond = stretches.motion - linear_motion(stretches, freedom, response)
-    on_used = respond(plant, stretches.s[used], no_deviations(plant))
-    nothing = np.zeros((stretches.n_blows, len(used)), complex)
+    on_used = respond(plant, stretches.s[used], nominal_values(plant))
+    nothing = np.zeros((stretches.n_records, len(used)), complex)
     columns = as_real(freedom.columns(stretches, on_used, nothing, None))
     misfit = as_real(beyond[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
     factor = factor_with_prior(columns)
@@ -136,10 +136,10 @@ def fit_linear(stretches: Stretches, freedom: Freedom) -> LinearFit:
     )
 
 
-def _settled_cost(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) -> float:
+def _settled_cost(stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray) -> float:
     """Cost of the linear model after a few steps: a law must gain more than the first one has left."""
     used, best = stretches.used, np.inf
-    nothing = np.zeros((stretches.n_blows, len(used)), complex)
+    nothing = np.zeros((stretches.n_records, len(used)), complex)
     for _ in range(STEPS):
         response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
         shown = linear_motion(stretches, freedom, response)
@@ -155,14 +155,14 @@ def _settled_cost(stretches: Stretches, freedom: Freedom, unknowns: FloatArray) 
     return best
 
 
-def screen(
-    stretches: Stretches, fit: LinearFit, laws: Sequence[Law], *, places: Sequence[int] | None = None
+def score_laws(
+    stretches: SegmentSet, fit: LinearFit, laws: Sequence[Law], *, places: Sequence[int] | None = None
 ) -> list[Guess]:
     """Try every law at every place.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
     fit : LinearFit
         The linear model.
@@ -188,7 +188,7 @@ def screen(
     return sorted(guesses, key=lambda guess: guess.cost)
 
 
-def linear_motion(stretches: Stretches, freedom: Freedom, response: PlantResponse) -> ComplexArray:
+def linear_motion(stretches: SegmentSet, freedom: NuisancePrior, response: ModalResponse) -> ComplexArray:
     """Give what sensors show of the force, without unknown starts.
 
     Where a stretch starts in motion, modes above the free ones follow the force as if at rest; the force's own start
@@ -196,17 +196,17 @@ def linear_motion(stretches: Stretches, freedom: Freedom, response: PlantRespons
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The forces.
-    freedom : Freedom
+    freedom : NuisancePrior
         Which modes are free.
-    response : PlantResponse
+    response : ModalResponse
         On all lines.
 
     Returns
     -------
     (n_blows, n_sensors, n_lines) complex array
-        As `Stretches.motion`.
+        As `SegmentSet.motion`.
     """
     s, moving = stretches.s, freedom.moving
     motion = response.from_inputs()[stretches.input_of] * stretches.force[:, None]
@@ -220,19 +220,19 @@ def linear_motion(stretches: Stretches, freedom: Freedom, response: PlantRespons
 
 
 def linear_motion_of_place(
-    stretches: Stretches, freedom: Freedom, unknowns: FloatArray, response: PlantResponse, place: int
+    stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray, response: ModalResponse, place: int
 ) -> tuple[ComplexArray, ComplexArray]:
     """Give the motion of a place by the linear model alone, and how it answers a force on itself.
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The forces.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     unknowns : (n_unknowns,) array
         In prior standard deviations: how stretches start that start in motion.
-    response : PlantResponse
+    response : ModalResponse
         With these unknowns, on all lines.
     place : int
         Index in `Plant.places`.
@@ -256,14 +256,14 @@ def as_real(values: ComplexArray) -> FloatArray:
     return np.ascontiguousarray(values.reshape(*lead, -1)).view(np.float64)
 
 
-def _of_place(fit: LinearFit, stretches: Stretches, place: int) -> tuple[ComplexArray, ComplexArray]:
+def _of_place(fit: LinearFit, stretches: SegmentSet, place: int) -> tuple[ComplexArray, ComplexArray]:
     return linear_motion_of_place(stretches, fit.freedom, fit.unknowns, fit.response, place)
 
 
 class _Contracted:
     """What is summed over sensors once for all features of a place."""
 
-    def __init__(self, stretches: Stretches, fit: LinearFit) -> None:
+    def __init__(self, stretches: SegmentSet, fit: LinearFit) -> None:
         used = stretches.used
         self.weight = 1 / np.sqrt(stretches.variance[:, :, used])
         shape = self.weight.shape
@@ -281,7 +281,7 @@ class _Contracted:
 
 
 def _at_place(
-    stretches: Stretches,
+    stretches: SegmentSet,
     fit: LinearFit,
     contracted: _Contracted,
     clock: Clock,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.candidates import Track
+from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import TIE
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import step_to
@@ -25,8 +25,8 @@ from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import PlantResponse
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 DEAD_ZONES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # parts of the largest motion
 YIELDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # parts of the largest motion: a spring slips beyond, at once or more and more
@@ -61,17 +61,17 @@ class AnyForce:
     alike: tuple[int, ...] = ()
 
     @classmethod
-    def on(cls, track: Track, place: int, cost: float) -> AnyForce:
+    def on(cls, track: LawFitProgress, place: int, cost: float) -> AnyForce:
         """Put down what a force at a place leaves."""
         return cls(place=place, cost=cost, left=cost / track.linear.n_rows, missed=track.missed)
 
 
-def find_place(short: Track, long: Track, likely: Iterable[int]) -> tuple[AnyForce, AnyForce]:
+def find_place(short: LawFitProgress, long: LawFitProgress, likely: Iterable[int]) -> tuple[AnyForce, AnyForce]:
     """Find the place of a force whose law is not known, among those at which any force explains as much.
 
     Parameters
     ----------
-    short, long : Track
+    short, long : LawFitProgress
         The data.
     likely : iterable of int
         Places that are fitted to the long stretches, whatever the short ones say.
@@ -103,12 +103,12 @@ def _with_alike(fits: Sequence[AnyForce]) -> AnyForce:
     return replace(best, alike=tuple(one.place for one in best_first if one.cost <= most))
 
 
-def fit_anything(track: Track, place: int, n_turns: int) -> AnyForce:
+def fit_anything(track: LawFitProgress, place: int, n_turns: int) -> AnyForce:
     """Fit a sum of simple laws at a place.
 
     Parameters
     ----------
-    track : Track
+    track : LawFitProgress
         The data, and the linear model.
     place : int
         Index in `Plant.places`.
@@ -184,9 +184,9 @@ def _slipping(x: FloatArray) -> FloatArray:
 
 
 def _rows(
-    stretches: Stretches,
+    stretches: SegmentSet,
     linear: LinearFit,
-    response: PlantResponse,
+    response: ModalResponse,
     start: Start,
     forces: ComplexArray,
     force: ComplexArray | None,
@@ -197,7 +197,7 @@ def _rows(
     shown = linear_motion(stretches, freedom, response)
     shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
     misfit = as_real((stretches.motion - shown)[:, :, used] * weight)
-    on_place = np.zeros((stretches.n_blows, len(used)), complex) if force is None else -force[:, used]
+    on_place = np.zeros((stretches.n_records, len(used)), complex) if force is None else -force[:, used]
     by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, start.place))
     to_sensors = response.to_sensors(start.place)[:, used]
     return np.concatenate([by_unknowns, as_real(-to_sensors * forces[:, :, None, used] * weight)]), misfit

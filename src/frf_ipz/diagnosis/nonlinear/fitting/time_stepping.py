@@ -111,7 +111,7 @@ def make_modes(omega_rad_s: FloatArray, damping_ratio: FloatArray, step_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class March:
+class TimeSteps:
     """What a law did.
 
     Parameters
@@ -160,7 +160,9 @@ class Yielding:
         return np.asarray((self.modes.after @ self.readers).imag)
 
 
-def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: FloatArray, velocity: FloatArray) -> March:
+def step_in_time(
+    law: Law, numbers: tuple[float, float], place: Yielding, motion: FloatArray, velocity: FloatArray
+) -> TimeSteps:
     """Go through all times with a law.
 
     Parameters
@@ -176,16 +178,16 @@ def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: Float
 
     Returns
     -------
-    March
+    TimeSteps
         Force and motion.
     """
     readers, modes = place.readers.T, place.modes
     per_unit = place.compliance()
     step = StepCompliance(float(per_unit[0]), float(per_unit[1]), *numbers)
-    n_blows, n_times = motion.shape
+    n_records, n_times = motion.shape
     turn, per_force = modes.turn[:, None], (modes.turn * modes.after + modes.before)[:, None]
-    z = np.zeros((len(turn), n_blows), complex)  # all that happened before the present step does
-    forces, free = np.zeros((n_times, n_blows)), np.ascontiguousarray(np.stack([motion.T, velocity.T], 1))
+    z = np.zeros((len(turn), n_records), complex)  # all that happened before the present step does
+    forces, free = np.zeros((n_times, n_records)), np.ascontiguousarray(np.stack([motion.T, velocity.T], 1))
     for k in range(n_times):
         here = free[k]
         here += (readers @ z).imag
@@ -194,7 +196,7 @@ def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: Float
         z -= per_force * force
         forces[k] = force
     free_motion, free_velocity = free[:, 0].T, free[:, 1].T
-    return March(
+    return TimeSteps(
         force=np.ascontiguousarray(forces.T),
         motion=free_motion - step.motion * forces.T,
         velocity=free_velocity - step.velocity * forces.T,
@@ -204,7 +206,9 @@ def march(law: Law, numbers: tuple[float, float], place: Yielding, motion: Float
     )
 
 
-def follow(law: Law, place: Yielding, done: March, changes: FloatArray, added: FloatArray | None = None) -> FloatArray:
+def step_tangent(
+    law: Law, place: Yielding, done: TimeSteps, changes: FloatArray, added: FloatArray | None = None
+) -> FloatArray:
     """Change of the force by small changes of the motion without it and of the law's numbers, and by further forces.
 
     Parameters
@@ -213,7 +217,7 @@ def follow(law: Law, place: Yielding, done: March, changes: FloatArray, added: F
         At the place.
     place : Yielding
         How the place gives way.
-    done : March
+    done : TimeSteps
         What the law did.
     changes : (n_changes, 2, n_blows, n_times) array
         Of motion and velocity.
@@ -244,7 +248,7 @@ def follow(law: Law, place: Yielding, done: March, changes: FloatArray, added: F
     return np.ascontiguousarray(force.transpose(2, 1, 0))
 
 
-def _slopes(law: Law, done: March) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _slopes(law: Law, done: TimeSteps) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Derive the force by free motion and velocity, and by the law's numbers times their size."""
     w, v, step = done.free_motion, done.free_velocity, done.step
     way = DIFFERENCE * max(float(np.abs(w).max()), SMALLEST)

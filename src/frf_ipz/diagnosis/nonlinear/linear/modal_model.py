@@ -1,7 +1,7 @@
 """The linear part of a structure with a force law: modes, what lies above, and the places a law could sit at.
 
 Transfer functions join three kinds of points: struck ones, sensors, and places. Each is a sum over modes up to a few
-times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`Deviations`) moves
+times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`NuisanceValues`) moves
 frequencies, damping and the shapes at sensors, blows and the place of a law.
 """
 
@@ -76,7 +76,7 @@ class Points:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plant:
+class ModalModel:
     """A structure in modal form.
 
     Parameters
@@ -113,14 +113,14 @@ class Plant:
         """Number of modes that are followed."""
         return len(self.omega_rad_s)
 
-    def poles(self, deviations: Deviations) -> tuple[FloatArray, FloatArray]:
+    def poles(self, deviations: NuisanceValues) -> tuple[FloatArray, FloatArray]:
         """Natural frequencies, rad/s, and damping ratios of the real structure, (n_modes,) each."""
         frequency, damping = (np.clip(one, -FARTHEST, FARTHEST) for one in (deviations.frequency, deviations.damping))
         return self.omega_rad_s * np.exp(frequency), self.damping_ratio * np.exp(damping)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Deviations:
+class NuisanceValues:
     """What the real structure differs by from the nominal model, all zero to begin with.
 
     Parameters
@@ -142,21 +142,21 @@ class Deviations:
     place: FloatArray
 
 
-def no_deviations(plant: Plant) -> Deviations:
+def nominal_values(plant: ModalModel) -> NuisanceValues:
     """Take the nominal model as it is.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
 
     Returns
     -------
-    Deviations
+    NuisanceValues
         Zeros.
     """
     n_modes = plant.n_modes
-    return Deviations(
+    return NuisanceValues(
         frequency=np.zeros(n_modes),
         damping=np.zeros(n_modes),
         sensors=np.zeros((len(plant.sensors), n_modes)),
@@ -165,7 +165,7 @@ def no_deviations(plant: Plant) -> Deviations:
     )
 
 
-def make_plant(model: StructuralModel, observations: Observations) -> Plant:
+def make_modal_model(model: StructuralModel, observations: Observations) -> ModalModel:
     """Bring a model into modal form for a test.
 
     Parameters
@@ -177,7 +177,7 @@ def make_plant(model: StructuralModel, observations: Observations) -> Plant:
 
     Returns
     -------
-    Plant
+    ModalModel
         With every node and spring as a place.
 
     Raises
@@ -185,7 +185,7 @@ def make_plant(model: StructuralModel, observations: Observations) -> Plant:
     InputError
         If the model lacks a DOF of the test, or holds it.
     """
-    sensors = tuple({(s.channel, s.dof): s for blow in observations.blows for s in blow.sensors}.values())
+    sensors = tuple({(s.channel, s.dof): s for record in observations.records for s in record.sensors}.values())
     inputs = observations.input_dofs
     places = find_places(model, {dof.direction for dof in (*inputs, *(s.dof for s in sensors))})
     top_hz = BEYOND * observations.band_hz[1]
@@ -198,7 +198,7 @@ def make_plant(model: StructuralModel, observations: Observations) -> Plant:
     rows += [_weights(model, tuple(zip((1,) if len(p.ends) == 1 else (-1, 1), p.ends, strict=True))) for p in places]
     points = _points(low, basis, np.array(rows))
     first, second = len(sensors), len(sensors) + len(inputs)
-    return Plant(
+    return ModalModel(
         model=model,
         omega_rad_s=omega,
         damping_ratio=damping,
@@ -295,24 +295,24 @@ def _some(points: Points, rows: slice) -> Points:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlantResponse:
+class ModalResponse:
     """Receptances on lines, for one set of deviations.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
     s : (n_lines,) complex array
         rad/s.
-    deviations : Deviations
+    deviations : NuisanceValues
         Of the real structure.
     modes : (n_modes, n_lines) complex array
         1 / (s^2 + 2 zeta omega s + omega^2).
     """
 
-    plant: Plant
+    plant: ModalModel
     s: ComplexArray
-    deviations: Deviations
+    deviations: NuisanceValues
     modes: ComplexArray
 
     @property
@@ -325,7 +325,7 @@ class PlantResponse:
         """(n_inputs, n_modes) shapes at the blows as they are."""
         return self.plant.at_inputs.shapes + self.deviations.inputs
 
-    def on(self, lines: IntArray) -> PlantResponse:
+    def on(self, lines: IntArray) -> ModalResponse:
         """Keep some of the lines."""
         return replace(self, s=self.s[lines], modes=self.modes[:, lines])
 
@@ -357,23 +357,23 @@ class PlantResponse:
         return np.asarray(static.T[:, :, None] - inertial.T[:, :, None] * self.s**2)
 
 
-def respond(plant: Plant, s: ComplexArray, deviations: Deviations) -> PlantResponse:
+def respond(plant: ModalModel, s: ComplexArray, deviations: NuisanceValues) -> ModalResponse:
     """Evaluate the modes of a plant on lines.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
     s : (n_lines,) complex array
         rad/s.
-    deviations : Deviations
+    deviations : NuisanceValues
         Of the real structure.
 
     Returns
     -------
-    PlantResponse
+    ModalResponse
         Receptances between all points.
     """
     omega, ratio = plant.poles(deviations)
     modes = 1 / (s**2 + (2 * ratio * omega)[:, None] * s + (omega**2)[:, None])
-    return PlantResponse(plant=plant, s=s, deviations=deviations, modes=modes)
+    return ModalResponse(plant=plant, s=s, deviations=deviations, modes=modes)

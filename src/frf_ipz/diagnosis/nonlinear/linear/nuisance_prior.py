@@ -13,12 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import Deviations, Plant, PlantResponse, no_deviations, respond
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import (
+    ModalModel,
+    ModalResponse,
+    NuisanceValues,
+    nominal_values,
+    respond,
+)
 from frf_ipz.diagnosis.nonlinear.recorded.segments import decayed
 from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
 
@@ -34,12 +40,12 @@ LEFT_SPREAD = 2.0  # times what the strongest blow can have left when the next c
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Freedom:
+class NuisancePrior:
     """Unknowns of the linear model and how far they may go.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
     modes : (n_free,) int array
         Modes whose parameters are free.
@@ -54,10 +60,10 @@ class Freedom:
     starts : (n_moving, n_free) array
         Of the modal velocity at the start of stretches, and of displacement times omega, m/s kg^1/2.
     moving : (n_moving,) int array
-        Stretches that start in motion.
+        SegmentSet that start in motion.
     """
 
-    plant: Plant
+    plant: ModalModel
     modes: IntArray
     frequency: FloatArray
     damping: FloatArray
@@ -91,7 +97,7 @@ class Freedom:
         parts[4] = np.zeros_like(parts[4])
         return np.concatenate(parts)
 
-    def deviations(self, unknowns: FloatArray, at: int | None = None) -> Deviations:
+    def deviations(self, unknowns: FloatArray, at: int | None = None) -> NuisanceValues:
         """Turn unknowns into deviations of the plant.
 
         Parameters
@@ -99,14 +105,14 @@ class Freedom:
         unknowns : (n_unknowns,) array
             In prior standard deviations.
         at : int, optional
-            Place of a law, an index in `Plant.places`.
+            Place of a law, an index in `ModalModel.places`.
 
         Returns
         -------
-        Deviations
+        NuisanceValues
             Zero for modes that are not free.
         """
-        found = no_deviations(self.plant)
+        found = nominal_values(self.plant)
         frequency, damping, sensors, inputs, place = self._split(unknowns)[:5]
         found.frequency[self.modes] = frequency * self.frequency
         found.damping[self.modes] = damping * self.damping
@@ -116,17 +122,17 @@ class Freedom:
             found.place[self.modes] = place * self.places[at]
         return found
 
-    def place_starts(self, unknowns: FloatArray, response: PlantResponse, place: int) -> ComplexArray:
+    def place_starts(self, unknowns: FloatArray, response: ModalResponse, place: int) -> ComplexArray:
         """Motion of a place that stems from how stretches start.
 
         Parameters
         ----------
         unknowns : (n_unknowns,) array
             In prior standard deviations.
-        response : PlantResponse
+        response : ModalResponse
             On the lines wanted.
         place : int
-            Index in `Plant.places`.
+            Index in `ModalModel.places`.
 
         Returns
         -------
@@ -136,20 +142,20 @@ class Freedom:
         free = _free_motion(response, self.modes, 0) * response.place_shapes(place)[self.modes, None]
         return np.asarray(np.einsum("cbm,cml->bl", self.starts_of(unknowns), free))
 
-    def sensor_starts(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
+    def sensor_starts(self, unknowns: FloatArray, response: ModalResponse) -> ComplexArray:
         """Give what sensors show of how stretches start.
 
         Parameters
         ----------
         unknowns : (n_unknowns,) array
             In prior standard deviations.
-        response : PlantResponse
+        response : ModalResponse
             On the lines wanted.
 
         Returns
         -------
         (n_moving, n_sensors, n_lines) complex array
-            As `Stretches.motion`.
+            As `SegmentSet.motion`.
         """
         starts, shapes = self.starts_of(unknowns), response.sensor_shapes[:, self.modes]
         seen = [
@@ -165,8 +171,8 @@ class Freedom:
 
     def columns(
         self,
-        stretches: Stretches,
-        response: PlantResponse,
+        stretches: SegmentSet,
+        response: ModalResponse,
         place_force: ComplexArray,
         place: int | None,
         unknowns: FloatArray | None = None,
@@ -175,14 +181,14 @@ class Freedom:
 
         Parameters
         ----------
-        stretches : Stretches
+        stretches : SegmentSet
             The data; `response` is on their used lines.
-        response : PlantResponse
+        response : ModalResponse
             The structure as it is thought to be.
         place_force : (n_blows, n_used) complex array
             Force of the law on the structure, N s.
         place : int, optional
-            Of the law, an index in `Plant.places`; None without a law.
+            Of the law, an index in `ModalModel.places`; None without a law.
         unknowns : (n_unknowns,) array, optional
             Where the linear model is: how stretches start changes with frequencies and damping.
 
@@ -228,7 +234,7 @@ class Freedom:
                 first += len(modes)
         return columns
 
-    def _starts_by_pole(self, unknowns: FloatArray, response: PlantResponse) -> ComplexArray:
+    def _starts_by_pole(self, unknowns: FloatArray, response: ModalResponse) -> ComplexArray:
         """(2 n_free, n_moving, n_sensors, n_lines) change of what sensors show of starts, by poles."""
         starts, shapes = self.starts_of(unknowns), response.sensor_shapes[:, self.modes]
         found = []
@@ -245,12 +251,12 @@ class Freedom:
             found.append(np.stack(rows, 2))
         return np.concatenate(found)
 
-    def _start_columns(self, response: PlantResponse, weight: FloatArray) -> list[ComplexArray]:
+    def _start_columns(self, response: ModalResponse, weight: FloatArray) -> list[ComplexArray]:
         columns = np.zeros((2, *self.starts.shape, *weight.shape), complex)
         for row, (sensor, shape) in enumerate(zip(self.plant.sensors, response.sensor_shapes, strict=True)):
             free = _free_motion(response, self.modes, sensor.quantity.power) * shape[self.modes, None]
-            for number, blow in enumerate(self.moving):
-                columns[:, number, :, blow, row] = free * self.starts[number][:, None] * weight[blow, row]
+            for number, record in enumerate(self.moving):
+                columns[:, number, :, record, row] = free * self.starts[number][:, None] * weight[record, row]
         return list(columns.reshape(-1, self.starts.shape[1], *weight.shape)) if len(self.moving) else []
 
     def as_stated(self, unknowns: FloatArray) -> FloatArray:
@@ -261,7 +267,7 @@ class Freedom:
         starts = np.tile(self.modes >= self.plant.n_rigid, 2 * len(self.moving))
         return np.asarray(unknowns * np.concatenate([np.zeros(self.n_lasting), starts]))
 
-    def without_starts(self, unknowns: FloatArray) -> tuple[Freedom, FloatArray]:
+    def without_starts(self, unknowns: FloatArray) -> tuple[NuisancePrior, FloatArray]:
         """Leave out how stretches start, for others that start at rest."""
         none = replace(self, starts=self.starts[:0], moving=self.moving[:0])
         return none, unknowns[: none.n_unknowns]
@@ -270,7 +276,7 @@ class Freedom:
         return np.split(unknowns, np.cumsum(self.sizes)[:-1])
 
 
-def _free_motion(response: PlantResponse, modes: IntArray, power: int) -> ComplexArray:
+def _free_motion(response: ModalResponse, modes: IntArray, power: int) -> ComplexArray:
     """Transform free vibrations, (2, n_free, n_lines), s / omega and s^2 / omega, as displacements.
 
     They start with a modal displacement of 1 / omega, or with a velocity of 1. What is measured as velocity or
@@ -297,14 +303,16 @@ def _one_by_one(motion: ComplexArray, sizes: FloatArray, weight: FloatArray) -> 
     return columns.reshape(-1, *weight.shape)
 
 
-def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: DiagnoseOptions) -> Freedom:
+def make_nuisance_prior(
+    plant: ModalModel, stretches: SegmentSet, top_hz: float, options: DiagnoseOptions
+) -> NuisancePrior:
     """Say what may deviate, from the tolerances of the user.
 
     Parameters
     ----------
-    plant : Plant
+    plant : ModalModel
         The structure.
-    stretches : Stretches
+    stretches : SegmentSet
         Which of them start in motion.
     top_hz : float
         Top of the band.
@@ -313,7 +321,7 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
 
     Returns
     -------
-    Freedom
+    NuisancePrior
         For the modes of the band and the first ones above it.
     """
     modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
@@ -328,7 +336,7 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
         pause = stretches.pause_s[moving]
         left = LEFT_SPREAD * response * impulse.max() * decayed(plant, pause)[:, modes]
         starts = np.where(pause[:, None] > 0, left, unknown)
-    return Freedom(
+    return NuisancePrior(
         plant=plant,
         modes=modes,
         frequency=np.where(rigid, CORD_SPREAD, frequency),
@@ -341,7 +349,7 @@ def make_freedom(plant: Plant, stretches: Stretches, top_hz: float, options: Dia
     )
 
 
-def _uneven(plant: Plant, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+def _uneven(plant: ModalModel, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
     """How far uneven stiffness moves shapes at places, as a part of the largest of all nodes, or of all springs."""
     shapes = np.abs(plant.at_places.shapes[:, modes])
     across = np.array([len(place.ends) > 1 for place in plant.places])[:, None]
@@ -349,7 +357,7 @@ def _uneven(plant: Plant, modes: IntArray, options: DiagnoseOptions) -> FloatArr
     return np.asarray(UNEVEN * options.stiffness_tolerance * np.where(across, largest[1], largest[0]))
 
 
-def _shape_spread(plant: Plant, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+def _shape_spread(plant: ModalModel, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions) -> FloatArray:
     """How far shapes at points may be off: by gains, uneven stiffness and, off the exact place, by their slope."""
     largest = np.abs(plant.at_places.shapes[:, modes]).max(0)
     points = np.vstack([plant.at_sensors.shapes, plant.at_inputs.shapes])[:, modes]
@@ -370,7 +378,7 @@ def _shape_spread(plant: Plant, dofs: tuple[Dof, ...], modes: IntArray, options:
     return np.array(spread)
 
 
-def _slope(plant: Plant, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
+def _slope(plant: ModalModel, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
     """Largest change of shapes towards neighbours, per length of the structure."""
     if plant.model.kind == "lumped":
         return np.zeros(len(modes))

@@ -12,9 +12,9 @@ from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import Modes, Yielding, m
 from frf_ipz.diagnosis.nonlinear.recorded.segments import FINER
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Deviations
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import Freedom
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import Stretches
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import NuisanceValues
+    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
 
 DIFFERENCE = 1e-4  # of a frequency or damping ratio: step of a derivative
 REST_DAMPING = 0.05  # of the one mode that stands for all above those that are followed
@@ -27,9 +27,9 @@ class PlaceInTime:
 
     Parameters
     ----------
-    stretches : Stretches
+    stretches : SegmentSet
         The data.
-    freedom : Freedom
+    freedom : NuisancePrior
         Unknowns of the linear model.
     unknowns : (n_unknowns,) array
         In prior standard deviations.
@@ -37,8 +37,8 @@ class PlaceInTime:
         Index in `Plant.places`.
     """
 
-    stretches: Stretches
-    freedom: Freedom
+    stretches: SegmentSet
+    freedom: NuisancePrior
     unknowns: FloatArray
     place: int
 
@@ -53,7 +53,7 @@ class PlaceInTime:
         return np.asarray(self.freedom.plant.at_places.shapes[self.place] + self.deviations.place)
 
     @property
-    def deviations(self) -> Deviations:
+    def deviations(self) -> NuisanceValues:
         """Of the structure."""
         return self.freedom.deviations(self.unknowns, self.place)
 
@@ -167,7 +167,7 @@ class PlaceInTime:
         found = []
         for which in (0, 1):
             unit = [freedom.starts * (which == 0), freedom.starts * (which == 1)]
-            z = np.zeros((self.stretches.n_blows, *turning.shape), complex)
+            z = np.zeros((self.stretches.n_records, *turning.shape), complex)
             z[freedom.moving] = _begin(modes, *unit)[:, :, None] * turning
             found.append(np.stack(self._read(modes, z), 1) * self.shapes[freedom.modes, None])
         return found

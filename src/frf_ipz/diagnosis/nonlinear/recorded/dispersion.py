@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 CUT_OFF = 0.46  # of the sampling rate: usual for converters
 HELD = 0.97  # of the cut-off: above, nothing was recorded, and the phase stays
@@ -39,7 +39,7 @@ def without_dispersion(observations: Observations, dispersion_rad: float) -> Obs
     """
     if not dispersion_rad:
         return observations
-    return replace(observations, blows=tuple(_undispersed(blow, dispersion_rad) for blow in observations.blows))
+    return replace(observations, records=tuple(_undispersed(record, dispersion_rad) for record in observations.records))
 
 
 def latest_s(dispersion_rad: float, frequency_hz: float, step_s: float) -> float:
@@ -63,10 +63,10 @@ def latest_s(dispersion_rad: float, frequency_hz: float, step_s: float) -> float
     return dispersion_rad * step_s / (np.pi * CUT_OFF) * part**2 / (1 - part**2)
 
 
-def _undispersed(blow: Blow, dispersion_rad: float) -> Blow:
-    n = blow.n_samples + ROOM
+def _undispersed(record: ObservedRecord, dispersion_rad: float) -> ObservedRecord:
+    n = record.n_samples + ROOM
     part = np.minimum(np.fft.rfftfreq(n) / CUT_OFF, HELD)
     turn = np.exp(2j * dispersion_rad * (np.arctanh(part) - part))
-    signals = np.vstack([blow.force, blow.responses])
-    turned = np.fft.irfft(np.fft.rfft(signals, n, axis=1) * turn, n, axis=1)[:, : blow.n_samples]
-    return replace(blow, force=turned[0], responses=turned[1:])
+    signals = np.vstack([record.force, record.responses])
+    turned = np.fft.irfft(np.fft.rfft(signals, n, axis=1) * turn, n, axis=1)[:, : record.n_samples]
+    return replace(record, force=turned[0], responses=turned[1:])

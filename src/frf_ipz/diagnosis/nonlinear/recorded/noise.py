@@ -14,7 +14,7 @@ from frf_ipz.diagnosis.measured.forces import force_noise, isolate_pulse
 from frf_ipz.diagnosis.measured.noise import Noise
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.observations import Blow, Observations
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord
     from frf_ipz.dofs import Dof
 
 QUIET_PART = 0.3  # quantile of a band of lines that holds noise, between resonances
@@ -50,9 +50,9 @@ class ChannelNoise:
     responses: tuple[Noise, ...]
     pulse_s: float
 
-    def force_of(self, blow: Blow) -> FloatArray:
+    def force_of(self, record: ObservedRecord) -> FloatArray:
         """(n_samples,) force without what is noise for sure."""
-        return isolate_pulse(blow).blow.force if self.is_hammer else blow.force
+        return isolate_pulse(record).record.force if self.is_hammer else record.force
 
     def force_energy(self, frequency_hz: FloatArray, duration_s: float) -> FloatArray:
         """Variance of the force's transform."""
@@ -77,16 +77,16 @@ def read_noise(observations: Observations) -> ChannelNoise:
         A trace where noise is not seen at all.
     """
     is_hammer = observations.kind == "hammer"
-    sensors = tuple({(s.channel, s.dof): None for blow in observations.blows for s in blow.sensors})
+    sensors = tuple({(s.channel, s.dof): None for record in observations.records for s in record.sensors})
     signals = [_signals(observations, sensor) for sensor in sensors]
-    step = observations.blows[0].step_s
+    step = observations.records[0].step_s
     if is_hammer:
-        pulses = tuple(isolate_pulse(blow) for blow in observations.blows)
+        pulses = tuple(isolate_pulse(record) for record in observations.records)
         length = float(np.median([pulse.stop - pulse.start for pulse in pulses])) * step
         found = [quiet_density([s[len(s) // 2 :] for s in mine], step).rounded(mine, step) for mine in signals]
-        force = force_noise(observations.blows, pulses)
+        force = force_noise(observations.records, pulses)
         return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(found), pulse_s=length)
-    forces = [blow.force for blow in observations.blows]
+    forces = [record.force for record in observations.records]
     lines = _undriven(forces, step, observations.band_hz)
     return ChannelNoise(
         is_hammer=False,
@@ -128,8 +128,8 @@ def quiet_density(tails: list[FloatArray], step_s: float) -> Noise:
 def _signals(observations: Observations, sensor: tuple[str, Dof]) -> list[FloatArray]:
     return [
         row
-        for blow in observations.blows
-        for s, row in zip(blow.sensors, blow.responses, strict=True)
+        for record in observations.records
+        for s, row in zip(record.sensors, record.responses, strict=True)
         if (s.channel, s.dof) == sensor
     ]
 

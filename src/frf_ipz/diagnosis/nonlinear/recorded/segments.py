@@ -1,4 +1,4 @@
-"""Stretches of single blows, transformed along a line in the s-plane.
+"""SegmentSet of single blows, transformed along a line in the s-plane.
 
 Force and responses of a stretch are multiplied by exp(-sigma t) before the transform: the ratio of a blow from rest is
 then exactly the transfer function at sigma + i omega. A stretch that starts while the structure moves needs the motion
@@ -21,9 +21,9 @@ from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import Plant
+    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
     from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise
-    from frf_ipz.diagnosis.observations import Blow, Observations, Sensor
+    from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 
 DECAYS = 8.0  # sigma times the stretch: its end counts for 3e-4
 THIN = 2  # lines are closer than the window resolves: every second one is independent enough
@@ -45,7 +45,7 @@ LEFT = 0.003  # of the motion after a blow: with less left at the next, that sta
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stretches:
+class SegmentSet:
     """Transforms of stretches of the blows of a test; what is called a blow here is one stretch.
 
     Parameters
@@ -71,7 +71,7 @@ class Stretches:
     variance : (n_blows, n_sensors, n_lines) array
         With what the model cannot be expected to meet; infinite where a blow lacks a sensor.
     input_of : (n_blows,) int array
-        Rows of `Plant.inputs`.
+        Rows of `ModalModel.inputs`.
     blow_of : (n_blows,) int array
         Which of the observations' blows each stretch is of.
     moving : (n_blows,) bool array
@@ -95,14 +95,14 @@ class Stretches:
     noise: FloatArray
     variance: FloatArray
     input_of: IntArray
-    blow_of: IntArray
+    record_of: IntArray
     moving: BoolArray
     pause_s: FloatArray
     first_sample: IntArray
     window: Window
 
     @property
-    def n_blows(self) -> int:
+    def n_records(self) -> int:
         """Number of blows."""
         return len(self.force)
 
@@ -128,7 +128,7 @@ class Window:
     start_s : float
         Where stretches of a hammer's blows start; 0 is at the blow.
     per_record : int
-        Stretches of each record of a shaker.
+        SegmentSet of each record of a shaker.
     floor : float
         Misfit that the model is allowed, as a part of the response.
     loudest : bool
@@ -142,14 +142,14 @@ class Window:
     loudest: bool = True
 
 
-def transform(observations: Observations, plant: Plant, noise: ChannelNoise, window: Window) -> Stretches:
+def transform(observations: Observations, plant: ModalModel, noise: ChannelNoise, window: Window) -> SegmentSet:
     """Cut stretches and transform them.
 
     Parameters
     ----------
     observations : Observations
         Blows or records.
-    plant : Plant
+    plant : ModalModel
         Names the sensors and blows.
     noise : ChannelNoise
         Of these observations.
@@ -158,7 +158,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
 
     Returns
     -------
-    Stretches
+    SegmentSet
         Of all blows, with one length.
 
     Raises
@@ -175,7 +175,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     motion = np.zeros((len(cuts), len(plant.sensors), len(s)), complex)
     present = np.zeros(motion.shape[:2], bool)
     for number, cut in enumerate(cuts):
-        rows = [_row(plant, sensor.channel, sensor.dof) for sensor in cut.blow.sensors]
+        rows = [_row(plant, sensor.channel, sensor.dof) for sensor in cut.record.sensors]
         finer = _finer(cut, n)
         fine_force[number] = finer[0]
         lines, start_force[number] = _lines(cut, finer, sigma)
@@ -188,7 +188,7 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
     noisy = known + np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)[:, None] * size
     variance = np.where(present[..., None], noisy + floor**2 * size, np.inf)
-    return Stretches(
+    return SegmentSet(
         s=s,
         used=np.flatnonzero(observations.looks_at(frequency, sigma / (2 * np.pi)))[::THIN],
         step_s=step,
@@ -199,8 +199,8 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
         motion=motion,
         noise=noisy,
         variance=variance,
-        input_of=np.array([plant.inputs.index(cut.blow.input_dof) for cut in cuts]),
-        blow_of=np.array([cut.number for cut in cuts]),
+        input_of=np.array([plant.inputs.index(cut.record.input_dof) for cut in cuts]),
+        record_of=np.array([cut.number for cut in cuts]),
         moving=np.array([cut.is_moving for cut in cuts]),
         pause_s=np.array([cut.pause_s for cut in cuts]),
         first_sample=np.array([cut.start for cut in cuts]),
@@ -208,8 +208,8 @@ def transform(observations: Observations, plant: Plant, noise: ChannelNoise, win
     )
 
 
-def _noise(plant: Plant, noise: ChannelNoise, s: ComplexArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Variances of `Stretches.motion`, (n_sensors, n_lines), and of `Stretches.force`, (n_lines,), by noise."""
+def _noise(plant: ModalModel, noise: ChannelNoise, s: ComplexArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+    """Variances of `SegmentSet.motion`, (n_sensors, n_lines), and of `SegmentSet.force`, (n_lines,), by noise."""
     frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
     energy = (1 - np.exp(-2 * DECAYS)) / (2 * sigma)
     own = [
@@ -222,52 +222,54 @@ def _noise(plant: Plant, noise: ChannelNoise, s: ComplexArray, sigma: float) -> 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cut:
     number: int
-    blow: Blow
+    record: ObservedRecord
     start: int
     _: KW_ONLY
     is_moving: bool
     pause_s: float = 0.0
 
 
-def decayed(plant: Plant, pause_s: FloatArray) -> FloatArray:
+def decayed(plant: ModalModel, pause_s: FloatArray) -> FloatArray:
     """Give how much of each mode is left after a pause, (n, n_modes), at most: damping may be less than is stated."""
     return np.asarray(np.exp(-SLOWER * np.outer(pause_s, plant.damping_ratio * plant.omega_rad_s)))
 
 
-def _cuts(observations: Observations, window: Window, step: float, plant: Plant) -> tuple[list[_Cut], int]:
+def _cuts(observations: Observations, window: Window, step: float, plant: ModalModel) -> tuple[list[_Cut], int]:
     """Where stretches start: at the blow, or, of a shaker, spread over the record."""
-    blows, wanted = observations.blows, round(window.duration_s / step)
+    records, wanted = observations.records, round(window.duration_s / step)
     if observations.kind == "hammer" and not window.start_s:
-        pulses = [isolate_pulse(blow) for blow in blows]
-        starts = [max(int(np.argmax(np.abs(pulse.blow.force) > 0)) - BEFORE, 0) for pulse in pulses]
-        n = min(wanted, *(blow.n_samples - start for blow, start in zip(blows, starts, strict=True)))
-        pauses = [blow.duration_s if blow.follows and _is_left(plant, blow.duration_s) else 0.0 for blow in blows]
+        pulses = [isolate_pulse(record) for record in records]
+        starts = [max(int(np.argmax(np.abs(pulse.record.force) > 0)) - BEFORE, 0) for pulse in pulses]
+        n = min(wanted, *(record.n_samples - start for record, start in zip(records, starts, strict=True)))
+        pauses = [
+            record.duration_s if record.follows and _is_left(plant, record.duration_s) else 0.0 for record in records
+        ]
         return [
-            _Cut(i, pulse.blow, start, is_moving=pause > 0, pause_s=pause)
+            _Cut(i, pulse.record, start, is_moving=pause > 0, pause_s=pause)
             for i, (pulse, start, pause) in enumerate(zip(pulses, starts, pauses, strict=True))
         ], _fast_length(n)
-    shortest = min(blow.n_samples for blow in blows)
+    shortest = min(record.n_samples for record in records)
     n = _fast_length(min(wanted, shortest - 2 * EDGE))
     if observations.kind == "hammer":
         start = min(EDGE + round(window.start_s / step), shortest - n - EDGE)
-        return [_Cut(i, isolate_pulse(blow).blow, start, is_moving=True) for i, blow in enumerate(blows)], n
+        return [_Cut(i, isolate_pulse(record).record, start, is_moving=True) for i, record in enumerate(records)], n
     room, count, cuts = shortest - n - 2 * EDGE, window.per_record, []
     sizes = _sizes(observations, n)
-    for i, (blow, size) in enumerate(zip(blows, sizes, strict=True)):
+    for i, (record, size) in enumerate(zip(records, sizes, strict=True)):
         loudest = EDGE + min(max(int(np.argmax(size[EDGE:])) - round(EARLY * n), 0), max(room, 0))
-        if starts_at_rest(blow):  # nothing is unknown then, and one stretch says more than two that move
-            cuts.append(_Cut(i, blow, 0, is_moving=False))
+        if starts_at_rest(record):  # nothing is unknown then, and one stretch says more than two that move
+            cuts.append(_Cut(i, record, 0, is_moving=False))
             if window.loudest and size[: n // 4].max() < QUIETER * size.max():
-                cuts.append(_Cut(i, blow, loudest, is_moving=True))
+                cuts.append(_Cut(i, record, loudest, is_moving=True))
             continue
         alive = _alive(size, n, room)
         parts = [EDGE + round(alive * (place + 0.5) / count) for place in range(count)]
         parts[int(np.argmin([abs(part - loudest) for part in parts]))] = loudest
-        cuts += [_Cut(i, blow, start, is_moving=True) for start in parts]
+        cuts += [_Cut(i, record, start, is_moving=True) for start in parts]
     return cuts, n
 
 
-def _is_left(plant: Plant, pause_s: float) -> bool:
+def _is_left(plant: ModalModel, pause_s: float) -> bool:
     """Tell whether the structure still moves when the next blow comes."""
     return bool(decayed(plant, np.array([pause_s]))[:, plant.n_rigid :].max() > LEFT)
 
@@ -282,24 +284,24 @@ def _alive(size: FloatArray, n: int, room: int) -> int:
 def _sizes(observations: Observations, n: int) -> list[FloatArray]:
     """How far the structure moves in each record at each time: what a stop or a stiffening spring answers to."""
     low, found = observations.band_hz[0], []
-    for blow in observations.blows:
-        frequency = np.fft.rfftfreq(blow.n_samples, blow.step_s)
+    for record in observations.records:
+        frequency = np.fft.rfftfreq(record.n_samples, record.step_s)
         s = 2j * np.pi * np.maximum(frequency, low)
-        powers = np.array([sensor.quantity.power for sensor in blow.sensors])[:, None]
-        faded = blow.responses * tukey(blow.n_samples, FADED)  # what jumps from the end to the start would ring
+        powers = np.array([sensor.quantity.power for sensor in record.sensors])[:, None]
+        faded = record.responses * tukey(record.n_samples, FADED)  # what jumps from the end to the start would ring
         lines = np.fft.rfft(faded) * (frequency >= LOW * low) / s**powers
-        motion = np.fft.irfft(lines, blow.n_samples)
+        motion = np.fft.irfft(lines, record.n_samples)
         motion /= np.maximum(motion.std(1, keepdims=True), 1e-300)
         found.append(maximum_filter1d(np.abs(motion).max(0), max(round(ABOUT * n), 1)))
     return found
 
 
-def starts_at_rest(blow: Blow) -> bool:
+def starts_at_rest(record: ObservedRecord) -> bool:
     """Look whether nothing moves yet at the first samples.
 
     Parameters
     ----------
-    blow : Blow
+    record : ObservedRecord
         Of a shaker.
 
     Returns
@@ -307,8 +309,8 @@ def starts_at_rest(blow: Blow) -> bool:
     bool
         True at rest.
     """
-    signals = np.vstack([blow.force, blow.responses])
-    first = max(FIRST_SAMPLES, round(FIRST_PART * blow.n_samples))
+    signals = np.vstack([record.force, record.responses])
+    first = max(FIRST_SAMPLES, round(FIRST_PART * record.n_samples))
     size = np.sqrt(np.mean(signals**2, 1))
     return bool(np.all(np.sqrt(np.mean(signals[:, :first] ** 2, 1)) < AT_REST * size))
 
@@ -319,10 +321,10 @@ def _lines(cut: _Cut, finer: FloatArray, sigma: float) -> tuple[ComplexArray, Fl
     A signal that jumps at the start is not band-limited: the sum over samples is off by half the first one, and, on
     finer samples, by little more.
     """
-    step = cut.blow.step_s
+    step = cut.record.step_s
     n = finer.shape[1] // FINER
     if not cut.is_moving:
-        signals = np.vstack([cut.blow.force, cut.blow.responses])[:, cut.start : cut.start + n]
+        signals = np.vstack([cut.record.force, cut.record.responses])[:, cut.start : cut.start + n]
         return np.fft.rfft(signals * np.exp(-sigma * step * np.arange(n)) * step, axis=1), np.zeros(2)
     fine = step / FINER
     decay = np.exp(-sigma * fine * np.arange(FINER * n)) * fine
@@ -333,7 +335,7 @@ def _lines(cut: _Cut, finer: FloatArray, sigma: float) -> tuple[ComplexArray, Fl
 
 def _finer(cut: _Cut, n: int) -> FloatArray:
     """Force and responses on finer times, (1 + n_sensors, FINER n)."""
-    signals = np.vstack([cut.blow.force, cut.blow.responses])
+    signals = np.vstack([cut.record.force, cut.record.responses])
     padded = np.pad(signals, ((0, 0), (EDGE, EDGE)))[:, cut.start : cut.start + n + 2 * EDGE]
     return np.asarray(resample(_tapered(padded), FINER * padded.shape[1], axis=1)[:, FINER * EDGE : FINER * (EDGE + n)])
 
@@ -365,9 +367,9 @@ def common_step(observations: Observations) -> float:
     InputError
         If recordings differ in it.
     """
-    steps = np.array([blow.step_s for blow in observations.blows])
+    steps = np.array([record.step_s for record in observations.records])
     if np.ptp(steps) > 1e-4 * steps[0]:
-        odd = observations.blows[int(np.argmax(np.abs(steps - np.median(steps))))]
+        odd = observations.records[int(np.argmax(np.abs(steps - np.median(steps))))]
         raise InputError(
             f"the blow {odd.name} has a time step of {odd.step_s:g} s, the others of {np.median(steps):g} s; "
             "what depends on level is looked for in recordings of one sampling rate: leave it out"
@@ -383,5 +385,5 @@ def _noise_row(noise: ChannelNoise, sensor: Sensor) -> int:
     return noise.sensors.index((sensor.channel, sensor.dof))
 
 
-def _row(plant: Plant, channel: str, dof: object) -> int:
+def _row(plant: ModalModel, channel: str, dof: object) -> int:
     return next(i for i, s in enumerate(plant.sensors) if (s.channel, s.dof) == (channel, dof))

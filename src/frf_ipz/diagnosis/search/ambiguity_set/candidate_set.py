@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.search.fit import Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.search.search import Ranking
 
 FAR = 8  # places anywhere, not beside each other, by what a wide search says of them
 EQUAL, MOST_EQUAL = 1.1, 4  # times the best cost there: places as good as the best, though beside it, and how many
 
 
-def fit_far(bench: Bench, ranking: Ranking, fits: Fits) -> int:
+def fit_far(bench: InferenceProblem, ranking: Ranking, fits: Fits) -> int:
     """Fit the most probable effect wherever a wide search finds it likely, and around where that is better.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     ranking : Ranking
         Of a search, with one fit at least.
@@ -56,12 +56,14 @@ def fit_far(bench: Bench, ranking: Ranking, fits: Fits) -> int:
     return len(starts)
 
 
-def next_beside(bench: Bench, near: Iterable[Fit], known: Container[tuple[object, ...]]) -> tuple[Cause, Fit] | None:
+def next_beside(
+    bench: InferenceProblem, near: Iterable[Fit], known: Container[tuple[object, ...]]
+) -> tuple[Cause, Fit] | None:
     """Choose a place that is not known beside the first fit that has such.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     near : iterable of Fit
         The best first.

@@ -21,18 +21,18 @@ from frf_ipz.diagnosis.search.neighbourhood_search import Fits, bar_of, climb_al
 from frf_ipz.diagnosis.search.search import Ranking, keep, ranked
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 FITTED = 30  # places, by what a wide search says of them
 ITERATIONS = 20
 
 
-def look_elsewhere(bench: Bench, ranking: Ranking) -> Ranking:
+def look_elsewhere(bench: InferenceProblem, ranking: Ranking) -> Ranking:
     """Fit the most probable cause at other places.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     ranking : Ranking
         Of a search.

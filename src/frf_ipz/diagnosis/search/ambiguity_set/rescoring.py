@@ -27,7 +27,7 @@ from frf_ipz.diagnosis.search.set_up import with_errors
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.search.fit import Data, Fit
     from frf_ipz.diagnosis.search.hypothesis import Cause
-    from frf_ipz.diagnosis.search.inference_problem import Bench
+    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
 
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
@@ -48,12 +48,12 @@ class _Weighed:
 _Settled: TypeAlias = dict[tuple[object, ...], _Weighed]
 
 
-def settle_ties(bench: Bench, ranking: Ranking) -> Ranking:
+def settle_ties(bench: InferenceProblem, ranking: Ranking) -> Ranking:
     """Weigh again what is nearly as probable as the best, with what may be.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     ranking : Ranking
         Of a search.
@@ -93,7 +93,9 @@ def _nearest(fits: Fits) -> list[Fit]:
     return near[:MOST]
 
 
-def _look_beside(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]) -> None:
+def _look_beside(
+    bench: InferenceProblem, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, InferenceProblem]
+) -> None:
     """Weigh places beside the best ones until all that are left are worse."""
     far: set[tuple[object, ...]] = set()
     for _ in range(MOST_BESIDE):
@@ -107,7 +109,9 @@ def _look_beside(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts
             far.add(cause.key)
 
 
-def _look_alike(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]) -> None:
+def _look_alike(
+    bench: InferenceProblem, base: Fit, fits: Fits, settled: _Settled, stricts: dict[float, InferenceProblem]
+) -> None:
     """Weigh what looks like the best where that sits now, and places beside it: theirs were found elsewhere before."""
     for _ in range(MOST_ALIKE):
         best = max(settled.values(), key=lambda one: one.log_evidence)
@@ -119,7 +123,13 @@ def _look_alike(bench: Bench, base: Fit, fits: Fits, settled: _Settled, stricts:
 
 
 def _add(
-    bench: Bench, base: Fit, cause: Cause, like: Fit, fits: Fits, settled: _Settled, stricts: dict[float, Bench]
+    bench: InferenceProblem,
+    base: Fit,
+    cause: Cause,
+    like: Fit,
+    fits: Fits,
+    settled: _Settled,
+    stricts: dict[float, InferenceProblem],
 ) -> bool:
     """Fit a cause from a similar one, and weigh it if it is near the best; False if it is not."""
     if cause.key not in fits:
@@ -144,7 +154,7 @@ def _in_order(fits: Fits, settled: _Settled) -> tuple[Fit, ...]:
     return tuple(sorted([*weighed, *others], key=lambda fit: -fit.log_evidence))
 
 
-def _likely_errors(bench: Bench, best: Fit) -> Data:
+def _likely_errors(bench: InferenceProblem, best: Fit) -> Data:
     """Give the data the errors of FRFs that are likeliest by the best explanation."""
     data, options = bench.data, bench.specimen.options
     most = best.log_evidence + data.whitening.log_density
@@ -158,7 +168,7 @@ def _likely_errors(bench: Bench, best: Fit) -> Data:
     return data
 
 
-def _weigh(bench: Bench, stricts: dict[float, Bench], fit: Fit) -> _Weighed:
+def _weigh(bench: InferenceProblem, stricts: dict[float, InferenceProblem], fit: Fit) -> _Weighed:
     """Give a fit the mean evidence, and the values of the likeliest tolerances."""
     best, mean, last = fit, fit.log_evidence, fit
     for part, strict in stricts.items():
@@ -168,7 +178,7 @@ def _weigh(bench: Bench, stricts: dict[float, Bench], fit: Fit) -> _Weighed:
     return _Weighed(fit=replace(best, log_evidence=fit.log_evidence), log_evidence=mean)
 
 
-def _with_part(bench: Bench, strict: Bench, part: float, fit: Fit) -> Fit:
+def _with_part(bench: InferenceProblem, strict: InferenceProblem, part: float, fit: Fit) -> Fit:
     """Fit again with a part of the tolerances; everything but the evidence is given for all of them."""
     nuisance = bench.nuisance
     hypothesis = strict.suppose(fit.hypothesis.causes)

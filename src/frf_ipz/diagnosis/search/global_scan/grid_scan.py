@@ -16,13 +16,13 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.search.global_scan.refine import robust_misfit
 from frf_ipz.diagnosis.search.global_scan.signatures import Start, search_sketches
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.inference_problem import Bench, weights_of
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.catalogue.model_context import Specimen
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.fit import Fit
@@ -32,12 +32,12 @@ SCATTER_ERROR = 0.1  # the same where scatter was fitted
 LOOKED_AROUND = 16  # places of each effect: where not all places are looked at, those beside the best are
 
 
-def wide_search(bench: Bench, base: Fit) -> list[Start]:
+def wide_search(bench: InferenceProblem, base: Fit) -> list[Start]:
     """Look for large effects, far from the axis.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -50,14 +50,14 @@ def wide_search(bench: Bench, base: Fit) -> list[Start]:
     return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
 
 
-def search_among_scatter(bench: Bench, base: Fit) -> list[Start]:
+def search_among_scatter(bench: InferenceProblem, base: Fit) -> list[Start]:
     """Look for large effects half-way to the axis, beside the scatter that was fitted without them.
 
     Scatter takes up what shifts natural frequencies; what it cannot, stands out.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -71,14 +71,14 @@ def search_among_scatter(bench: Bench, base: Fit) -> list[Start]:
     return _search(bench, specimen, bench.middle, base, base.unknown, SCATTER_ERROR)
 
 
-def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
+def causes_of(effect: Effect, specimen: ModelContext) -> list[Cause]:
     """Give an effect at all its places.
 
     Parameters
     ----------
     effect : Effect
         What.
-    specimen : Specimen
+    specimen : ModelContext
         What is tested.
 
     Returns
@@ -91,7 +91,7 @@ def causes_of(effect: Effect, specimen: Specimen) -> list[Cause]:
 
 
 def _search(
-    bench: Bench, specimen: Specimen, measured: Measured, base: Fit, unknown: FloatArray, error: float
+    bench: InferenceProblem, specimen: ModelContext, measured: Measured, base: Fit, unknown: FloatArray, error: float
 ) -> list[Start]:
     causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
     weights = weights_of(measured, error)
@@ -105,7 +105,12 @@ def _search(
 
 
 def _sketched(
-    specimen: Specimen, measured: Measured, base: Fit, response: Response, weights: FloatArray, causes: Sequence[Cause]
+    specimen: ModelContext,
+    measured: Measured,
+    base: Fit,
+    response: Response,
+    weights: FloatArray,
+    causes: Sequence[Cause],
 ) -> tuple[list[Start], list[Cause]]:
     """Find the best values of causes that can be sketched, and which ones cannot."""
     sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
@@ -117,7 +122,7 @@ def _sketched(
     return found, [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
 
 
-def _between(specimen: Specimen, causes: Sequence[Cause], starts: Sequence[Start]) -> list[Cause]:
+def _between(specimen: ModelContext, causes: Sequence[Cause], starts: Sequence[Start]) -> list[Cause]:
     """Give the places beside the best of each effect that are none of those where it was looked for."""
     seen = {cause.key for cause in causes}
     counts, found = Counter[str](), list[Cause]()
@@ -135,13 +140,13 @@ def _between(specimen: Specimen, causes: Sequence[Cause], starts: Sequence[Start
 
 
 def best_start(
-    bench: Bench, base: Fit, cause: Cause, measured: Measured, weights: FloatArray, unknown: FloatArray
+    bench: InferenceProblem, base: Fit, cause: Cause, measured: Measured, weights: FloatArray, unknown: FloatArray
 ) -> Start:
     """Try the values that an effect proposes to start from.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.

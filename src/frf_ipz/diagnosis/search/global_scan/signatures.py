@@ -17,7 +17,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.search.hypothesis import Cause
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Sketch
+    from frf_ipz.diagnosis.catalogue.effect import Signature
     from frf_ipz.diagnosis.measured.transfer import Measured
     from frf_ipz.diagnosis.physics.basis import Basis
     from frf_ipz.diagnosis.physics.layout import Layout
@@ -130,7 +130,7 @@ def missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
 
 
 def search_sketches(
-    causes: Sequence[Cause], sketches: Sequence[Sketch], base: Response, basis: Basis, layout: Layout,
+    causes: Sequence[Cause], sketches: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
     measured: Measured, weights: FloatArray,
 ) -> list[Start]:  # fmt: skip
     """Find the best values of each effect at each place.
@@ -139,7 +139,7 @@ def search_sketches(
     ----------
     causes : sequence of Cause
         What is tried.
-    sketches : sequence of Sketch
+    sketches : sequence of Signature
         The same as dynamic stiffness.
     base : Response
         Of what is supposed already.
@@ -171,7 +171,7 @@ def search_sketches(
     return found
 
 
-def _by_motion(sketches: Sequence[Sketch]) -> Iterator[list[list[int]]]:
+def _by_motion(sketches: Sequence[Signature]) -> Iterator[list[list[int]]]:
     """Sketches on the same motion share their receptances; motions come in handy numbers."""
     same: dict[bytes, list[int]] = {}
     for index, sketch in enumerate(sketches):
@@ -181,7 +181,7 @@ def _by_motion(sketches: Sequence[Sketch]) -> Iterator[list[list[int]]]:
         yield groups[start : start + AT_ONCE]
 
 
-def _best(cause: Cause, sketch: Sketch, terms: Terms) -> Start:
+def _best(cause: Cause, sketch: Signature, terms: Terms) -> Start:
     own = terms[3]
     if sketch.amplitudes is None:
         scale = np.median(np.abs(own)) * np.median(np.abs(sketch.shapes), axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.diagnosis.search.global_scan.refine import refine
 from frf_ipz.diagnosis.search.global_scan.signatures import Start
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.inference_problem import Bench, weights_of
+from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.transfer import Measured
@@ -32,12 +32,12 @@ MOST_STEPS = 12
 GAIN = 0.5  # nats: a neighbour must be better by that
 
 
-def refine_far(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
+def refine_far(bench: InferenceProblem, base: Fit, starts: Sequence[Start]) -> list[Start]:
     """Refine the best starts of a wide search, and step to better places.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -67,12 +67,12 @@ def refine_far(bench: Bench, base: Fit, starts: Sequence[Start]) -> list[Start]:
     return list(best.values())
 
 
-def bring_closer(bench: Bench, starts: Sequence[Supposed]) -> list[Supposed]:
+def bring_closer(bench: InferenceProblem, starts: Sequence[Supposed]) -> list[Supposed]:
     """Bring starts half the way to the axis: their values, and the places of the best.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     starts : sequence of (tuple of Cause, Start)
         Each with what is supposed besides.
@@ -92,12 +92,12 @@ def bring_closer(bench: Bench, starts: Sequence[Supposed]) -> list[Supposed]:
     return sorted([*best, *closer[STEPPED_CLOSER:]], key=lambda one: one[1].cost)
 
 
-def step_far(bench: Bench, known: tuple[Cause, ...], start: Start) -> Start:
+def step_far(bench: InferenceProblem, known: tuple[Cause, ...], start: Start) -> Start:
     """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way.
 
     Parameters
     ----------
-    bench : Bench
+    bench : InferenceProblem
         Data and effects.
     known : tuple of Cause
         What is supposed besides, at the same places.
@@ -112,7 +112,7 @@ def step_far(bench: Bench, known: tuple[Cause, ...], start: Start) -> Start:
     return _step(bench, known, start, bench.coarse)
 
 
-def _step(bench: Bench, known: tuple[Cause, ...], start: Start, measured: Measured) -> Start:
+def _step(bench: InferenceProblem, known: tuple[Cause, ...], start: Start, measured: Measured) -> Start:
     weights = weights_of(measured, REFINED_ERROR)
     seen = {start.cause.key}
     for _ in range(MOST_STEPS):

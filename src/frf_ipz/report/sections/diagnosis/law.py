@@ -12,18 +12,18 @@ from frf_ipz.report.wording import number, percent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.diagnosis import LawAtWork
+    from frf_ipz.diagnosis.diagnosis import LawInTime
 
 PERIODS = 12.0  # of the strongest line: what is seen before one zooms out
 MOST_POINTS = 4000  # of the force
 
 
-def law_pictures(law: LawAtWork | None) -> list[Picture]:
+def law_pictures(law: LawInTime | None) -> list[Picture]:
     """Draw a law at work.
 
     Parameters
     ----------
-    law : LawAtWork, optional
+    law : LawInTime, optional
         From the diagnosis.
 
     Returns
@@ -33,10 +33,10 @@ def law_pictures(law: LawAtWork | None) -> list[Picture]:
     """
     if law is None:
         return []
-    return [_force(law), *([_response(law)] if law.blow else [])]
+    return [_force(law), *([_response(law)] if law.record else [])]
 
 
-def _force(law: LawAtWork) -> Picture:
+def _force(law: LawInTime) -> Picture:
     kept = slice(None, None, max(1, len(law.motion_m) // MOST_POINTS))
     hover = "%{x:.4g}: %{y:.4g} N"
     over_motion = line(law.motion_m[kept], law.force_N[kept], "over motion", "@updated", hover=hover)
@@ -57,7 +57,7 @@ def _force(law: LawAtWork) -> Picture:
     )
 
 
-def _response(law: LawAtWork) -> Picture:
+def _response(law: LawInTime) -> Picture:
     curves = (law.measured, law.without, law.simulated)
     kept = thin(law.time_s, curves, BINS[1])
     hover = f"%{{x:.5g}} s: %{{y:.4g}} {law.unit}"
@@ -73,7 +73,7 @@ def _response(law: LawAtWork) -> Picture:
     note = "Simulated in time from the measured force. What is left has a norm of "
     return Picture(
         name="law-response",
-        title=f"{law.channel} in {law.blow} ({shown}): measured, with the law and without it",
+        title=f"{law.channel} in {law.record} ({shown}): measured, with the law and without it",
         alt=f"{law.response.capitalize()} over time. The model without the law misses {percent(errors[0], 2)} of it, "
         f"with the law {percent(errors[1], 2)}.",
         traces=traces,
@@ -88,12 +88,12 @@ def _response(law: LawAtWork) -> Picture:
     )
 
 
-def _error(law: LawAtWork, model: FloatArray) -> float:
+def _error(law: LawInTime, model: FloatArray) -> float:
     size = max(float(np.linalg.norm(law.measured)), np.finfo(float).tiny)
     return float(np.linalg.norm(law.measured - model)) / size
 
 
-def _window(law: LawAtWork) -> list[float]:
+def _window(law: LawInTime) -> list[float]:
     """Choose a few periods about where the law changes most."""
     step = law.time_s[1] - law.time_s[0]
     lines = np.abs(np.fft.rfft(law.measured))

@@ -148,7 +148,7 @@ def _mode(rows: pd.DataFrame, place: int) -> list[Trace]:
     }
     change, damping = 100 * (hertz / hertz[-1] - 1), 100 * rows["damping_ratio"].to_numpy(float)
     bars = 100 * deviation / hertz, 100 * Q95 * rows["damping_ratio_std"].to_numpy(float)
-    texts = [f"{blow}: {value:.6g} Hz" for blow, value in zip(rows["blow"], hertz, strict=True)]
+    texts = [f"{record}: {value:.6g} Hz" for record, value in zip(rows["record"], hertz, strict=True)]
     hover = "%{text}, %{x:.4g} N: "
     more: Trace = {**style, "text": texts}
     return [
@@ -176,12 +176,12 @@ def _table(modes: pd.DataFrame) -> Table:
         [
             str(int(row["mode"]) + 1),
             row["frf"],
-            row["blow"],
+            row["record"],
             number(row["level_N"]),
             with_error(row["frequency_hz"], row["frequency_std_hz"]),
             with_error(100 * row["damping_ratio"], 100 * row["damping_ratio_std"]),
         ]
         for row in modes.sort_values(["mode", "frf", "level_N"]).to_dict("records")
     ]
-    columns = ("mode", "FRF (sensor / blow)", "blow", "peak force, N", "frequency, Hz", "damping ratio, %")
+    columns = ("mode", "FRF (sensor / excitation)", "record", "peak force, N", "frequency, Hz", "damping ratio, %")
     return Table(caption="Modes of single blows", columns=columns, rows=rows)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting import output_error_fit as shooting
-from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import shoot
+from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.refine import Start
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_plant
-from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_freedom
+from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
+from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_nuisance_prior
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, transform
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -30,11 +30,11 @@ def hardening(w, v):
 def cubic(chain, strike):
     """Blows on the chain with a cubic spring at node 3, and the plant, with 1 % of uneven stiffness allowed."""
     observations = strike(hardening)
-    plant = make_plant(chain.model, observations)
+    plant = make_modal_model(chain.model, observations)
     stretches = transform(observations, plant, read_noise(observations), Window(duration_s=1.0, floor=NOISE_FLOOR))
     options = DiagnoseOptions(stiffness_tolerance=5e-3)
     place = next(i for i, p in enumerate(plant.places) if p.location == {"nodes": [3]})
-    return stretches, make_freedom(plant, stretches, observations.band_hz[1], options), place
+    return stretches, make_nuisance_prior(plant, stretches, observations.band_hz[1], options), place
 
 
 def start_at(freedom, place, **changes):
@@ -49,8 +49,8 @@ def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
     shapes = freedom.plant.at_places.shapes.copy()
     shapes[place, freedom.modes] -= OFF * freedom.places[place] * (freedom.modes == 0)
     wrong = replace(freedom.plant, at_places=replace(freedom.plant.at_places, shapes=shapes))
-    fit = shoot(stretches, replace(freedom, plant=wrong), start_at(freedom, place), iterations=12)
-    held = shoot(
+    fit = fit_output_error(stretches, replace(freedom, plant=wrong), start_at(freedom, place), iterations=12)
+    held = fit_output_error(
         stretches, replace(freedom, plant=wrong, places=1e-9 * freedom.places), start_at(freedom, place), iterations=12
     )
     assert fit.cost < 0.5 * held.cost
@@ -63,8 +63,8 @@ def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
 def test_changes_that_run_away_are_taken_for_none(cubic, monkeypatch, size):
     """Of a stiff stop, say: the derivative grows from contact to contact until it has no number any more."""
     stretches, freedom, place = cubic
-    follow = shooting.follow
-    monkeypatch.setattr(shooting, "follow", lambda *given: size * follow(*given))
-    fit = shoot(stretches, freedom, start_at(freedom, place), iterations=2)
+    follow = shooting.step_tangent
+    monkeypatch.setattr(shooting, "step_tangent", lambda *given: size * follow(*given))
+    fit = fit_output_error(stretches, freedom, start_at(freedom, place), iterations=2)
     assert np.isfinite(fit.cost)
     assert np.isfinite(fit.covariance).all()
