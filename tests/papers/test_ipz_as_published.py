@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from paper_comparison import epsilon, fitted_place_cm
 
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.paper_cases import published, section_4, section_5, table
+from frf_testbench.updating.paper_comparison import epsilon, fitted_place_cm
 from printed_digits import cut
 
 EPSILON = 0.01  # the damping that enters it is printed with three digits

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from paper_comparison import compare_section_4, judge
 
 from frf_ipz.prediction.agreement import with_measured_poles
 from frf_ipz.updating.options import UpdateOptions
@@ -11,6 +10,7 @@ from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.paper_cases import section_4, section_5
+from frf_testbench.updating.paper_comparison import compare_section_4, judge
 
 MOST_ITERATIONS = 5
 IMAGINARY = 1e-5  # of the imaginary part: the bar for poles and zeros

@@ -17,7 +17,7 @@ from frf_ipz.ingest.signals.windows import exponential_window, force_window
 from frf_ipz.ingest.spectra import empty_sums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.survey.checks import SECOND_PULSE
 from frf_ipz.ingest.variance import frf_variance
-from synthetic_campaign import HIT, Structure, blow, pulse, write_csv, write_test
+from synthetic_campaign import HIT, Structure, impact, pulse, write_csv, write_test
 
 FILES = settings(max_examples=30, deadline=None)  # an example writes and reads files
 STEP_S = 1 / 1024
@@ -73,7 +73,7 @@ def test_an_exponential_window_is_taken_back_exactly_for_any_structure(structure
     n_samples = 2048
     left = np.exp(-decay_1_s * (n_samples * STEP_S - at_s))
     with tempfile.TemporaryDirectory() as folder:
-        signals = blow(structure, n_samples=n_samples, step_s=STEP_S, at_s=at_s, length_s=1.6e-3)
+        signals = impact(structure, n_samples=n_samples, step_s=STEP_S, at_s=at_s, length_s=1.6e-3)
         write_csv(Path(folder) / "hits" / "1.csv", signals, STEP_S)
         options = IngestOptions(exponential_window_s=1 / decay_1_s)
         frfs = estimate_frfs(read_test(write_test(Path(folder), HIT)), options).frfs
@@ -86,7 +86,7 @@ def test_an_exponential_window_is_taken_back_exactly_for_any_structure(structure
 @FILES
 @given(force=st.sampled_from(list(UNITS["force"])), acc=st.sampled_from(list(UNITS["acc"])))
 def test_units_do_not_change_frfs(force, acc):
-    signals = blow(Structure(), n_samples=512, step_s=STEP_S, length_s=1.6e-3)
+    signals = impact(Structure(), n_samples=512, step_s=STEP_S, length_s=1.6e-3)
     values = []
     with tempfile.TemporaryDirectory() as folder:
         for number, (force_unit, unit) in enumerate((("N", "m/s^2"), (force, acc))):
@@ -112,7 +112,7 @@ def test_every_blow_of_a_file_is_found(gaps, heights, sign):
         for at, height in zip(at_s, heights, strict=False)
     )
     with tempfile.TemporaryDirectory() as folder:
-        write_csv(Path(folder) / "hits" / "1.csv", blow(Structure(), force=force, step_s=STEP_S), STEP_S)
+        write_csv(Path(folder) / "hits" / "1.csv", impact(Structure(), force=force, step_s=STEP_S), STEP_S)
         result = estimate_frfs(read_test(write_test(Path(folder), HIT)), IngestOptions())
     expected = sign * np.array(heights[: len(at_s)])
     np.testing.assert_allclose(result.records.peak_force_N, expected, rtol=0.05)  # samples beside the top

@@ -294,7 +294,6 @@ def linear_slopes(model: PoleResidueModel, s: ComplexArray) -> ComplexArray:
 
 
 def labels_of(case: Case) -> tuple[FrfLabel, ...]:
-    """Name every blow with every sensor, as receptances."""
-    return tuple(
-        FrfLabel(sensor, struck, FrfQuantity.RECEPTANCE) for struck in case.input_dofs for sensor in case.sensors
-    )
+    """Name every input with every sensor, as receptances."""
+    pairs = ((sensor, source) for source in case.input_dofs for sensor in case.sensors)
+    return tuple(FrfLabel(sensor, source, FrfQuantity.RECEPTANCE) for sensor, source in pairs)

@@ -1,8 +1,8 @@
 """The linear part of a structure with a force law: modes, what lies above, and the places a law could sit at.
 
 Transfer functions join three kinds of points: struck ones, sensors, and places. Each is a sum over modes up to a few
-times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`NuisanceValues`) moves
-frequencies, damping and the shapes at sensors, blows and the place of a law.
+times the band and the first two terms of the rest's series in s^2. What the model may be wrong by (`NuisanceValues`)
+moves frequencies, damping and the shapes at sensors, blows and the place of a law.
 """
 
 from __future__ import annotations
