@@ -3,8 +3,7 @@
 import numpy as np
 from scipy import io, sparse
 
-from frf_ipz.fe.beams.beam_options import BeamFile, BeamOptions
-from frf_ipz.fe.kinds.beam import build_beam
+from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, build_beam
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.fe.model_options import DampingSection, ModelSection
 from frf_ipz.structure import Geometry, StructuralModel

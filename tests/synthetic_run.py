@@ -15,11 +15,11 @@ from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.dofs import Dof
 from frf_ipz.export.state_space import to_state_space
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
-from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.pair import pair
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.update import update_model

@@ -13,8 +13,8 @@ from scipy.sparse import linalg as sparse_linalg
 from brick_plate import plate_matrices
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.structure import Geometry, StructuralModel
 
 ELEMENT_M, THICKNESS_M, LAYERS = 5e-3, 6e-3, 3

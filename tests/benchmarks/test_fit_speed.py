@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from frf_ipz.identification.fit import fit_modes
-from frf_ipz.identification.lines.measured import measured_lines
+from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.identification.start.stabilization import start_poles
+from frf_ipz.identification.stabilization import start_poles
 from synthetic_frfs import of_bench
 
 ROUNDS = 3

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import linalg
 from scipy.linalg import lapack
 
+from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
-from frf_ipz.updating.published.step import PublishedStep, StepSettings
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.paper_cases import section_4
 from frf_testbench.updating.study import set_up

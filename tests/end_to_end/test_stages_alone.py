@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.cli import main as command
-from frf_ipz.export.design_files import load_ensemble, read_weights
-from frf_ipz.export.state_space_files import load_state_space
+from frf_ipz.export.state_space_files import load_ensemble, load_state_space, read_weights
 from frf_ipz.report.findings import plain_signs
 from frf_ipz.runs.folder import read_run
 from small_campaign import write_campaign

@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 import frf_testbench.updating
 from fe_models import beam
 from frf_ipz.dofs import parse_dof
-from frf_ipz.fe.beams.beam_options import BeamSection
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.kinds.beam import BeamSection
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.fe.response import model_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.pencils import damped_zeros

@@ -7,11 +7,11 @@ from numpy.testing import assert_allclose
 
 from fe_models import ALUMINIUM, beam, structural_model
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.beam_options import BeamSection
 from frf_ipz.fe.changes import with_point_masses, with_springs
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.kinds.beam import BeamSection
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.fe.response import model_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
-from frf_ipz.identification.lines.measured import measured_lines
+from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.records import read_records
 

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.errors import InputError
-from frf_ipz.prediction.members import Members
+from frf_ipz.prediction.ensemble import Members
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,21 +14,29 @@ import pandas as pd
 from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, IntArray
-from frf_ipz.identification.fitting import FIXED_POLES, MODEL_ERROR, Fitted, excess_of, find_modes, levels
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.refinement import refine
 from frf_ipz.identification.likelihood.smooth_terms import all_terms
-from frf_ipz.identification.lines.measured import measured_lines, with_noise_of
+from frf_ipz.identification.measured_lines import measured_lines, with_noise_of
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.identification.results.gains import find_gains
-from frf_ipz.identification.results.measured_model import measured_model, mode_order, residue_covariance
+from frf_ipz.identification.results.measured_model import measured_model, residue_covariance
 from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import FoundZeros, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.judgement import judge
-from frf_ipz.identification.support import Support, doubts, find_support
+from frf_ipz.identification.search.find_modes import (
+    FIXED_POLES,
+    MODEL_ERROR,
+    Fitted,
+    excess_of,
+    find_modes,
+    levels,
+    mode_order,
+)
+from frf_ipz.identification.search.goodness_of_fit import judge
+from frf_ipz.identification.search.split_half import Support, doubts, find_support
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.export.options import ExportOptions
-from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.prediction.options import PredictOptions

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.prediction.members import Members
+    from frf_ipz.prediction.ensemble import Members
     from frf_ipz.rational import ZeroSet
     from frf_ipz.structure import ReducedModel
 

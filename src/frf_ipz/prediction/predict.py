@@ -15,7 +15,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.prediction.advice import explain, wide_stretches
-from frf_ipz.prediction.members import Members
+from frf_ipz.prediction.ensemble import Members
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.zeros import predicted_zeros
 

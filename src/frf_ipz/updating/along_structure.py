@@ -13,7 +13,7 @@ import pandas as pd
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.numerics.pencils import undamped_poles
-from frf_ipz.updating.minimal.gaussian import solve_step
+from frf_ipz.updating.gaussian import solve_step
 from frf_ipz.updating.parameters import structural_basis
 
 if TYPE_CHECKING:

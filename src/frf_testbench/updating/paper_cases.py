@@ -14,11 +14,10 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray
 from frf_ipz.dofs import parse_dof
-from frf_ipz.fe.beams.beam_options import BeamFile, BeamOptions, BeamSection
-from frf_ipz.fe.kinds.beam import build_beam
+from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, BeamSection, build_beam
 from frf_ipz.fe.model_options import DampingSection, ModelSection
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.fe.response import model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit

@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.errors import FrfIpzError
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
-from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.pair import pair
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
 from frf_ipz.prediction.predict import predict_frfs

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.physics.nuisance import make_nuisance
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.hypothesis import Cause, suppose
 from frf_ipz.dofs import Dof, parse_dof
-from frf_ipz.fe.beams.variants import with_axial_force, with_formulation
+from frf_ipz.fe.beam_models import with_axial_force, with_formulation
 from frf_ipz.fe.changes import released, scaled_parts, with_point_masses, with_springs
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import model_frfs

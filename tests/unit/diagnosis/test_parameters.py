@@ -13,11 +13,11 @@ from frf_ipz.diagnosis.parameters import _modal, diagnosed_basis
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.pair import pair
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.update import update_model
 

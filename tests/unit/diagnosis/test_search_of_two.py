@@ -34,7 +34,7 @@ from frf_ipz.diagnosis.search.search import (
     search_beside,
 )
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.variants import with_formulation
+from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
 from frf_ipz.progress import silent
 

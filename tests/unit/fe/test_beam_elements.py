@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from frf_ipz.fe.beams.elements import (
+from frf_ipz.fe.beam_elements import (
     BeamElements,
     deflection_polynomials,
     geometric_stiffness_matrices,

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from exact_beams import exact_frequencies_hz, rectangle
 from fe_models import beam
-from frf_ipz.fe.beams.beam_options import BeamPointMass, BeamPointSpring, BeamSection
 from frf_ipz.fe.eigen import solve_modes
+from frf_ipz.fe.kinds.beam import BeamPointMass, BeamPointSpring, BeamSection
 
 LENGTH, WIDTH, THICK, MODULUS, DENSITY, POISSON = 0.6, 0.03, 0.06, 70e9, 2700.0, 0.33
 STOCKY = {

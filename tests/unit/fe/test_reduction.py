@@ -10,12 +10,12 @@ from scipy import linalg, sparse
 from fe_models import LUMPED_TEXT, beam, read_text_model, structural_model
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import IllConditionedError, InputError
-from frf_ipz.fe import reduction
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction import reduce as reduction
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_rows, condition_number
 from frf_ipz.fe.response import model_frfs, model_poles
-from frf_ipz.fe.selection import MAX_CONDITION, choose_rows, condition_number
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 

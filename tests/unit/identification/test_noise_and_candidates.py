@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.identification.likelihood.smooth_terms import all_terms
-from frf_ipz.identification.lines.noise import misfit_variance, rough_variance
+from frf_ipz.identification.noise import misfit_variance, rough_variance
 from frf_ipz.identification.search.candidates import find_candidates
 from frf_ipz.numerics.partial_fractions import unstacked
 

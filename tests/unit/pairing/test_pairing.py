@@ -11,8 +11,8 @@ from chains import chain, label
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
-from frf_ipz.pairing.assignment import pair
 from frf_ipz.pairing.model_roots import ModelZeros, model_poles, model_zeros
+from frf_ipz.pairing.pair import pair
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.fe.options import ReduceOptions
+from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions, PinnedPole, StruckPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection

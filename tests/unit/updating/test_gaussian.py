@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from frf_ipz.updating.minimal.gaussian import draw, enough_slack, likely_scales, solve_step, unlikely
+from frf_ipz.updating.gaussian import draw, enough_slack, likely_scales, solve_step, unlikely
 from frf_ipz.updating.parameters import PriorTerm
 
 DRAWS = 40_000

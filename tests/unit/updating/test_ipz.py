@@ -8,8 +8,8 @@ import pytest
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError, NumericalError
 from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.published.step import PublishedStep, StepSettings
 from frf_ipz.updating.update import method_names, update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.paper_cases import section_4, section_5

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import sparse
 
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.numerics.pencils import damped_poles, undamped_poles
-from frf_ipz.pairing.assignment import pair
+from frf_ipz.pairing.pair import pair
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, structural_basis

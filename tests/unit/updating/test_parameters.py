@@ -10,8 +10,8 @@ from chains import chain
 from fe_models import beam
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import ShapeError
-from frf_ipz.fe.options import ReduceOptions
-from frf_ipz.fe.reduction import reduce_model
+from frf_ipz.fe.reduction.options import ReduceOptions
+from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import (
     FREE_STD,

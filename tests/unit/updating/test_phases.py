@@ -7,8 +7,8 @@ import pytest
 
 from frf_ipz.progress import silent
 from frf_ipz.updating.methods import minimal_change
-from frf_ipz.updating.minimal.gauss_newton import iterate
-from frf_ipz.updating.minimal.modal_frame import frame_of, modal_frame
+from frf_ipz.updating.minimal_change.gauss_newton import iterate
+from frf_ipz.updating.minimal_change.modal_frame import frame_of, modal_frame
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, structural_basis
 from frf_ipz.updating.problem import make_problem

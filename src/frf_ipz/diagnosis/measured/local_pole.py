@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, IntArray
-from frf_ipz.numerics.column_scaling import even, solve_columns
+from frf_ipz.numerics.least_squares import even, solve_columns
 
 WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 ROUNDS = 4  # of weights

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Linearised
-from frf_ipz.numerics.column_scaling import solve_columns
+from frf_ipz.numerics.least_squares import solve_columns
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

@@ -21,7 +21,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.forces import CUT_OFF, cut_off, isolate_pulse
 from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
-from frf_ipz.numerics.column_scaling import solve_columns
+from frf_ipz.numerics.least_squares import solve_columns
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord

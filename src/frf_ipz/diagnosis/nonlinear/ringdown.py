@@ -21,7 +21,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
-from frf_ipz.numerics.column_scaling import even, solve_columns
+from frf_ipz.numerics.least_squares import even, solve_columns
 
 WINDOWS_APART = 0.5  # of a window: from one to the next
 STEPS = 12

@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.interpolation import kink_at, slope_row
+from frf_ipz.fe.beam_models import kink_at, slope_row
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel

@@ -28,9 +28,9 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.diagnosis.physics.layout import extents, kink_beside, motion_row, shift_rows
-from frf_ipz.fe.beams.beam_options import BeamFile
-from frf_ipz.fe.beams.variants import with_formulation
+from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.eigen import solve_basis
+from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions

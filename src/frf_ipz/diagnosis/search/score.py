@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
-from frf_ipz.numerics.regularised_cholesky import factor_with_prior
+from frf_ipz.numerics.least_squares import factor_with_prior
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray

@@ -19,46 +19,9 @@ from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+    from frf_ipz.identification.measured_lines import Weighted
 
 WORST_PIVOT = 1e-6  # of a unit column: below, the normal equations lose too many digits and QR is taken
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Weighted:
-    """FRFs and weights in the form in which they are fitted.
-
-    Parameters
-    ----------
-    s : (n_lines,) complex array
-        rad/s.
-    receptance : (n_lines, n_frfs) complex array
-        FRFs as receptances, m/N.
-    profile : (n_lines,) array
-        Weight of a line that all FRFs share.
-    gain : (n_frfs,) array
-        Weight of an FRF: one over the standard deviation of each part of its noise is profile times gain, N/m.
-    full : (n_lines, n_frfs) array or None
-        Weights where profile times gain is not good enough.
-    real_modes : bool
-        Residues of receptances are imaginary, as those of normal modes.
-    """
-
-    s: ComplexArray
-    receptance: ComplexArray
-    profile: FloatArray
-    gain: FloatArray
-    full: FloatArray | None = None
-    real_modes: bool = False
-
-    @property
-    def is_shared(self) -> bool:
-        """One basis serves all FRFs."""
-        return self.full is None
-
-    @property
-    def weight(self) -> FloatArray:
-        """Weight of each line and FRF, (n_lines, n_frfs) array."""
-        return self.profile[:, None] * self.gain if self.full is None else self.full
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

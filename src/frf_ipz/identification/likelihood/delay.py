@@ -15,8 +15,8 @@ from frf_ipz.identification.likelihood.compression import model_columns
 from frf_ipz.numerics.partial_fractions import stacked
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.likelihood.compression import Weighted
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+    from frf_ipz.identification.measured_lines import Weighted
 
 EARLIEST, LATEST = -1.0, 3.0  # periods of the highest frequency
 STEPS = 81

@@ -16,7 +16,8 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, Weighted, compress
+from frf_ipz.identification.likelihood.compression import Compressed, compress
+from frf_ipz.identification.measured_lines import Weighted
 from frf_ipz.rational import damping_ratio
 
 if TYPE_CHECKING:

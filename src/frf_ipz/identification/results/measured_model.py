@@ -6,35 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.identification.likelihood.covariance import FitErrors
 from frf_ipz.rational import PoleResidueModel
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.compression import Compressed
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-
-
-def mode_order(poles: ComplexArray, band_rad_s: tuple[float, float]) -> tuple[IntArray, int]:
-    """Order poles: modes of the band by frequency, then what lies beside it.
-
-    Parameters
-    ----------
-    poles : (n_poles,) complex array
-        rad/s.
-    band_rad_s : pair of float
-        The fitted band.
-
-    Returns
-    -------
-    order : (n_poles,) int array
-        Places in the order wanted.
-    n_modes : int
-        How many lie in the band.
-    """
-    modulus = np.abs(poles)
-    inside: BoolArray = (modulus >= band_rad_s[0]) & (modulus <= band_rad_s[1])
-    return np.lexsort((modulus, ~inside)), int(np.count_nonzero(inside))
 
 
 def measured_model(

@@ -13,7 +13,7 @@ from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.identification.search.judgement import Judgement
+    from frf_ipz.identification.search.goodness_of_fit import Judgement
 
 BANDS = 8  # of the misfit table, as wide as one another
 GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the damping

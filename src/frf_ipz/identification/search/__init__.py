@@ -1,1 +1,1 @@
-"""Which modes there are: found where the misfit has peaks, dropped where they are not significant."""
+"""Which modes there are: added at peaks of the misfit, dropped where not significant, checked by halves."""

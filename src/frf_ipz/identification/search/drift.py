@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, Weighted, response
+from frf_ipz.identification.likelihood.compression import Compressed, response
 from frf_ipz.identification.likelihood.refinement import Refined, pole_jacobian, refine
+from frf_ipz.identification.measured_lines import Weighted
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms

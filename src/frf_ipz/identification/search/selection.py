@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray
-from frf_ipz.identification.likelihood.compression import Weighted
 from frf_ipz.identification.likelihood.refinement import Refined, refine
-from frf_ipz.identification.search.artefacts import find_artefacts
+from frf_ipz.identification.measured_lines import Weighted
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.judgement import Judgement, judge
+from frf_ipz.identification.search.goodness_of_fit import Judgement, judge
+from frf_ipz.identification.search.spurious_poles import find_artefacts
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:

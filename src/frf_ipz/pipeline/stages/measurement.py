@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from frf_ipz.export import run_tables as tables
-from frf_ipz.export.mode_table import mode_table
-from frf_ipz.export.tables import write_table
+from frf_ipz.export.parquet import write_table
+from frf_ipz.export.run_tables import mode_table
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs

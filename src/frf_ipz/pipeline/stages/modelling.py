@@ -13,10 +13,10 @@ from frf_ipz.diagnosis.misplacements import misplacements
 from frf_ipz.diagnosis.parameters import diagnosed_basis
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
+from frf_ipz.export.parquet import write_table
 from frf_ipz.export.state_space_files import save_reduced_model
-from frf_ipz.export.tables import write_table
-from frf_ipz.fe.reduction import reduce_model
-from frf_ipz.pairing.assignment import pair as pair_roots
+from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.pairing.pair import pair as pair_roots
 from frf_ipz.pipeline.sensors import unweighed_sensors
 from frf_ipz.pipeline.stages.mismatch import corrections, effects_of
 from frf_ipz.updating.parameters import structural_basis

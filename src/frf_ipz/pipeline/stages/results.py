@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.export import run_tables as tables
-from frf_ipz.export.design_files import save_ensemble, save_weights
+from frf_ipz.export.parquet import write_table
 from frf_ipz.export.state_space import to_ensemble, to_state_space
-from frf_ipz.export.state_space_files import save_state_space
-from frf_ipz.export.tables import write_table
+from frf_ipz.export.state_space_files import save_ensemble, save_state_space, save_weights
 from frf_ipz.export.uncertainty import uncertainty_weights
 from frf_ipz.frf import FrfSet
 from frf_ipz.pipeline.stages.delays import known_delays

@@ -17,12 +17,12 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.updating.along_structure import part_table
-from frf_ipz.updating.minimal.damping import DampingPhase, damping_phase
-from frf_ipz.updating.minimal.ensemble import Posterior, draw_ensemble
-from frf_ipz.updating.minimal.gauss_newton import PhaseResult, iterate
-from frf_ipz.updating.minimal.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
-from frf_ipz.updating.minimal.outliers import contradicted, unmet_targets
-from frf_ipz.updating.minimal.stiffness import StiffnessPhase, log_moduli
+from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
+from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
+from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
+from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
+from frf_ipz.updating.minimal_change.outliers import contradicted, unmet_targets
+from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
 from frf_ipz.updating.tracking import TrackedRoots, WantedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.fe.beams.beam_options import BeamFile
-from frf_ipz.fe.beams.variants import with_formulation
+from frf_ipz.fe.beam_models import with_formulation
+from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext

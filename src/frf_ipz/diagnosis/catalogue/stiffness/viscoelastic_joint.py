@@ -11,7 +11,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
 from frf_ipz.diagnosis.physics.change import Attachment, Change
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.beam_options import BeamFile
+from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext

@@ -12,8 +12,8 @@ from scipy import linalg
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
 from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.fe.beams.beam_options import BeamFile
-from frf_ipz.fe.beams.variants import geometric_stiffness
+from frf_ipz.fe.beam_models import geometric_stiffness
+from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext

@@ -12,7 +12,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, grid
 from frf_ipz.diagnosis.physics.change import Change
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beams.beam_options import BeamFile
+from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext

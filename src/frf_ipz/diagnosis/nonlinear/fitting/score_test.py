@@ -17,7 +17,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, nominal_values, respond
-from frf_ipz.numerics.regularised_cholesky import factor_with_prior
+from frf_ipz.numerics.least_squares import factor_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

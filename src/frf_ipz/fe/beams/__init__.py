@@ -1,1 +1,0 @@
-"""Straight beams: elements, fields between the nodes, and other versions of a beam."""

@@ -1,0 +1,138 @@
+"""What a reduction is asked for: by the test, and by the options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.fe.reduction.options import ReduceOptions
+    from frf_ipz.structure import StructuralModel
+
+
+MOST_DAMPED = 12  # DOFs with dampers: more are damping of the structure, not single dampers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReductionPlan:
+    """What is wanted, and what the user has fixed; all DOFs are unsigned and free in the model.
+
+    Parameters
+    ----------
+    wanted : tuple of Dof
+        Actuators, sensors and points of interest, each once.
+    residual : tuple of Dof
+        DOFs whose residual flexibility joins the basis.
+    residual_is_given : bool
+        True where the user named them.
+    dofs : tuple of Dof
+        DOFs to retain; empty where they are to be chosen.
+    modes : int, optional
+        Modes to keep, where the user says so.
+    """
+
+    wanted: tuple[Dof, ...]
+    residual: tuple[Dof, ...]
+    residual_is_given: bool
+    dofs: tuple[Dof, ...]
+    modes: int | None
+
+
+def plan_reduction(
+    model: StructuralModel,
+    options: ReduceOptions,
+    *,
+    actuators: Sequence[Dof],
+    sensors: Sequence[Dof],
+    points: Sequence[Dof],
+) -> ReductionPlan:
+    """Bring test and options together, and see that they fit the model and each other.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    options : ReduceOptions
+        What the user has fixed.
+    actuators, sensors, points : sequence of Dof
+        DOFs of the test and points of interest; signs are ignored.
+
+    Returns
+    -------
+    ReductionPlan
+        What is to be done.
+
+    Raises
+    ------
+    InputError
+        If the model lacks a DOF or holds it, one is named twice, or the numbers do not fit.
+    """
+    loaded, read = unsigned(actuators), unsigned([*sensors, *points])
+    given = options.residual_flexibility
+    fewer = min((side for side in (loaded, read) if side), key=len, default=())
+    plan = ReductionPlan(
+        wanted=unsigned([*actuators, *sensors, *points]),
+        residual=_parsed(given, "residual_flexibility") if given is not None else unsigned([*fewer, *_damped(model)]),
+        residual_is_given=given is not None,
+        dofs=_parsed(options.dofs, "dofs"),
+        modes=options.modes,
+    )
+    for dof in (*plan.wanted, *plan.residual, *plan.dofs):
+        model.index(dof)
+    _require_counts(plan, model)
+    return plan
+
+
+def _damped(model: StructuralModel) -> tuple[Dof, ...]:
+    """DOFs on which dampers act: their forces bend the shapes, and undamped modes alone do not follow."""
+    on = np.flatnonzero(model.damping.diagonal())
+    return tuple(model.dofs[row] for row in on.tolist()) if len(on) <= MOST_DAMPED else ()
+
+
+def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:
+    """Take each DOF once, in the positive direction.
+
+    Parameters
+    ----------
+    dofs : sequence of Dof
+        DOFs with signs.
+
+    Returns
+    -------
+    tuple of Dof
+        In the order of their first appearance.
+    """
+    return tuple(dict.fromkeys(dof.unsigned for dof in dofs))
+
+
+def _parsed(labels: Sequence[str], key: str) -> tuple[Dof, ...]:
+    dofs = tuple(parse_dof(label).unsigned for label in labels)
+    for place, dof in enumerate(dofs):
+        if dof in dofs[:place]:
+            raise InputError(f"[reduce] {key} names the DOF {dof.name} twice; each one counts once")
+    return dofs
+
+
+def _require_counts(plan: ReductionPlan, model: StructuralModel) -> None:
+    order = int(np.count_nonzero(~model.fixed))
+    if plan.modes is not None and not 1 <= plan.modes <= order:
+        raise InputError(f"[reduce] modes is {plan.modes}; the model '{model.name}' has {order} free DOFs")
+    if not plan.dofs:
+        return
+    if plan.modes is not None and plan.residual_is_given and len(plan.dofs) != plan.modes + len(plan.residual):
+        raise InputError(
+            f"[reduce] dofs names {len(plan.dofs)} DOFs, but {plan.modes} modes and {len(plan.residual)} residual "
+            f"vectors need {plan.modes + len(plan.residual)}; change one of the three, or leave dofs out"
+        )
+    if len(plan.dofs) <= len(plan.residual):
+        raise InputError(
+            f"[reduce] dofs names {len(plan.dofs)} DOFs, which leaves no mode beside {len(plan.residual)} residual "
+            "vectors; name more, or leave dofs out"
+        )

@@ -1,0 +1,84 @@
+"""How much larger errors of poles are where the misfit is not white: lines, and FRFs, that err alike.
+
+The covariance of an optimum is ``I^-1 B I^-1`` with the information I and the covariance B of the score, which is
+``I`` itself for white noise [Huber1967]. B is found from the score of each line, summed over the FRFs: a structure
+whose frequencies waver moves all FRFs at once. Scores of neighbouring lines are added with falling weights
+[Newey1987], and each line's misfit is raised by what its own coefficients have taken from it.
+
+[Huber1967] P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley
+Symposium on Mathematical Statistics and Probability 1, 1967, 221-233.
+[Newey1987] W. K. Newey, K. D. West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent
+covariance matrix, Econometrica 55, 1987, 703-708, doi:10.2307/1913610.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.identification.likelihood.compression import model_columns, response
+from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.numerics.partial_fractions import stacked
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.likelihood.refinement import Refined
+    from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+
+NEIGHBOURS = (0, 2)  # lines on either side whose scores count as alike; the larger result is taken
+MOST_LEVERAGE = 0.95  # of a line that the coefficients follow nearly by themselves
+
+
+def levels_of_poles(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray:
+    """Find the factor on the variance of each pole that the misfit shows.
+
+    Parameters
+    ----------
+    data : Weighted
+        Lines and weights.
+    fit : Refined
+        The fit.
+    terms : SmoothTerms
+        What lies out of band.
+
+    Returns
+    -------
+    (2 n_poles,) array
+        For all real parts, then all imaginary parts; about 1 where the misfit is white noise of the stated size.
+    """
+    scores = _scores(data, fit, terms)
+    inverse = np.linalg.pinv(fit.information, hermitian=True)
+    expected = np.diag(inverse)
+    found = [np.einsum("ij,jk,ki->i", inverse, _covariance(scores, reach), inverse) for reach in NEIGHBOURS]
+    return np.asarray(np.max(found, axis=0) / expected)
+
+
+def _covariance(scores: FloatArray, reach: int) -> FloatArray:
+    total = scores.T @ scores
+    for lag in range(1, reach + 1):
+        shifted = scores[lag:].T @ scores[:-lag]
+        total += (1 - lag / (reach + 1)) * (shifted + shifted.T)
+    return np.asarray(total)
+
+
+def _scores(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray:
+    """Gradient of the log likelihood by the poles on each line, (n_lines, 2 n_poles), all FRFs together."""
+    system = fit.system
+    n_lines, n_poles = len(data.s), system.n_poles
+    columns = model_columns(data.s, fit.poles, terms, real_modes=system.real_modes, with_slopes=True)
+    misfit = stacked((data.receptance - response(system, terms, data.s)) * data.weight)
+    residues = system.scaled_residues()
+    scores = np.zeros((n_lines, 2 * n_poles))
+    for number, weight in enumerate([data.profile] if data.is_shared else data.weight.T):
+        frfs = np.arange(len(residues)) if data.is_shared else np.array([number])
+        weighted = columns * np.tile(weight, 2)[:, None]
+        basis = np.linalg.qr(weighted[:, : system.n_linear])[0]
+        slopes = weighted[:, system.n_linear :]
+        real, imag = np.split(slopes - basis @ (basis.T @ slopes), 2, axis=1)
+        leverage = np.minimum(np.einsum("ij,ij->i", basis, basis), MOST_LEVERAGE)
+        raised = misfit[:, frfs] / np.sqrt(1 - leverage)[:, None]
+        a, b = raised @ residues[frfs].real, raised @ residues[frfs].imag
+        by_poles = np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
+        scores += by_poles[:n_lines] + by_poles[n_lines:]
+    return scores

@@ -1,1 +1,0 @@
-"""The measured lines as the fitter sees them: receptances, their noise, their weights."""

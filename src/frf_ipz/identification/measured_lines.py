@@ -1,0 +1,212 @@
+"""The lines and FRFs that are fitted, as receptances, with the variance of their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.errors import InputError
+from frf_ipz.identification.noise import misfit_variance, rough_variance
+
+if TYPE_CHECKING:
+    from frf_ipz.frf import FrfSet
+    from frf_ipz.identification.options import FitOptions
+
+LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line tells nothing of the structure
+LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
+MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: few structures are linear to less
+FEWEST_LINES = 16  # what the fit of a single mode needs
+SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
+SHARED_SPREAD = 0.15  # rms relative deviation of weights from profile times gain that costs less than 3 % of efficiency
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Weighted:
+    """FRFs and weights in the form in which they are fitted.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        rad/s.
+    receptance : (n_lines, n_frfs) complex array
+        FRFs as receptances, m/N.
+    profile : (n_lines,) array
+        Weight of a line that all FRFs share.
+    gain : (n_frfs,) array
+        Weight of an FRF: one over the standard deviation of each part of its noise is profile times gain, N/m.
+    full : (n_lines, n_frfs) array or None
+        Weights where profile times gain is not good enough.
+    real_modes : bool
+        Residues of receptances are imaginary, as those of normal modes.
+    """
+
+    s: ComplexArray
+    receptance: ComplexArray
+    profile: FloatArray
+    gain: FloatArray
+    full: FloatArray | None = None
+    real_modes: bool = False
+
+    @property
+    def is_shared(self) -> bool:
+        """One basis serves all FRFs."""
+        return self.full is None
+
+    @property
+    def weight(self) -> FloatArray:
+        """Weight of each line and FRF, (n_lines, n_frfs) array."""
+        return self.profile[:, None] * self.gain if self.full is None else self.full
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredLines:
+    """What is fitted.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Lines of the band that are used, Hz.
+    s : (n_lines,) complex array
+        Where the FRFs were measured, rad/s.
+    receptance : (n_lines, n_frfs) complex array
+        The FRFs over s to the power of their quantity.
+    variance : (n_lines, n_frfs) array
+        E of the squared modulus of their error, as far as it is noise.
+    known : (n_frfs,) bool array
+        True where the variance comes with the recordings.
+    used : (n_all_lines,) bool array
+        Which lines of the FrfSet these are.
+    powers : (n_frfs,) int array
+        Power of s that makes each FRF out of a receptance.
+    """
+
+    frequency_hz: FloatArray
+    s: ComplexArray
+    receptance: ComplexArray
+    variance: FloatArray
+    known: BoolArray
+    used: BoolArray
+    powers: IntArray
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest line, Hz."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
+
+    @property
+    def line_hz(self) -> float:
+        """Distance of lines, Hz."""
+        return float(np.median(np.diff(self.frequency_hz)))
+
+    def weighted(self, *, shared: bool = False) -> Weighted:
+        """Weigh each line by one over the standard deviation of each part of its noise.
+
+        Returns
+        -------
+        Weighted
+            With a profile that all FRFs share, where that is good enough.
+        """
+        log_weight = -0.5 * np.log(self.variance / 2)
+        gain = log_weight.mean(axis=0)
+        profile = (log_weight - gain).mean(axis=1)
+        spread = log_weight - gain - profile[:, None]
+        full = np.exp(log_weight) if not shared and np.sqrt(np.mean(spread**2)) > SHARED_SPREAD else None
+        return Weighted(s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full)
+
+
+def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
+    """Choose the lines to fit, and find the noise of FRFs whose variance is not known.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Measured FRFs.
+    options : FitOptions
+        Band and stretches to leave out.
+
+    Returns
+    -------
+    MeasuredLines
+        What is fitted.
+
+    Raises
+    ------
+    InputError
+        If too few lines are left.
+    """
+    known = np.asarray(np.isfinite(frfs.variance).any(axis=0), bool)
+    usable = _usable(frfs, known)
+    noise = np.where(known, frfs.variance, np.nan)
+    if not known.all():
+        noise[:, ~known] = rough_variance(frfs.values[:, ~known])
+    band = options.band_hz or _signal_band(frfs, noise, usable)
+    independent = np.arange(frfs.n_lines) % frfs.correlated_lines == 0
+    used = usable & independent & frfs.in_band(band, options.exclude_hz)
+    if used.sum() < FEWEST_LINES:
+        raise InputError(
+            f"only {int(used.sum())} usable frequency lines are left in the band {band[0]:g} to {band[1]:g} Hz; "
+            f"a fit needs {FEWEST_LINES}: set a wider [fit] band_hz or a finer frequency resolution"
+        )
+    lines = frfs.lines(used)
+    powers = np.array([label.quantity.power for label in frfs.labels])
+    if not known.all():  # once more in the band alone: what lies outside may be of another size
+        noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])
+    variance = noise[used] + (np.where(known, LEAST_NOISE, MODEL_ERROR) * np.abs(lines.values)) ** 2
+    variance = np.maximum(variance, np.finfo(float).tiny * 1e40)
+    to_receptance = lines.s[:, None] ** powers
+    return MeasuredLines(
+        frequency_hz=lines.frequency_hz,
+        s=lines.s,
+        receptance=lines.values / to_receptance,
+        variance=variance / np.abs(to_receptance) ** 2,
+        known=known,
+        used=used,
+        powers=powers,
+    )
+
+
+def with_noise_of(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLines:
+    """Take the noise of FRFs whose variance is not known from what a model leaves of them.
+
+    Parameters
+    ----------
+    lines : MeasuredLines
+        What is fitted.
+    misfit : (n_lines, n_frfs) complex array
+        Measured minus model, as receptances.
+
+    Returns
+    -------
+    MeasuredLines
+        With a better variance: peaks that a model follows are no noise.
+    """
+    if lines.known.all():
+        return lines
+    variance = lines.variance.copy()
+    floor = (MODEL_ERROR * np.abs(lines.receptance)) ** 2
+    variance[:, ~lines.known] = (misfit_variance(misfit, np.abs(lines.receptance)) + floor)[:, ~lines.known]
+    return replace(lines, variance=variance)
+
+
+def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
+    usable = frfs.s != 0
+    usable &= (np.isfinite(frfs.variance) | ~known).all(axis=1)
+    coherent = np.isfinite(frfs.coherence)
+    if coherent.any():
+        usable &= ~(np.nanmedian(np.where(coherent, frfs.coherence, 1.0), axis=1) < LEAST_COHERENCE)
+    return np.asarray(usable)
+
+
+def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
+    """Find the lines that carry signal, for a user who has said nothing."""
+    told = np.isfinite(noise) & (noise > 0)
+    ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=told)
+    strong = usable & (np.median(ratio, axis=1) > SIGNAL**2)
+    if not strong.any():
+        raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")
+    share = np.cumsum(strong) / strong.sum()
+    first, last = np.searchsorted(share, [1e-9, 1 - 1e-9])
+    return float(frfs.frequency_hz[first]), float(frfs.frequency_hz[min(last, frfs.n_lines - 1)])

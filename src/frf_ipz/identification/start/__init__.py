@@ -1,1 +1,0 @@
-"""First poles, from a stabilisation diagram."""

@@ -1,0 +1,116 @@
+"""The published iteration on parameters that a diagnosis has chosen: eqs. (6) to (20) without substructures.
+
+With parameters of both matrices at once nothing is put back (steps 2j to 2l), and all FRFs count in every step.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import linear_sum_assignment
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.numerics.pencils import Roots, damped_sensitivity
+from frf_ipz.updating.ipz.step import ILL_CONDITIONED
+from frf_ipz.updating.tracking import WantedRoots
+from frf_ipz.updating.updated_model import UpdateStatus
+
+if TYPE_CHECKING:
+    from frf_ipz.updating.parameters import ParameterBasis
+    from frf_ipz.updating.problem import UpdateProblem
+
+DEAF = 1e-12  # of the largest sensitivity: a parameter below moves no target
+
+
+def iterate_parameters(
+    problem: UpdateProblem, basis: ParameterBasis, *, alpha: float, beta: float, delta: float, max_iterations: int
+) -> tuple[FloatArray, ComplexArray, UpdateStatus, pd.DataFrame]:
+    """Bring poles and zeros to their targets by some parameters.
+
+    Parameters
+    ----------
+    problem : UpdateProblem
+        Model and targets.
+    basis : ParameterBasis
+        The parameters.
+    alpha, beta, delta : float
+        Regularisation, step and stop.
+    max_iterations : int
+        Stop after that many.
+
+    Returns
+    -------
+    theta : (p,) array
+        Parameters.
+    roots : (n,) complex array
+        Poles and zeros reached, rad/s.
+    status : UpdateStatus
+        How it ended.
+    history : DataFrame
+        One row an iteration.
+    """
+    theta = np.zeros(len(basis.names))
+    wanted = WantedRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
+    values, previous, rows = problem.computed, np.inf, []
+    status = UpdateStatus.MAX_ITERATIONS
+    for iteration in range(1, max_iterations + 1):
+        values, slopes = _roots_and_slopes(problem, basis, wanted, theta, values)
+        weights = np.abs(values).max() / np.abs(values)
+        error = (problem.values - values) * weights
+        misfit = float(np.sum(np.abs(error) ** 2))
+        change = beta * _solve(slopes * weights[:, None], error, alpha)
+        size = float(np.linalg.norm(change))
+        rows.append({"iteration": iteration, "misfit": misfit, "step": size, **_named(basis, theta)})
+        if abs(misfit - previous) <= delta:
+            status = UpdateStatus.CONVERGED
+            break
+        if not np.isfinite(misfit):
+            status = UpdateStatus.DIVERGED
+            break
+        previous, theta = misfit, theta + change
+    return theta, values, status, pd.DataFrame(rows)
+
+
+def _roots_and_slopes(
+    problem: UpdateProblem, basis: ParameterBasis, wanted: WantedRoots, theta: FloatArray, near: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    amounts, moves = basis.amounts(theta), basis.slopes(theta)
+    model = problem.model
+    everything = wanted.damped(
+        model.mass + np.tensordot(amounts, basis.mass, 1),
+        model.damping + np.tensordot(amounts, basis.damping, 1),
+        model.stiffness + np.tensordot(amounts, basis.stiffness, 1),
+    )
+    values, slopes = np.zeros(len(near), complex), np.zeros((len(near), len(theta)), complex)
+    for number, found in everything.items():
+        places = np.flatnonzero(wanted.frf == number)
+        roots = _nearest(found, near[places])
+        values[places] = roots.values
+        moved = damped_sensitivity(roots, mass=basis.mass, damping=basis.damping, stiffness=basis.stiffness)
+        slopes[places] = moved * moves
+    return values, slopes
+
+
+def _nearest(roots: Roots, near: ComplexArray) -> Roots:
+    upper = roots.take(np.flatnonzero(roots.values.imag > 0))
+    _, chosen = linear_sum_assignment(np.abs(near[:, None] - upper.values) / np.abs(near)[:, None])
+    return upper.take(chosen)
+
+
+def _solve(slopes: ComplexArray, error: ComplexArray, alpha: float) -> FloatArray:
+    """Eq. (18), with the rule for alpha of step 2g."""
+    stacked = np.vstack([slopes.real, slopes.imag])
+    heard: BoolArray = np.linalg.norm(stacked, axis=0) > DEAF * np.linalg.norm(stacked)
+    normal = stacked[:, heard].T @ stacked[:, heard]
+    if np.linalg.cond(normal) >= ILL_CONDITIONED:
+        diagonal = np.diagonal(normal).copy()
+        normal[np.diag_indices_from(normal)] += alpha**2 * diagonal.mean() / (1 / diagonal).mean() / diagonal
+    change = np.zeros(len(heard))
+    change[heard] = np.linalg.lstsq(normal, stacked[:, heard].T @ np.concatenate([error.real, error.imag]))[0]
+    return change
+
+
+def _named(basis: ParameterBasis, theta: FloatArray) -> dict[str, float]:
+    return dict(zip(basis.names, theta.tolist(), strict=True))

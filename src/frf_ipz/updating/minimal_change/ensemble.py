@@ -1,0 +1,112 @@
+"""Models drawn from what targets and prior leave open: the null space of an update, and the noise of its targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.updating.gaussian import draw
+from frf_ipz.updating.minimal_change.damping import DampingPhase
+from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
+from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
+from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
+from frf_ipz.updating.parameters import unwhiten
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Posterior:
+    """Both phases of an update and where they ended.
+
+    Parameters
+    ----------
+    frame : ModalFrame
+        Coordinates of the stiffness phase.
+    stiffness : StiffnessPhase
+        With its targets and noise.
+    stiffness_result : PhaseResult
+        Where it ended.
+    inner : ModalFrame
+        Coordinates of the damping phase: modes of the model with updated stiffness, inside `frame`.
+    damping : DampingPhase
+        With its targets and noise.
+    damping_result : PhaseResult
+        Where it ended.
+    """
+
+    frame: ModalFrame
+    stiffness: StiffnessPhase
+    stiffness_result: PhaseResult
+    inner: ModalFrame
+    damping: DampingPhase
+    damping_result: PhaseResult
+
+    def model(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Give mass, damping and stiffness of the updated model, each (r, r)."""
+        mass, stiffness = self.stiffness.matrices(self.stiffness_result.theta)
+        damping = self.inner.outside(self.damping.damping(self.damping_result.theta))
+        return self.frame.outside(mass), self.frame.outside(damping), self.frame.outside(stiffness)
+
+
+def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+    """Draw models.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Both phases of an update.
+    rng : Generator
+        Source of randomness.
+    count : int
+        How many.
+
+    Returns
+    -------
+    members : (count, 3, r, r) array
+        Mass, damping and stiffness of each.
+    theta : (count, p) array
+        Parameters of their stiffness and mass.
+    """
+    theta, mass, stiffness = _draw_stiffness(posterior, rng, count)
+    damping = _draw_damping(posterior, rng, count)
+    frame = posterior.frame
+    return np.stack([frame.outside(mass), frame.outside(damping), frame.outside(stiffness)], axis=1), theta
+
+
+def _draw_stiffness(
+    posterior: Posterior, rng: np.random.Generator, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    phase, result = posterior.stiffness, posterior.stiffness_result
+    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    theta = unwhiten(phase.terms, result.scales[:-1], whitened)
+    mass, stiffness = phase.matrices(theta)
+    # what the linear step promised for the poles is imposed: far from the mean, second-order terms would blur them
+    poles = np.flatnonzero(phase.wanted.frf < 0)
+    promised = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
+    wanted = np.exp(2 * promised[:, poles])
+    shapes = next((roots.right.real for _, roots in result.tracked.groups if len(poles)), None)
+    return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, wanted)
+
+
+def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Give the modes that are most like some shapes the squared frequencies wanted; negative ones become 0."""
+    lower = np.linalg.inv(np.linalg.cholesky(mass))
+    values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
+    values = np.maximum(values, 0.0)
+    sides = mass @ (lower.swapaxes(1, 2) @ vectors)
+    likeness = (shapes.T @ sides) ** 2
+    for member in range(len(values)):
+        rows, columns = linear_sum_assignment(-likeness[member])
+        values[member, columns] = wanted[member, rows]
+    return np.asarray((sides * values[:, None, :]) @ sides.swapaxes(1, 2))
+
+
+def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
+    phase, result = posterior.damping, posterior.damping_result
+    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
+    values, vectors = np.linalg.eigh(members)
+    members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    return posterior.inner.outside(members)

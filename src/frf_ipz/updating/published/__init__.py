@@ -1,1 +1,0 @@
-"""The published iteration of [Dorosti2018], doi:10.1016/j.conengprac.2017.11.002."""

@@ -1,0 +1,63 @@
+"""Parquet tables carry unit and meaning of every column."""
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+
+from frf_ipz.dofs import Dof
+from frf_ipz.export.parquet import Column, make_table, repeated, write_table
+from frf_ipz.export.run_tables import frame_table, frf_table
+from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.quantities import FrfQuantity
+
+CONTRACT = ["frequency_hz", "output_dof", "input_dof", "quantity", "real", "imag", "coherence", "variance", "averages"]
+
+
+def frfs():
+    labels = tuple(FrfLabel(Dof(node, "z", -1), Dof(5, "z"), FrfQuantity.ACCELERANCE) for node in (1, 2))
+    return FrfSet(
+        frequency_hz=np.array([1.0, 2.0, 3.0]),
+        values=np.array([[1 + 1j, 2], [3, 4], [5, 6 - 1j]]),
+        labels=labels,
+        variance=np.full((3, 2), np.nan),
+        coherence=np.array([[1.0, np.nan]] * 3),
+        averages=np.array([4, 1]),
+    )
+
+
+def test_the_frf_table_is_that_of_the_contract(tmp_path):
+    write_table(frf_table(frfs()), tmp_path / "frf.parquet")
+    table = pd.read_parquet(tmp_path / "frf.parquet")
+    assert list(table.columns) == CONTRACT
+    row = table[(table.output_dof == "2:-z") & (table.frequency_hz == 3.0)].iloc[0]
+    assert (row.real, row.imag, row.averages, row.quantity, row.input_dof) == (6.0, -1.0, 1, "accelerance", "5:+z")
+
+
+def test_what_is_unknown_is_null_not_nan():
+    table = frf_table(frfs())
+    assert table["variance"].null_count == 6
+    assert table["coherence"].null_count == 3
+
+
+def test_every_column_says_its_unit_and_meaning(tmp_path):
+    write_table(frf_table(frfs()), tmp_path / "frf.parquet")
+    schema = pq.read_schema(tmp_path / "frf.parquet")
+    assert schema.field("frequency_hz").metadata[b"unit"] == b"Hz"
+    assert all(schema.field(name).metadata[b"meaning"] for name in CONTRACT)
+
+
+def test_columns_of_a_frame_find_their_kind():
+    frame = pd.DataFrame({"order": [1], "hz": [2.5], "name": ["a"], "taken": [True]})
+    table = frame_table(frame, {"hz": Column("hz", "float", "Hz", "frequency")}, meaning="of a pole")
+    assert [str(field.type) for field in table.schema] == ["int64", "double", "string", "bool"]
+    assert table.schema.field("hz").metadata[b"unit"] == b"Hz"
+
+
+def test_none_is_null_in_every_kind():
+    columns = [Column("number", "int", "", "n"), Column("text", "text", "", "t"), Column("ratio", "float", "1", "r")]
+    table = make_table(columns, {"number": [1, None], "text": ["a", None], "ratio": [np.nan, 1.0]})
+    assert [table[name].null_count for name in ("number", "text", "ratio")] == [1, 1, 1]
+
+
+def test_repeated_texts_stand_in_order():
+    assert repeated(["b", "a"], 2).to_pylist() == ["b", "b", "a", "a"]

@@ -1,0 +1,55 @@
+"""FRFs of an ensemble, all at once, against those of each member."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chains import chain, label
+from frf_ipz.fe.response import model_frfs
+from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.prediction.ensemble import Members
+
+S = 2j * np.pi * np.linspace(2.0, 100.0, 30)
+SAME = 1e-8  # relative to the peak: modes and matrices solve one problem in two ways
+
+
+def members(models):
+    ensemble = np.array([(model.mass, model.damping, model.stiffness) for model in models])
+    return Members(ensemble=ensemble, lowest_rad_s=float(np.abs(S).min()))
+
+
+@pytest.mark.parametrize("damping", [0.001, 0.3], ids=["light", "heavy"])
+def test_receptances_are_those_of_the_matrices(damping):
+    models = [chain(seed=seed, damping=damping, between=True) for seed in range(4)]
+    one = label(99, 3)
+    output, force = models[0].row(one.output_dof), models[0].row(one.input_dof)
+    found = members(models).receptance(output, force, S)
+    for member, model in zip(found, models, strict=True):
+        expected = model_frfs(model, [one], S)[:, 0]
+        assert np.abs(member - expected).max() < SAME * np.abs(expected).max()
+
+
+def test_a_body_that_is_free_to_fly_has_no_division_by_zero():
+    model = chain(free=True)
+    one = label(1, 5)
+    found = members([model]).receptance(model.row(one.output_dof), model.row(one.input_dof), S)[0]
+    expected = model_frfs(model, [one], S)[:, 0]
+    assert_allclose(found, expected, rtol=1e-4)  # its rigid-body mode is given a thousandth of the lowest frequency
+
+
+def test_amplitudes_are_products_of_mass_normalised_shapes():
+    model = chain()
+    one = label(2, -4)
+    found = members([model]).amplitudes(model.row(one.output_dof), model.row(one.input_dof), 3)
+    shapes = undamped_poles(model.mass, model.stiffness).right.real
+    assert found.shape == (1, 3)
+    assert_allclose(found[0], -shapes[1, :3] * shapes[3, :3], rtol=1e-9)
+
+
+def test_a_negative_stiffness_counts_as_none():
+    model = chain()
+    soft = replace(model, stiffness=model.stiffness - 3e4 * np.eye(5))
+    assert undamped_poles(soft.mass, soft.stiffness).values.real.min() < 0
+    assert members([soft]).modes[0].min() > 0
