@@ -42,7 +42,7 @@ def test_init_groups_blows_by_the_name_of_their_files(campaign):
         (campaign / "hits" / f"blow_{number + 1}.csv").rename(campaign / "hits" / f"{name}.csv")
     write_starting_files(campaign)
     test = read_test(campaign / "test.toml")
-    assert {str(run.input_dof): len(run.files) for run in test.runs} == {"180:+z": 1, "18:+z": 2}
+    assert {str(setup.input_dof): len(setup.files) for setup in test.setups} == {"180:+z": 1, "18:+z": 2}
 
 
 def test_init_of_frfs_writes_a_test_of_their_kind(tmp_path):

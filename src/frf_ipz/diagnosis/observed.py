@@ -68,7 +68,7 @@ def _record(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
         step_s=record.step_s,
         force=record.force,
         responses=record.responses[rows],
-        rested=record.rested,
+        rested=record.starts_at_rest,
         recording=record.recording,
         number=record.number,
         start_s=record.start_s,

@@ -96,7 +96,7 @@ class VibrationTest:
         ``none``, ``common`` or ``per_channel``.
     channels : tuple of Channel
         The input first; none of kind ``frf``.
-    runs : tuple of TestSetup
+    setups : tuple of TestSetup
         One a struck DOF and layout of sensors; none of kind ``frf``.
     frf_sources : tuple of FrfSource
         Files with FRFs, of kind ``frf``.
@@ -110,7 +110,7 @@ class VibrationTest:
     nominal_damping_ratio: float | None
     unknown_scale: str
     channels: tuple[Channel, ...]
-    runs: tuple[TestSetup, ...]
+    setups: tuple[TestSetup, ...]
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
 
@@ -137,7 +137,7 @@ class VibrationTest:
     @property
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
-        recordings = [file for run in self.runs for file in run.files]
+        recordings = [file for setup in self.setups for file in setup.files]
         return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources)]))
 
     @cached_property
@@ -147,7 +147,7 @@ class VibrationTest:
         A sensor that moves from hit to hit counts at each node with the share of recordings during which it sat there:
         to first order in the mass, that is the structure whose FRFs are the mean over all recordings.
         """
-        return self._masses(self.runs)
+        return self._masses(self.setups)
 
     def masses_with(self, label: FrfLabel) -> dict[int, float]:
         """Give the known masses of the sensors while one FRF was measured.
@@ -162,16 +162,16 @@ class VibrationTest:
         dict of int to float
             Node and mass, kg.
         """
-        return self._masses([run for run in self.runs if label in setup_labels(self.channels, run)])
+        return self._masses([setup for setup in self.setups if label in setup_labels(self.channels, setup)])
 
-    def _masses(self, runs: Iterable[TestSetup]) -> dict[int, float]:
-        runs = list(runs)
-        n_files = sum(len(run.files) for run in runs)
+    def _masses(self, setups: Iterable[TestSetup]) -> dict[int, float]:
+        setups = list(setups)
+        n_files = sum(len(setup.files) for setup in setups)
         masses: Counter[int] = Counter()
-        for run in runs:
-            for channel, dof in zip(self.output_channels, run.output_dofs, strict=True):
+        for setup in setups:
+            for channel, dof in zip(self.output_channels, setup.output_dofs, strict=True):
                 if channel.mass_kg:
-                    masses[dof.node] += channel.mass_kg * len(run.files) / n_files  # type: ignore[assignment] # kg, no count
+                    masses[dof.node] += channel.mass_kg * len(setup.files) / n_files  # type: ignore[assignment] # kg, no count
         return dict(masses)
 
 
@@ -200,11 +200,13 @@ def read_test(path: Path) -> VibrationTest:
     _check_sections(path, keys)
     channels = _read_channels(path, keys)
     entries = keys.hit or keys.record
-    runs = tuple(_read_run(path, entry, channels, f"[[{ENTRIES[keys.test.kind]}]] {entry.dof}") for entry in entries)
-    _check_units(path, channels, runs)
-    _check_files_once(path, runs)
+    setups = tuple(
+        _read_setup(path, entry, channels, f"[[{ENTRIES[keys.test.kind]}]] {entry.dof}") for entry in entries
+    )
+    _check_units(path, channels, setups)
+    _check_files_once(path, setups)
     sources = tuple(_read_source(path, entry) for entry in keys.frf)
-    labels = [label for run in runs for label in setup_labels(channels, run)]
+    labels = [label for setup in setups for label in setup_labels(channels, setup)]
     labels += [label for source in sources for label in _labels_of_source(source)]
     return VibrationTest(
         path=path,
@@ -213,20 +215,20 @@ def read_test(path: Path) -> VibrationTest:
         nominal_damping_ratio=keys.test.nominal_damping_ratio,
         unknown_scale=keys.test.unknown_scale,
         channels=channels,
-        runs=runs,
+        setups=setups,
         frf_sources=sources,
         labels=tuple(dict.fromkeys(labels)),
     )
 
 
-def setup_labels(channels: tuple[Channel, ...], run: TestSetup) -> tuple[FrfLabel, ...]:
+def setup_labels(channels: tuple[Channel, ...], setup: TestSetup) -> tuple[FrfLabel, ...]:
     """Name the FRFs that a run gives.
 
     Parameters
     ----------
     channels : tuple of Channel
         The input first.
-    run : TestSetup
+    setup : TestSetup
         The run.
 
     Returns
@@ -235,8 +237,8 @@ def setup_labels(channels: tuple[Channel, ...], run: TestSetup) -> tuple[FrfLabe
         One an output channel, in their order.
     """
     return tuple(
-        FrfLabel(dof, run.input_dof, frf_quantity_of(channel.quantity), channel.column, channels[0].column)
-        for channel, dof in zip(channels[1:], run.output_dofs, strict=True)
+        FrfLabel(dof, setup.input_dof, frf_quantity_of(channel.quantity), channel.column, channels[0].column)
+        for channel, dof in zip(channels[1:], setup.output_dofs, strict=True)
     )
 
 
@@ -320,10 +322,10 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
     )
 
 
-def _check_units(path: Path, channels: tuple[Channel, ...], runs: tuple[TestSetup, ...]) -> None:
+def _check_units(path: Path, channels: tuple[Channel, ...], setups: tuple[TestSetup, ...]) -> None:
     """Refuse units that cannot be right before anything is read; a moment or a rotation has its own."""
-    for run in runs:
-        for channel, dof in zip(channels, (run.input_dof, *run.output_dofs), strict=True):
+    for setup in setups:
+        for channel, dof in zip(channels, (setup.input_dof, *setup.output_dofs), strict=True):
             if not channel.unit and not channel.sensitivity:
                 continue
             convert = sensitivity_factor if channel.sensitivity else unit_factor
@@ -333,7 +335,7 @@ def _check_units(path: Path, channels: tuple[Channel, ...], runs: tuple[TestSetu
                 raise QuantityError(f"{path}, [[channel]] '{channel.column}' at {dof}: {error}") from None
 
 
-def _read_run(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], where: str) -> TestSetup:
+def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], where: str) -> TestSetup:
     outputs = {channel.column: channel.dof for channel in channels[1:]}
     for column, text in keys.output_dofs.items():
         if column not in outputs:
@@ -365,13 +367,13 @@ def _check_places(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...
             raise FileFormatError(path, f"{problem}; correct a 'dof', or take one channel out", where=where)
 
 
-def _check_files_once(path: Path, runs: tuple[TestSetup, ...]) -> None:
+def _check_files_once(path: Path, setups: tuple[TestSetup, ...]) -> None:
     owners: dict[Path, TestSetup] = {}
-    for run in runs:
-        for file in run.files:
-            other = owners.setdefault(file, run)
-            if other is not run:
-                problem = f"{file.name} belongs to the entries of {other.input_dof} and of {run.input_dof}"
+    for setup in setups:
+        for file in setup.files:
+            other = owners.setdefault(file, setup)
+            if other is not setup:
+                problem = f"{file.name} belongs to the entries of {other.input_dof} and of {setup.input_dof}"
                 raise FileFormatError(path, f"{problem}; a recording has one place of the force")
 
 

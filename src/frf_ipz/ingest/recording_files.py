@@ -43,12 +43,12 @@ class RecordingFiles:
     _kept: dict[Path, FloatArray] = field(default_factory=dict)
     _bytes: int = 0
 
-    def blocks(self, run: TestSetup, path: Path) -> Iterator[FloatArray]:
+    def blocks(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         """Give a recording block by block.
 
         Parameters
         ----------
-        run : TestSetup
+        setup : TestSetup
             The run that the file belongs to.
         path : Path
             The file.
@@ -69,7 +69,7 @@ class RecordingFiles:
             yield self._kept[path]
             return
         kept: list[FloatArray] = []
-        for block in self._read(run, path):
+        for block in self._read(setup, path):
             if self._bytes + sum(part.nbytes for part in kept) + block.nbytes <= BUDGET:
                 kept.append(block)
             else:
@@ -80,12 +80,12 @@ class RecordingFiles:
             self._kept[path] = np.concatenate(kept)
             self._bytes += self._kept[path].nbytes
 
-    def stretches(self, run: TestSetup, path: Path, bounds: Sequence[tuple[int, int]]) -> Iterator[FloatArray]:
+    def stretches(self, setup: TestSetup, path: Path, bounds: Sequence[tuple[int, int]]) -> Iterator[FloatArray]:
         """Give stretches of a recording.
 
         Parameters
         ----------
-        run : TestSetup
+        setup : TestSetup
             The run that the file belongs to.
         path : Path
             The file.
@@ -100,7 +100,7 @@ class RecordingFiles:
         wanted = list(bounds)
         parts: list[FloatArray] = []
         done = 0
-        for block in self.blocks(run, path):
+        for block in self.blocks(setup, path):
             while wanted and done < wanted[0][1]:
                 start, stop = wanted[0]
                 parts.append(block[max(start - done, 0) : max(stop - done, 0)])
@@ -111,10 +111,10 @@ class RecordingFiles:
                 parts = []
             done += len(block)
 
-    def _read(self, run: TestSetup, path: Path) -> Iterator[FloatArray]:
+    def _read(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         channels = self.test.channels
         recording = open_recording(path, [channel.column for channel in channels])
-        dofs = (run.input_dof, *run.output_dofs)
+        dofs = (setup.input_dof, *setup.output_dofs)
         factors = [_time_factor(recording)]
         factors += [
             _factor(path, channel, dof, stated)

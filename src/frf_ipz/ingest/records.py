@@ -50,9 +50,9 @@ class Record:
         SI, constant parts taken off where they are significant; the signs are those of the recording.
     trigger : int
         Sample at which the force sets in; 0 for records.
-    kept_force : pair of int
+    force_interval : pair of int
         First sample of the force that is its pulse, and the one after the last; outside there is only noise.
-    rested : bool
+    starts_at_rest : bool
         The structure was at rest at the first sample.
     recording : str
         What it was cut from.
@@ -72,8 +72,8 @@ class Record:
     force: FloatArray
     responses: FloatArray
     trigger: int
-    kept_force: tuple[int, int]
-    rested: bool
+    force_interval: tuple[int, int]
+    starts_at_rest: bool
     recording: str
     number: int
     start_s: float
@@ -107,7 +107,7 @@ class Record:
         signals = np.zeros((1 + len(self.responses), n_samples))
         signals[0, : self.n_samples] = self.force
         signals[1:, : self.n_samples] = self.responses
-        signals[0] *= force_window(n_samples, *self.kept_force)
+        signals[0] *= force_window(n_samples, *self.force_interval)
         if decay_1_s:
             signals *= exponential_window(n_samples, self.step_s, decay_1_s, self.trigger)
         return signals
@@ -180,26 +180,26 @@ def read_records(
     for _, group in groupby(wanted, key=lambda record: record.path):
         records = list(group)
         stretches = files.stretches(
-            records[0].run, records[0].path, [(record.start, record.stop) for record in records]
+            records[0].setup, records[0].path, [(record.start, record.stop) for record in records]
         )
         for record, signals in zip(records, stretches, strict=True):
             yield _calibrated(test, record, signals)
 
 
-def _calibrated(test: VibrationTest, facts: RecordInfo, signals: FloatArray) -> Record:
-    signals = signals[1:] - np.array(facts.offsets)[:, None]
+def _calibrated(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:
+    signals = signals[1:] - np.array(info.offsets)[:, None]
     return Record(
-        name=facts.name,
-        labels=setup_labels(test.channels, facts.run),
-        step_s=facts.step_s,
+        name=info.name,
+        labels=setup_labels(test.channels, info.setup),
+        step_s=info.step_s,
         force=signals[0],
         responses=signals[1:],
-        trigger=facts.trigger,
-        kept_force=facts.kept_force,
-        rested=facts.rested,
-        recording=str(facts.path),
-        number=facts.number,
-        start_s=facts.start * facts.step_s,
-        marks=facts.marks,
-        used=facts.used,
+        trigger=info.trigger,
+        force_interval=info.force_interval,
+        starts_at_rest=info.starts_at_rest,
+        recording=str(info.path),
+        number=info.number,
+        start_s=info.start * info.step_s,
+        marks=info.marks,
+        used=info.used,
     )

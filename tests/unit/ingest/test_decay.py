@@ -20,29 +20,29 @@ def ringing(frequency_hz, left, amplitude=1.0):
 def test_what_is_left_of_a_mode(left, noise):
     response = ringing(211.3, left) + noise * np.random.default_rng(1).standard_normal(N_SAMPLES)
     decay = measure_decay(response, STEP_S, 2)
-    assert decay.left == pytest.approx(left, rel=0.05)
+    assert decay.remaining_amplitude == pytest.approx(left, rel=0.05)
     assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
 
 
 def test_the_slowest_of_several_modes_counts():
     response = ringing(90.0, 5e-3, 10.0) + ringing(211.3, 0.02) + ringing(700.0, 1e-3)
     decay = measure_decay(response, STEP_S, 2)
-    assert decay.left == pytest.approx(0.02, rel=0.05)
+    assert decay.remaining_amplitude == pytest.approx(0.02, rel=0.05)
     assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
 
 
 def test_modes_below_the_noise_and_noise_alone_do_not_ring():
     rng = np.random.default_rng(2)
-    assert measure_decay(rng.standard_normal(N_SAMPLES), STEP_S, 2).left == 0.0
+    assert measure_decay(rng.standard_normal(N_SAMPLES), STEP_S, 2).remaining_amplitude == 0.0
     response = ringing(211.3, 1e-12) + 1e-3 * rng.standard_normal(N_SAMPLES)
-    assert measure_decay(response, STEP_S, 2).left == 0.0
+    assert measure_decay(response, STEP_S, 2).remaining_amplitude == 0.0
 
 
 def test_hum_does_not_ring_down():
     response = ringing(211.3, 1e-4) + ringing(150.0, 0.95, 0.05)
-    assert measure_decay(response, STEP_S, 2).left < 1e-3
+    assert measure_decay(response, STEP_S, 2).remaining_amplitude < 1e-3
     mode = ringing(211.3, 1e-4) + ringing(163.0, 0.95, 0.05)
-    assert measure_decay(mode, STEP_S, 2).left > 0.5
+    assert measure_decay(mode, STEP_S, 2).remaining_amplitude > 0.5
 
 
 def test_the_noise_is_measured_under_a_ringing_response():
@@ -54,7 +54,7 @@ def test_a_slow_mode_that_is_small_as_an_acceleration_counts_by_its_velocity():
     response = ringing(900.0, 1e-3, 1.0) + ringing(12.0, 0.2, 1e-3)
     assert measure_decay(response, STEP_S, 2).frequency_hz == pytest.approx(12.0, abs=1.0)
     weak = ringing(900.0, 1e-6, 1.0) + ringing(12.0, 0.2, 6e-6)
-    assert measure_decay(weak, STEP_S, 2).left < 0.1
+    assert measure_decay(weak, STEP_S, 2).remaining_amplitude < 0.1
 
 
 def test_the_noise_power_follows_its_colour():
@@ -67,7 +67,7 @@ def test_the_noise_power_follows_its_colour():
 
 
 def test_signals_that_are_too_short_tell_nothing():
-    assert measure_decay(np.ones(100), STEP_S, 2).left == 0.0
+    assert measure_decay(np.ones(100), STEP_S, 2).remaining_amplitude == 0.0
     assert np.isnan(noise_power(np.ones(100), STEP_S, np.array([1.0]))).all()
 
 

@@ -52,7 +52,7 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     result = estimate(path)
     truncated = estimate(path, exponential_window_s=0.0)
     left = np.exp(-0.0006 * 2 * np.pi * 31.0 * (4096 / 2048 - 0.03))
-    assert result.records.left_at_end.max() == pytest.approx(left, rel=0.05)
+    assert result.records.remaining_amplitude.max() == pytest.approx(left, rel=0.05)
     assert result.records.marks.str.contains("cut-off decay").all()
     assert result.records.used.all()
     assert errors(truncated, RINGING).max() > 0.5

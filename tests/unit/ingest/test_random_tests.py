@@ -175,7 +175,7 @@ def test_segments_that_cannot_be_are_refused(tmp_path, segment_s):
 def test_records_can_be_read_whole(tmp_path):
     signals = from_rest(np.random.default_rng(9), 8192)
     (record,) = read_records(read_test(write(tmp_path, [signals])), IngestOptions())
-    assert record.rested
+    assert record.starts_at_rest
     np.testing.assert_allclose(record.force, signals[0], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(record.responses, signals[1:], rtol=1e-12, atol=1e-12)
 

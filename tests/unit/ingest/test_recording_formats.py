@@ -17,7 +17,7 @@ DIGITS = 1e-14  # relative: the numbers are written with all of their digits
 
 def read(path, **of_test):
     test = read_test(write_test(path.parent.parent, HIT, **of_test))
-    blocks = list(RecordingFiles(test=test).blocks(test.runs[0], path))
+    blocks = list(RecordingFiles(test=test).blocks(test.setups[0], path))
     return np.concatenate(blocks)
 
 
@@ -90,7 +90,7 @@ def test_encodings(tmp_path, encoding):
     test_path = write_test(tmp_path, HIT)
     test_path.write_text(test_path.read_text(encoding="utf-8").replace("acc_1", "Stoß"), encoding="utf-8")
     test = read_test(test_path)
-    expect(np.concatenate(list(RecordingFiles(test=test).blocks(test.runs[0], path))))
+    expect(np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path))))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
@@ -116,7 +116,7 @@ def read_without_units(path):
     text = test_path.read_text(encoding="utf-8")
     test_path.write_text(text.replace('unit = "m/s^2"\n', "").replace('unit = "N"\n', ""), encoding="utf-8")
     test = read_test(test_path)
-    return np.concatenate(list(RecordingFiles(test=test).blocks(test.runs[0], path)))
+    return np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path)))
 
 
 def test_numbers_without_a_header_have_columns_1_2_3(tmp_path):
@@ -151,7 +151,7 @@ def test_stretches_across_blocks_are_whole(tmp_path):
     path = write_csv(tmp_path / "hits" / "1.csv", signals, STEP_S)
     test = read_test(write_test(tmp_path, HIT))
     bounds = [(5, 20), (40_000, 140_000), (140_000, 140_001), (149_990, 150_000)]
-    pieces = list(RecordingFiles(test=test).stretches(test.runs[0], path, bounds))
+    pieces = list(RecordingFiles(test=test).stretches(test.setups[0], path, bounds))
     for (start, stop), piece in zip(bounds, pieces, strict=True):
         np.testing.assert_allclose(piece[1:], signals[:, start:stop], rtol=DIGITS)
 
@@ -162,7 +162,7 @@ def test_files_are_read_anew_beyond_the_budget(tmp_path, monkeypatch):
     files = RecordingFiles(test=test)
     for _ in range(2):
         for path in test.files:
-            expect(np.concatenate(list(files.blocks(test.runs[0], path))))
+            expect(np.concatenate(list(files.blocks(test.setups[0], path))))
     assert len(files._kept) == 2
 
 

@@ -53,7 +53,7 @@ def test_a_test_without_a_name_is_called_after_its_folder(tmp_path):
 
 def test_a_roving_sensor_gives_its_own_labels(roving):
     test = read_test(roving)
-    assert [str(label) for label in setup_labels(test.channels, test.runs[1])] == ["1:+z / 7:+z", "5:-y / 7:+z"]
+    assert [str(label) for label in setup_labels(test.channels, test.setups[1])] == ["1:+z / 7:+z", "5:-y / 7:+z"]
     assert [str(label) for label in test.labels] == ["1:+z / 7:+z", "2:+z / 7:+z", "5:-y / 7:+z"]
     assert test.labels[2].sign == -1
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.ingest.signals.transients import without_transients
+from frf_ipz.ingest.signals.transients import transform_without_transients
 from synthetic_campaign import Structure, respond
 
 STEP_S = 1 / 1024
@@ -23,7 +23,7 @@ def running(n_samples, seed=3):
 def test_the_frf_remains_on_lines_and_between_them(n_samples, between):
     force, responses = running(n_samples)
     lines = np.arange(30, 730)
-    F, X = without_transients(force, responses, lines, between=between)
+    F, X = transform_without_transients(force, responses, lines, between=between)
     truth = LIGHT.accelerance(2j * np.pi * (lines + between) / (n_samples * STEP_S)).T
     wrong = np.abs(X - truth * F) / np.abs(truth * F).max(axis=1, keepdims=True)
     assert wrong.max() < 3e-3
@@ -40,21 +40,21 @@ def test_without_taking_them_off_the_frf_is_far_away():
 
 def test_all_lines_are_given_where_none_are_named():
     force, responses = running(3000)
-    F, X = without_transients(force, responses)
+    F, X = transform_without_transients(force, responses)
     assert F.shape == (1501,)
-    chosen, moved = without_transients(force, responses, np.arange(100, 200))
+    chosen, moved = transform_without_transients(force, responses, np.arange(100, 200))
     np.testing.assert_allclose(F[100:200], chosen, rtol=1e-12)
     np.testing.assert_allclose(X[:, 100:200], moved, rtol=1e-9, atol=1e-9 * np.abs(moved).max())
 
 
 def test_a_force_that_is_nowhere_gives_nothing_to_fail_on():
-    F, X = without_transients(np.zeros(512), np.zeros((2, 512)))
+    F, X = transform_without_transients(np.zeros(512), np.zeros((2, 512)))
     assert not F.any()
     assert not X.any()
 
 
 def test_too_few_samples_are_transformed_as_they_are():
     force, responses = np.random.default_rng(1).standard_normal(16), np.ones((1, 16))
-    F, X = without_transients(force, responses)
+    F, X = transform_without_transients(force, responses)
     np.testing.assert_allclose(F, np.fft.rfft(force), atol=1e-12)
     np.testing.assert_allclose(X, np.fft.rfft(responses), atol=1e-12)

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.signals.transients import pieces_without_transients
+from frf_ipz.ingest.signals.transients import transform_subrecords
 
 MOST_LINES = 2**16  # in the band
 FINEST = 8  # lines for one of the record: off the axis 5 miss 3 % of a peak a quarter of a line wide, these 0.7 %
@@ -121,7 +121,7 @@ def _comb(
     places = {(label.output_channel, label.output_dof, label.input_dof): place for place, label in enumerate(labels)}
     for record in observations.records:
         columns = [places[sensor.channel, sensor.dof, record.input_dof] for sensor in record.sensors]
-        for F, X in pieces_without_transients(record.force, record.responses, length, lines, between=between):
+        for F, X in transform_subrecords(record.force, record.responses, length, lines, between=between):
             n_pieces[columns] += 1
             force[:, columns] += (np.abs(F) ** 2)[:, None]
             cross[:, columns] += (F.conj() * X).T

@@ -18,7 +18,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.signals.transients import pieces_without_transients
+from frf_ipz.ingest.signals.transients import transform_subrecords
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -167,7 +167,7 @@ def _decaying(record: ObservedRecord, n: int, decay_1_s: float) -> ComplexArray:
 
 def _going_on(record: ObservedRecord, n: int) -> ComplexArray:
     """Transform pieces without what goes on at their ends, (n_pieces, 1 + n_sensors, n_lines)."""
-    pieces = pieces_without_transients(record.force, record.responses, n)
+    pieces = transform_subrecords(record.force, record.responses, n)
     return np.stack([np.vstack(piece) for piece in pieces]) * record.step_s
 
 

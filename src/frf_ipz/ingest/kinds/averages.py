@@ -73,8 +73,8 @@ def assemble_frfs(
         In the order of the test's labels.
     """
     estimates: dict[FrfLabel, _Estimate] = {}
-    for runs, labels in _sharing(test).items():
-        pooled = _pool(test, [averages[run] for run in runs], runs, labels)
+    for setups, labels in _sharing(test).items():
+        pooled = _pool(test, [averages[setup] for setup in setups], setups, labels)
         estimates |= _estimate(pooled, labels, options.estimator)
     ordered = [estimates[label] for label in test.labels]
     duration = survey.n_samples * survey.step_s
@@ -105,7 +105,7 @@ def about_variance(averages: Mapping[TestSetup, SetupAverage]) -> tuple[str, ...
     tuple of str
         Warnings.
     """
-    single = [str(run.input_dof) for run, average in averages.items() if average.sums.count == 1]
+    single = [str(setup.input_dof) for setup, average in averages.items() if average.sums.count == 1]
     if not single:
         return ()
     known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
@@ -117,15 +117,15 @@ def _sharing(test: VibrationTest) -> dict[tuple[TestSetup, ...], list[FrfLabel]]
     """Group the labels by the runs that measured them."""
     groups: dict[tuple[TestSetup, ...], list[FrfLabel]] = {}
     for label in test.labels:
-        runs = tuple(run for run in test.runs if label in setup_labels(test.channels, run))
-        groups.setdefault(runs, []).append(label)
+        setups = tuple(setup for setup in test.setups if label in setup_labels(test.channels, setup))
+        groups.setdefault(setups, []).append(label)
     return groups
 
 
 def _pool(
-    test: VibrationTest, averages: Sequence[SetupAverage], runs: Sequence[TestSetup], labels: Sequence[FrfLabel]
+    test: VibrationTest, averages: Sequence[SetupAverage], setups: Sequence[TestSetup], labels: Sequence[FrfLabel]
 ) -> SetupAverage:
-    places = [[setup_labels(test.channels, run).index(label) for label in labels] for run in runs]
+    places = [[setup_labels(test.channels, setup).index(label) for label in labels] for setup in setups]
     first = averages[0]
     if len(averages) == 1:
         rows = places[0]

@@ -59,14 +59,14 @@ def average_recordings(
     files = RecordingFiles(test=test)
     survey = survey_records(files, options, lambda fraction, text: progress(SURVEYED * fraction, text))
     n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
-    averages = {run: SetupAverage(empty_sums(n_lines, n_outputs)) for run in test.runs}
+    averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs)) for setup in test.setups}
     energies: list[float] = []
     traces: tuple[Trace, ...] = ()
     records = read_records(test, options, survey=survey, files=files, used_only=False)
-    for done, (facts, record) in enumerate(zip(survey.records, records, strict=True)):
+    for done, (info, record) in enumerate(zip(survey.records, records, strict=True)):
         progress(SURVEYED + (1.0 - SURVEYED) * done / len(survey.records), f"averaging {record.name}")
-        traces = record_traces(facts, record, traces)
-        energies.append(add(averages[facts.run], record, survey) if record.used else 0.0)
+        traces = record_traces(info, record, traces)
+        energies.append(add(averages[info.setup], record, survey) if record.used else 0.0)
     return FrfEstimate(
         frfs=assemble_frfs(test, survey, averages, options),
         records=record_table(survey, energies),

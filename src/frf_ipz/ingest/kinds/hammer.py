@@ -58,7 +58,7 @@ def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
 def _measure_noise(average: SetupAverage, record: Record, survey: Survey) -> None:
     frequency = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
     decay = exponential_window(record.n_samples, record.step_s, survey.decay_1_s, record.trigger)
-    kept = decay * force_window(record.n_samples, *record.kept_force)
+    kept = decay * force_window(record.n_samples, *record.force_interval)
     responses = [noise_power(response[record.trigger :], record.step_s, frequency) for response in record.responses]
     average.response_noise = np.array(responses) * np.sum(decay**2)
     average.force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency) * np.sum(kept**2)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.kinds.averaging import average_recordings
-from frf_ipz.ingest.signals.transients import pieces_without_transients
+from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.survey.random import independent_segments, segments_of
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
 
 
 def _add_pieces(average: SetupAverage, record: Record, length: int) -> float:
-    for force, responses in pieces_without_transients(record.force, record.responses, length):
+    for force, responses in transform_subrecords(record.force, record.responses, length):
         average.sums.add_spectra(force, responses)
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 

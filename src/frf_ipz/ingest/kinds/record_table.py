@@ -19,9 +19,9 @@ COLUMNS = (
     "used",
     "weight",
     "marks",
-    "second_pulse",
-    "left_at_end",
-    "left_at_hz",
+    "second_pulse_ratio",
+    "remaining_amplitude",
+    "slowest_mode_hz",
     "snr_db",
     "force_noise_N",
     "step_s",
@@ -48,9 +48,9 @@ def record_table(survey: Survey, energies: Sequence[float]) -> pd.DataFrame:
     """
     totals: dict[object, float] = {}
     for record, energy in zip(survey.records, energies, strict=True):
-        totals[record.run] = totals.get(record.run, 0.0) + energy
+        totals[record.setup] = totals.get(record.setup, 0.0) + energy
     rows = [
-        _row(record, energy / totals[record.run] if totals[record.run] else 0.0)
+        _row(record, energy / totals[record.setup] if totals[record.setup] else 0.0)
         for record, energy in zip(survey.records, energies, strict=True)
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
@@ -70,15 +70,15 @@ def empty_record_table() -> pd.DataFrame:
 def _row(record: RecordInfo, weight: float) -> tuple[object, ...]:
     return (
         record.name,
-        str(record.run.input_dof),
+        str(record.setup.input_dof),
         record.peak_force,
         record.pulse_s,
         record.used,
         weight,
         "; ".join(record.marks),
-        record.second_pulse,
-        record.left,
-        record.left_hz,
+        record.second_pulse_ratio,
+        record.remaining_amplitude,
+        record.slowest_mode_hz,
         record.snr_db,
         record.force_noise,
         record.step_s,

@@ -22,12 +22,12 @@ MOST_FORCES = 400
 MOST_RESPONSES = 16
 
 
-def record_traces(facts: RecordInfo, record: Record, drawn: tuple[Trace, ...]) -> tuple[Trace, ...]:
+def record_traces(info: RecordInfo, record: Record, drawn: tuple[Trace, ...]) -> tuple[Trace, ...]:
     """Add what is drawn of one blow or record.
 
     Parameters
     ----------
-    facts : RecordInfo
+    info : RecordInfo
         Where its pulse is.
     record : Record
         Its signals.
@@ -42,7 +42,7 @@ def record_traces(facts: RecordInfo, record: Record, drawn: tuple[Trace, ...]) -
     new: list[Trace] = []
     forces = sum(trace.unit.startswith("N") for trace in drawn)
     if forces < MOST_FORCES:
-        start, stop = facts.pulse
+        start, stop = info.pulse
         margin = int(MARGIN * (stop - start))
         new.append(
             _trace(

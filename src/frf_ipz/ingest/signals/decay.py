@@ -29,7 +29,7 @@ class Decay:
 
     Parameters
     ----------
-    left : float
+    remaining_amplitude : float
         Share of its amplitude that the slowest mode still has at the end; 0 where nothing rings above the noise.
     frequency_hz : float
         Of that mode, Hz; 0 where there is none.
@@ -37,7 +37,7 @@ class Decay:
         Standard deviation of the noise.
     """
 
-    left: float
+    remaining_amplitude: float
     frequency_hz: float
     noise: float
 
@@ -61,17 +61,21 @@ def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
     """
     half = len(response) // 2
     if half < 2 * FEWEST_LINES:
-        return Decay(left=0.0, frequency_hz=0.0, noise=0.0)
+        return Decay(remaining_amplitude=0.0, frequency_hz=0.0, noise=0.0)
     frequency, first, last = _halves(response, half, step_s)
     floor = _floor(last)
     noise = float(np.sqrt(np.mean(floor) / np.sum(np.hanning(half) ** 2)))
     early = maximum_filter1d(first, 5)
     rings = (last == maximum_filter1d(last, 7)) & (last > DISTINCT * floor) & (frequency > 2.5 / (half * step_s))
     rings &= (last < early) & _is_notable(early, frequency, power)
-    left = np.where(rings, last / np.maximum(early, np.finfo(float).tiny), 0.0)
-    left[_is_hum(frequency, left)] = 0.0
-    slowest = int(np.argmax(left))
-    return Decay(left=float(left[slowest]), frequency_hz=float(frequency[slowest] * (left[slowest] > 0)), noise=noise)
+    ratio = np.where(rings, last / np.maximum(early, np.finfo(float).tiny), 0.0)
+    ratio[_is_hum(frequency, ratio)] = 0.0
+    slowest = int(np.argmax(ratio))
+    return Decay(
+        remaining_amplitude=float(ratio[slowest]),
+        frequency_hz=float(frequency[slowest] * (ratio[slowest] > 0)),
+        noise=noise,
+    )
 
 
 def noise_power(signal: FloatArray, step_s: float, frequency_hz: FloatArray) -> FloatArray:
@@ -117,9 +121,9 @@ def _is_notable(power: FloatArray, frequency_hz: FloatArray, derivative: int) ->
     return np.asarray((power > NOTABLE**2 * power[3:].max()) | (velocity > NOTABLE**2 * velocity[3:].max()))
 
 
-def _is_hum(frequency_hz: FloatArray, left: FloatArray) -> BoolArray:
+def _is_hum(frequency_hz: FloatArray, ratio: FloatArray) -> BoolArray:
     """Tell which lines are multiples of the mains' frequency and do not decay."""
     spacing = frequency_hz[1]
     near = [np.abs(frequency_hz - mains * np.round(frequency_hz / mains)) < 1.5 * spacing for mains in MAINS_HZ]
     # where lines are so wide that every one is near a multiple, nothing can be said
-    return np.asarray((near[0] | near[1]) & (left > STEADY) & (12.0 * spacing < MAINS_HZ[0]))
+    return np.asarray((near[0] | near[1]) & (ratio > STEADY) & (12.0 * spacing < MAINS_HZ[0]))

@@ -37,7 +37,7 @@ _ROUGH = (_POWERS[:, :, None] * (np.eye(len(_X)) - _BASIS @ _BASIS.T)[:, None]).
 _MIDDLE = _POWERS * np.linalg.solve(_UPPER, _BASIS.T)[0][:, None]
 
 
-def without_transients(
+def transform_without_transients(
     force: FloatArray, responses: FloatArray, lines: IntArray | None = None, *, between: float = 0.0
 ) -> tuple[ComplexArray, ComplexArray]:
     """Transform a stretch of a running test, and take off what does not come from its force.
@@ -72,7 +72,7 @@ def without_transients(
     return F[wanted] * counts, (X[:, wanted] - transients) * counts
 
 
-def pieces_without_transients(
+def transform_subrecords(
     force: FloatArray, responses: FloatArray, length: int, lines: IntArray | None = None, *, between: float = 0.0
 ) -> Iterator[tuple[ComplexArray, ComplexArray]]:
     """Cut a record into pieces, one behind the other, and transform each without its transients.
@@ -86,16 +86,16 @@ def pieces_without_transients(
     length : int
         Samples of a piece; what is left at the end is not used.
     lines, between
-        As for `without_transients`.
+        As for `transform_without_transients`.
 
     Yields
     ------
     force, responses : complex arrays
-        As `without_transients` gives them.
+        As `transform_without_transients` gives them.
     """
     for start in range(0, len(force) - length + 1, length):
         piece = slice(start, start + length)
-        yield without_transients(force[piece], responses[:, piece], lines, between=between)
+        yield transform_without_transients(force[piece], responses[:, piece], lines, between=between)
 
 
 def _transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> tuple[ComplexArray, FloatArray]:

@@ -31,7 +31,7 @@ FEWEST_BEFORE = 16  # samples before the pulse that tell an offset
 
 def check_impact(
     test: VibrationTest,
-    scan: FileIndex,
+    index: FileIndex,
     name: str,
     rows: tuple[int, int],
     signals: FloatArray,
@@ -44,7 +44,7 @@ def check_impact(
     ----------
     test : VibrationTest
         Its channels.
-    scan : FileIndex
+    index : FileIndex
         Its file.
     name : str
         What it is called.
@@ -69,29 +69,29 @@ def check_impact(
     trigger = max(min(pulse.onset, *(int(bump) for bump in pulse.bumps), len(force) - 1), 0)
     if offsets is None:
         offsets = tuple(_offset(response[: max(start, 0)]) for response in responses)
-    decays = _decays(test, scan.step_s, responses - np.array(offsets)[:, None], trigger)
-    worst = max(decays, key=lambda decay: decay.left)
+    decays = _decays(test, index.step_s, responses - np.array(offsets)[:, None], trigger)
+    worst = max(decays, key=lambda decay: decay.remaining_amplitude)
     snr_db = _snr_db(responses - np.array(offsets)[:, None], trigger, decays)
     return RecordInfo(
         name=name,
-        run=scan.run,
-        path=scan.path,
+        setup=index.setup,
+        path=index.path,
         start=rows[0],
         stop=rows[1],
-        step_s=scan.step_s,
+        step_s=index.step_s,
         trigger=trigger,
         pulse=(start, stop),
-        kept_force=(0, len(force)),
+        force_interval=(0, len(force)),
         offsets=(pulse.base, *offsets),
         peak_force=pulse.height,
         digital_force=digital_step(force) > 0.0,
-        pulse_s=pulse.width * scan.step_s,
+        pulse_s=pulse.width * index.step_s,
         force_noise=pulse.noise,
-        second_pulse=float(pulse.ratios.max(initial=0.0)),
-        left=worst.left,
-        left_hz=worst.frequency_hz,
+        second_pulse_ratio=float(pulse.ratios.max(initial=0.0)),
+        remaining_amplitude=worst.remaining_amplitude,
+        slowest_mode_hz=worst.frequency_hz,
         snr_db=snr_db,
-        faults=(*_double_hit(pulse, scan.step_s), *_clipped(test, force, responses)),
+        faults=(*_double_hit(pulse, index.step_s), *_clipped(test, force, responses)),
         remarks=(
             *_cut_off(worst),
             *_weak(pulse, snr_db),
@@ -101,20 +101,22 @@ def check_impact(
     )
 
 
-def check_record(test: VibrationTest, scan: FileIndex, name: str, signals: FloatArray, *, rested: bool) -> RecordInfo:
+def check_record(
+    test: VibrationTest, index: FileIndex, name: str, signals: FloatArray, *, starts_at_rest: bool
+) -> RecordInfo:
     """Measure one record of a shaker and find what is wrong with it.
 
     Parameters
     ----------
     test : VibrationTest
         Its channels.
-    scan : FileIndex
+    index : FileIndex
         Its file.
     name : str
         What it is called.
     signals : (1 + n_channels, n_samples) array
         Time, force, responses, SI.
-    rested : bool
+    starts_at_rest : bool
         It starts from rest.
 
     Returns
@@ -128,20 +130,20 @@ def check_record(test: VibrationTest, scan: FileIndex, name: str, signals: Float
     offsets = np.where(np.abs(means) > 0.1 * spread, means, 0.0)
     return RecordInfo(
         name=name,
-        run=scan.run,
-        path=scan.path,
+        setup=index.setup,
+        path=index.path,
         start=0,
-        stop=scan.n_rows,
-        step_s=scan.step_s,
+        stop=index.n_rows,
+        step_s=index.step_s,
         trigger=0,
-        pulse=(0, scan.n_rows),
-        kept_force=(0, scan.n_rows),
+        pulse=(0, index.n_rows),
+        force_interval=(0, index.n_rows),
         offsets=tuple(float(offset) for offset in offsets),
         peak_force=float(force[np.argmax(np.abs(force))]),
         digital_force=digital_step(force) > 0.0,
         pulse_s=float("nan"),
         force_noise=float("nan"),
-        rested=rested,
+        starts_at_rest=starts_at_rest,
         faults=_clipped(test, force, responses),
         remarks=_shifted(test, signals[1:], tuple(offsets)),
     )
@@ -174,9 +176,9 @@ def _decays(test: VibrationTest, step_s: float, responses: FloatArray, trigger: 
 
 
 def _cut_off(worst: Decay) -> tuple[str, ...]:
-    if worst.left <= CUT_OFF:
+    if worst.remaining_amplitude <= CUT_OFF:
         return ()
-    return (f"cut-off decay: {100 * worst.left:.2g} % left at {worst.frequency_hz:.4g} Hz",)
+    return (f"cut-off decay: {100 * worst.remaining_amplitude:.2g} % left at {worst.frequency_hz:.4g} Hz",)
 
 
 def _snr_db(responses: FloatArray, trigger: int, decays: list[Decay]) -> float:

@@ -30,7 +30,7 @@ class FileIndex:
 
     Parameters
     ----------
-    run : TestSetup
+    setup : TestSetup
         What the file belongs to.
     path : Path
         The file.
@@ -42,7 +42,7 @@ class FileIndex:
         Row, to within a cell, at which each pulse of the force begins.
     """
 
-    run: TestSetup
+    setup: TestSetup
     path: Path
     n_rows: int
     step_s: float
@@ -79,14 +79,14 @@ class _Envelope:
         return np.asarray(np.maximum(highest - base, base - lowest))
 
 
-def index_file(files: RecordingFiles, run: TestSetup, path: Path, *, for_records: bool) -> FileIndex:
+def index_file(files: RecordingFiles, setup: TestSetup, path: Path, *, for_records: bool) -> FileIndex:
     """Look through a file.
 
     Parameters
     ----------
     files : RecordingFiles
         The recordings.
-    run : TestSetup
+    setup : TestSetup
         What the file belongs to.
     path : Path
         The file.
@@ -105,22 +105,22 @@ def index_file(files: RecordingFiles, run: TestSetup, path: Path, *, for_records
     """
     envelope = _Envelope()
     n_rows, first, last = 0, 0.0, 0.0
-    for block in files.blocks(run, path):
+    for block in files.blocks(setup, path):
         if n_rows == 0:
             first = float(block[0, 0])
         last = float(block[-1, 0])
         n_rows += len(block)
         envelope.add(block[:, 1])
     onsets = _onsets(path, files.test.input_channel.column, envelope.size()) if for_records else ()
-    return FileIndex(run=run, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
+    return FileIndex(setup=setup, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
 
 
-def split_records(scan: FileIndex, usual_length: int) -> tuple[tuple[int, int], ...]:
+def split_records(index: FileIndex, usual_length: int) -> tuple[tuple[int, int], ...]:
     """Split a file at its blows.
 
     Parameters
     ----------
-    scan : FileIndex
+    index : FileIndex
         The file.
     usual_length : int
         Rows from a pulse to the next in this test.
@@ -131,15 +131,15 @@ def split_records(scan: FileIndex, usual_length: int) -> tuple[tuple[int, int], 
         First row and row after the last of each blow. A blow begins a little before its pulse; a file with one blow
         is one piece. Pulses that follow too soon to be a new blow stay in the piece of the one before.
     """
-    apart = max(CROWDED * usual_length, BOUNCE_S / scan.step_s)
-    starts = [scan.onsets[0]]
-    for onset in scan.onsets[1:]:
+    apart = max(CROWDED * usual_length, BOUNCE_S / index.step_s)
+    starts = [index.onsets[0]]
+    for onset in index.onsets[1:]:
         if onset - starts[-1] >= apart:
             starts.append(onset)
     if len(starts) == 1:
-        return ((0, scan.n_rows),)
+        return ((0, index.n_rows),)
     lead = max(CELL, usual_length // 50)
-    bounds = [max(start - lead, 0) for start in starts] + [scan.n_rows]
+    bounds = [max(start - lead, 0) for start in starts] + [index.n_rows]
     return tuple(pairwise(bounds))
 
 

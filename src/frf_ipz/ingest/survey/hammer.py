@@ -52,11 +52,11 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
         If a file cannot be used and is not dropped, or the user's choice makes no sense.
     """
     scans = _scan(files, options, progress)
-    usual = int(np.median([scan.longest for scan in scans]))
+    usual = int(np.median([index.longest for index in scans]))
     records: list[RecordInfo] = []
-    for done, scan in enumerate(scans):
-        progress(0.5 + 0.5 * done / len(scans), f"checking {scan.path.name}")
-        records += _check_file(files, scan, usual)
+    for done, index in enumerate(scans):
+        progress(0.5 + 0.5 * done / len(scans), f"checking {index.path.name}")
+        records += _check_file(files, index, usual)
     files_named = [record_name(files.test, path, 1, 1) for path in files.test.files]
     check_names([*files_named, *(record.name for record in records if "#" in record.name)], options)
     verdict = select_records(records, options)
@@ -80,11 +80,11 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
 def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> list[FileIndex]:
     """Scan all files; one that the user drops may be anything."""
     test, scans = files.test, []
-    wanted = [(run, path) for run in test.runs for path in run.files]
-    for done, (run, path) in enumerate(wanted):
+    wanted = [(setup, path) for setup in test.setups for path in setup.files]
+    for done, (setup, path) in enumerate(wanted):
         progress(0.5 * done / len(test.files), f"reading {path.name}")
         try:
-            scans.append(index_file(files, run, path, for_records=True))
+            scans.append(index_file(files, setup, path, for_records=True))
         except InputError:
             if not is_named(record_name(test, path, 1, 1), [text for text in options.drop if "#" not in text]):
                 raise
@@ -93,18 +93,18 @@ def _scan(files: RecordingFiles, options: IngestOptions, progress: Progress) -> 
     return scans
 
 
-def _check_file(files: RecordingFiles, scan: FileIndex, usual: int) -> list[RecordInfo]:
+def _check_file(files: RecordingFiles, index: FileIndex, usual: int) -> list[RecordInfo]:
     """Check the blows of a file: its channels are as far from zero as before the first one, at rest."""
-    bounds = split_records(scan, usual)
-    stretches = files.stretches(scan.run, scan.path, bounds)
+    bounds = split_records(index, usual)
+    stretches = files.stretches(index.setup, index.path, bounds)
     records: list[RecordInfo] = []
     offsets = None
     for number, (rows, signals) in enumerate(zip(bounds, stretches, strict=True), start=1):
-        name = record_name(files.test, scan.path, number, len(bounds))
-        facts = check_impact(files.test, scan, name, rows, signals, offsets=offsets)
-        records.append(_without_long_lead(replace(facts, number=number)))
-        if facts.pulse[0] >= FEWEST_BEFORE:
-            offsets = offsets or facts.offsets[1:]
+        name = record_name(files.test, index.path, number, len(bounds))
+        info = check_impact(files.test, index, name, rows, signals, offsets=offsets)
+        records.append(_without_long_lead(replace(info, number=number)))
+        if info.pulse[0] >= FEWEST_BEFORE:
+            offsets = offsets or info.offsets[1:]
     return records
 
 
@@ -120,20 +120,20 @@ def _without_long_lead(record: RecordInfo) -> RecordInfo:
         start=record.start + cut,
         trigger=record.trigger - cut,
         pulse=(start - cut, stop - cut),
-        kept_force=(0, record.n_samples - cut),
+        force_interval=(0, record.n_samples - cut),
     )
 
 
 def _check_lengths(scans: Sequence[FileIndex], used: Sequence[RecordInfo], options: IngestOptions) -> None:
     """Refuse recordings of one blow whose lengths differ: one that was cut short would pass as a decay."""
     names = {record.path: record.name for record in used if "#" not in record.name}
-    whole = [scan for scan in scans if scan.path in names]
-    usual = int(np.median([scan.n_rows for scan in whole])) if whole else 0
-    for scan in whole:
-        if abs(scan.n_rows / usual - 1.0) > ALIKE and not is_named(names[scan.path], options.keep):
+    whole = [index for index in scans if index.path in names]
+    usual = int(np.median([index.n_rows for index in whole])) if whole else 0
+    for index in whole:
+        if abs(index.n_rows / usual - 1.0) > ALIKE and not is_named(names[index.path], options.keep):
             raise FileFormatError(
-                scan.path,
-                f"holds {scan.n_rows} samples where the others hold {usual}; export it whole, leave it out by "
+                index.path,
+                f"holds {index.n_rows} samples where the others hold {usual}; export it whole, leave it out by "
                 "[ingest] drop, or have it used as it is by [ingest] keep",
             )
 
@@ -154,13 +154,18 @@ def _decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[float, t
             return 0.0, ()
         rate = 1.0 / options.exponential_window_s
         return rate, (f"exponential window of {options.exponential_window_s:g} s on force and response, as asked for",)
-    rates = [(np.log(record.left / LEFT) / record.ringing_s, record) for record in used if record.left > CUT_OFF]
+    rates = [
+        (np.log(record.remaining_amplitude / LEFT) / record.ringing_s, record)
+        for record in used
+        if record.remaining_amplitude > CUT_OFF
+    ]
     if not rates:
         return 0.0, ()
     rate, worst = max(rates, key=lambda pair: float(pair[0]))
     text = (
-        f"exponential window of {1.0 / rate:.4g} s on force and response: without it {100 * worst.left:.2g} % of the "
-        f"mode at {worst.left_hz:.4g} Hz would be cut off at the end of {worst.name}, with it {100 * LEFT:.2g} %; "
+        f"exponential window of {1.0 / rate:.4g} s on force and response: without it "
+        f"{100 * worst.remaining_amplitude:.2g} % of the mode at {worst.slowest_mode_hz:.4g} Hz would be cut off at "
+        f"the end of {worst.name}, with it {100 * LEFT:.2g} %; "
         "the FRFs are exact at s = sigma + i omega"
     )
     return float(rate), (text,)
@@ -182,7 +187,7 @@ def _keep_force(
     gains = 2 * (lead + tail + 2 * taper_length(0, lead + tail)) < min(record.n_samples for record in used)
     if asked == 0.0 or (asked is None and (silent or not gains)):
         return tuple(records), ()
-    kept = tuple(replace(record, kept_force=_stretch(record, lead, tail)) for record in records)
+    kept = tuple(replace(record, force_interval=_stretch(record, lead, tail)) for record in records)
     why = "as asked for" if asked is not None else "the pulse and its ringing, as far as they stand out from the noise"
     text = f"force window from {1e3 * lead * step_s:.3g} ms before the blow to {1e3 * tail * step_s:.3g} ms after it: "
     return kept, (text + why,)
@@ -191,7 +196,7 @@ def _keep_force(
 def _stretch(record: RecordInfo, lead: int, tail: int) -> tuple[int, int]:
     """Take the stretch of all blows, longer only for one that hit twice and is used nevertheless."""
     stop = record.trigger + tail
-    return record.trigger - lead, max(stop, record.pulse[1]) if record.second_pulse else stop
+    return record.trigger - lead, max(stop, record.pulse[1]) if record.second_pulse_ratio else stop
 
 
 def _about_lines(decay: float) -> tuple[str, ...]:
@@ -203,11 +208,12 @@ def _about_lines(decay: float) -> tuple[str, ...]:
 
 def _about_rest(used: Sequence[RecordInfo], decay_1_s: float) -> tuple[str, ...]:
     """Warn where a window that the user chose, or ruled out, leaves more than the automatic one would."""
-    left = [(record.left * float(np.exp(-decay_1_s * record.ringing_s)), record) for record in used]
+    left = [(record.remaining_amplitude * float(np.exp(-decay_1_s * record.ringing_s)), record) for record in used]
     most, worst = max(left, key=lambda pair: pair[0])
     if most <= CUT_OFF:
         return ()
     return (
-        f"{100 * most:.2g} % of the mode at {worst.left_hz:.4g} Hz is cut off at the end of {worst.name}: FRFs are "
-        "wrong by about as much near it; leave out [ingest] exponential_window_s for a window that is strong enough",
+        f"{100 * most:.2g} % of the mode at {worst.slowest_mode_hz:.4g} Hz is cut off at the end of {worst.name}: FRFs "
+        "are wrong by about as much near it; leave out [ingest] exponential_window_s for a window that is strong "
+        "enough",
     )

@@ -63,10 +63,10 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
     """
     check_names([record_name(files.test, path, 1, 1) for path in files.test.files], options)
     records = []
-    wanted = [(run, path) for run in files.test.runs for path in run.files]
-    for done, (run, path) in enumerate(wanted):
+    wanted = [(setup, path) for setup in files.test.setups for path in setup.files]
+    for done, (setup, path) in enumerate(wanted):
         progress(0.5 * done / len(files.test.files), f"reading {path.name}")
-        records.append(_look(files, index_file(files, run, path, for_records=False)))
+        records.append(_look(files, index_file(files, setup, path, for_records=False)))
     verdict = select_records(records, options)
     survey = Survey(
         records=verdict.records, step_s=verdict.step_s, n_samples=max(record.n_samples for record in verdict.records)
@@ -115,10 +115,10 @@ def independent_segments(count: int) -> float:
     return count / (1.0 + HANN_HALF_OVERLAP * (count - 1) / count) if count else 0.0
 
 
-def _look(files: RecordingFiles, scan: FileIndex) -> RecordInfo:
-    (signals,) = files.stretches(scan.run, scan.path, [(0, scan.n_rows)])
-    name = record_name(files.test, scan.path, 1, 1)
-    return check_record(files.test, scan, name, signals, rested=_is_rested(signals[1:]))
+def _look(files: RecordingFiles, index: FileIndex) -> RecordInfo:
+    (signals,) = files.stretches(index.setup, index.path, [(0, index.n_rows)])
+    name = record_name(files.test, index.path, 1, 1)
+    return check_record(files.test, index, name, signals, starts_at_rest=_is_rested(signals[1:]))
 
 
 def _is_rested(signals: FloatArray) -> bool:
@@ -141,7 +141,7 @@ def _asked_segment(survey: Survey, segment_s: float) -> int:
 def _in_pieces(survey: Survey) -> Survey:
     """Cut records into equal pieces, as few as their length and the need of some scatter allow."""
     shortest = min(record.n_samples for record in survey.used)
-    fewest = min(Counter(record.run for record in survey.used).values())
+    fewest = min(Counter(record.setup for record in survey.used).values())
     count = max(-(-shortest // LONGEST), -(-FEWEST // fewest))
     length = max(shortest // count, min(SHORTEST, shortest))
     each = "records used whole" if length == shortest else f"pieces of {length * survey.step_s:.4g} s"
@@ -158,7 +158,7 @@ def _whole(survey: Survey, decay_1_s: float) -> Survey:
     )
     step = correlated_lines(decay_1_s * survey.n_samples * survey.step_s)
     lines = f"the window correlates the noise of neighbouring lines: one in {step} is independent"
-    restless = [record.name for record in survey.used if not record.rested]
+    restless = [record.name for record in survey.used if not record.starts_at_rest]
     warnings = [f"{name} does not start from rest: its initial motion enters the FRFs" for name in restless]
     return replace(
         survey,

@@ -16,7 +16,7 @@ class RecordInfo:
     ----------
     name : str
         Its file, relative to the test, with ``#2`` for the second blow of a file.
-    run : TestSetup
+    setup : TestSetup
         What it belongs to.
     path : Path
         Its file.
@@ -28,7 +28,7 @@ class RecordInfo:
         Sample, from `start`, at which the force sets in.
     pulse : pair of int
         First sample of its pulse, ringing and second pulses included, and the one after the last; from `start`.
-    kept_force : pair of int
+    force_interval : pair of int
         The stretch of the force that a force window leaves; the whole where there is none.
     offsets : tuple of float
         Constant part of the force and of each response that is taken off, SI.
@@ -40,15 +40,15 @@ class RecordInfo:
         Length of the pulse at half of its height, s; NaN for records.
     force_noise : float
         Standard deviation of the force outside of its pulse, N.
-    second_pulse : float
+    second_pulse_ratio : float
         Height of a second pulse over the first; 0 where there is none.
-    left : float
+    remaining_amplitude : float
         Share of the slowest mode's amplitude that is left at the end.
-    left_hz : float
+    slowest_mode_hz : float
         That mode's frequency, Hz.
     snr_db : float
         Power of the response over its noise, median of the channels, dB; NaN where the noise is not known.
-    rested : bool
+    starts_at_rest : bool
         The structure was at rest at the first sample.
     number : int
         1 for the first blow of its file: what that has left may still move the structure at the next.
@@ -61,24 +61,24 @@ class RecordInfo:
     """
 
     name: str
-    run: TestSetup
+    setup: TestSetup
     path: Path
     start: int
     stop: int
     step_s: float
     trigger: int
     pulse: tuple[int, int]
-    kept_force: tuple[int, int]
+    force_interval: tuple[int, int]
     offsets: tuple[float, ...]
     peak_force: float
     digital_force: bool
     pulse_s: float
     force_noise: float
-    second_pulse: float = 0.0
-    left: float = 0.0
-    left_hz: float = 0.0
+    second_pulse_ratio: float = 0.0
+    remaining_amplitude: float = 0.0
+    slowest_mode_hz: float = 0.0
     snr_db: float = float("nan")
-    rested: bool = True
+    starts_at_rest: bool = True
     number: int = 1
     faults: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()

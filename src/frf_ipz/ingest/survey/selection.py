@@ -140,13 +140,13 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
         for record in decided
         if not record.used and record.faults
     ]
-    for run in dict.fromkeys(record.run for record in records):
-        if not any(record.used for record in decided if record.run == run):
-            saved = _least_bad(run, decided, options, step_s)
+    for setup in dict.fromkeys(record.setup for record in records):
+        if not any(record.used for record in decided if record.setup == setup):
+            saved = _least_bad(setup, decided, options, step_s)
             decided = [replace(record, used=True) if record is saved else record for record in decided]
             warnings = [text for text in warnings if not text.startswith(f"{saved.name} is left out")]
             reason = "; ".join(saved.faults)
-            warnings.append(f"{saved.name} is used although it is bad ({reason}): no better blow at {run.input_dof}")
+            warnings.append(f"{saved.name} is used although it is bad ({reason}): no better blow at {setup.input_dof}")
     return Selection(records=tuple(decided), step_s=step_s, warnings=tuple(warnings))
 
 
@@ -189,16 +189,16 @@ def _decide(record: RecordInfo, options: IngestOptions) -> RecordInfo:
     return replace(record, used=not record.faults)
 
 
-def _least_bad(run: TestSetup, records: Sequence[RecordInfo], options: IngestOptions, step_s: float) -> RecordInfo:
-    mine = [record for record in records if record.run == run and not is_named(record.name, options.drop)]
+def _least_bad(setup: TestSetup, records: Sequence[RecordInfo], options: IngestOptions, step_s: float) -> RecordInfo:
+    mine = [record for record in records if record.setup == setup and not is_named(record.name, options.drop)]
     if not mine:
         raise InputError(
-            f"[ingest] drop leaves no blow at {run.input_dof}; keep one, or take its entry out of test.toml"
+            f"[ingest] drop leaves no blow at {setup.input_dof}; keep one, or take its entry out of test.toml"
         )
     usable = [record for record in mine if abs(record.step_s / step_s - 1.0) <= SAME_STEP]
     if not usable:
         raise InputError(
-            f"all blows at {run.input_dof} have the time step {mine[0].step_s:.6g} s, but the others of the test have "
-            f"{step_s:.6g} s; export them with one step, or make a test of their own"
+            f"all blows at {setup.input_dof} have the time step {mine[0].step_s:.6g} s, but the others of the test "
+            f"have {step_s:.6g} s; export them with one step, or make a test of their own"
         )
-    return min(usable, key=lambda record: (len(record.faults), record.second_pulse, -abs(record.peak_force)))
+    return min(usable, key=lambda record: (len(record.faults), record.second_pulse_ratio, -abs(record.peak_force)))

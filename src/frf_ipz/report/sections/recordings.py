@@ -135,7 +135,7 @@ def _table(records: pd.DataFrame) -> Table:
         "peak_force_N": ("peak force, N", number),
         "pulse_s": ("pulse, ms", lambda value: number(1e3 * value, 3)),
         "snr_db": ("signal to noise, dB", lambda value: number(value, 3)),
-        "left_at_end": ("left at the end", lambda value: percent(value, 2)),
+        "remaining_amplitude": ("left at the end", lambda value: percent(value, 2)),
         "weight": ("weight", lambda value: number(value, 3)),
         "used": ("used", lambda value: "yes" if value else "no"),
         "marks": ("what is wrong", lambda value: str(value or "")),
