@@ -12,7 +12,7 @@ from frf_ipz.ingest.records import read_records
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest import records as recorded
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
 
 

@@ -1,91 +1,31 @@
-"""A test as the user describes it in `test.toml`: channels, struck DOFs, files; checked, with paths resolved."""
+"""`test.toml`: its keys as the contract names them, read into a `VibrationTest`; checked, with paths resolved."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Literal
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign_keys import CampaignFileKeys, ChannelKeys, FrfKeys, SetupKeys
-from frf_ipz.ingest.file_patterns import expand_pattern
-from frf_ipz.ingest.formats.frf_file import FrfSource
+from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
+from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.registry import read_frfs
-from frf_ipz.ingest.units import numerator_of, sensitivity_factor, unit_factor
-from frf_ipz.quantities import FrfQuantity, frf_quantity_of
-from frf_ipz.toml_files import read_toml
+from frf_ipz.ingest.units import sensitivity_factor, unit_factor
+from frf_ipz.quantities import FrfQuantity
+from frf_ipz.toml_files import STRICT, read_toml
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-ENTRIES = {"hammer": "hit", "random": "record", "frf": "frf"}
+ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """A column of the recordings.
+class TestKeys:
+    """The section ``[test]``.
 
     Parameters
     ----------
-    column : str
-        Its header, or its number in files without one.
-    role : str
-        ``input`` or ``output``.
-    quantity : str
-        ``force``, ``acceleration``, ``velocity`` or ``displacement``.
-    unit, sensitivity : str
-        At most one is not empty; where both are, the files' row of units counts.
-    dof : Dof, optional
-        Where an output sits, unless a run says otherwise.
-    mass_kg : float
-        The sensor's own mass.
-    """
-
-    column: str
-    role: str
-    quantity: str
-    unit: str = ""
-    sensitivity: str = ""
-    dof: Dof | None = None
-    mass_kg: float = 0.0
-
-    @property
-    def column_unit(self) -> str:
-        """The unit the column is in, as far as the test says; empty where the files have to."""
-        return numerator_of(self.sensitivity) if self.sensitivity else self.unit
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TestSetup:
-    """Recordings with the force at one DOF and the sensors in one place.
-
-    Parameters
-    ----------
-    input_dof : Dof
-        Where the force acts, with its sign.
-    output_dofs : tuple of Dof
-        Where the outputs sit, in the order of the output channels.
-    files : tuple of Path
-        The recordings, sorted.
-    """
-
-    input_dof: Dof
-    output_dofs: tuple[Dof, ...]
-    files: tuple[Path, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class VibrationTest:
-    """A test: what was measured, where, and in which files.
-
-    Parameters
-    ----------
-    path : Path
-        ``test.toml``.
     name : str
         What the user calls it.
     kind : str
@@ -94,85 +34,124 @@ class VibrationTest:
         For models that state no damping.
     unknown_scale : str
         ``none``, ``common`` or ``per_channel``.
-    channels : tuple of Channel
-        The input first; none of kind ``frf``.
-    setups : tuple of TestSetup
-        One a struck DOF and layout of sensors; none of kind ``frf``.
-    frf_sources : tuple of FrfSource
-        Files with FRFs, of kind ``frf``.
-    labels : tuple of FrfLabel
-        The FRFs that the test gives, each once.
     """
 
-    path: Path
-    name: str
-    kind: str
-    nominal_damping_ratio: float | None
-    unknown_scale: str
-    channels: tuple[Channel, ...]
-    setups: tuple[TestSetup, ...]
-    frf_sources: tuple[FrfSource, ...]
-    labels: tuple[FrfLabel, ...]
+    __pydantic_config__ = STRICT
 
-    @property
-    def input_channel(self) -> Channel:
-        """The force."""
-        return self.channels[0]
+    kind: Literal["hammer", "random", "frf"]
+    name: str = ""
+    nominal_damping_ratio: float | None = None
+    unknown_scale: Literal["none", "common", "per_channel"] = "none"
 
-    @property
-    def output_channels(self) -> tuple[Channel, ...]:
-        """The responses."""
-        return self.channels[1:]
 
-    @property
-    def output_dofs(self) -> tuple[Dof, ...]:
-        """Where sensors sit in any of the FRFs, each once."""
-        return tuple(dict.fromkeys(label.output_dof for label in self.labels))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelKeys:
+    """One ``[[channel]]``.
 
-    @property
-    def input_dofs(self) -> tuple[Dof, ...]:
-        """Where forces act in any of the FRFs, each once."""
-        return tuple(dict.fromkeys(label.input_dof for label in self.labels))
+    Parameters
+    ----------
+    column : str
+        Header of its column; in files without a header its number, the time being column 1.
+    role : str
+        ``input`` or ``output``.
+    quantity : str
+        ``force``, ``acceleration``, ``velocity`` or ``displacement``.
+    unit : str, optional
+        Of the column; not needed where the files have a row of units.
+    sensitivity : str, optional
+        Instead of the unit.
+    dof : str, optional
+        Where an output sits; a ``[[hit]]`` or ``[[record]]`` may say otherwise.
+    mass_kg : float
+        The sensor's own mass.
+    """
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files of measurements, each once."""
-        recordings = [file for setup in self.setups for file in setup.files]
-        return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources)]))
+    __pydantic_config__ = STRICT
 
-    @cached_property
-    def sensor_masses(self) -> dict[int, float]:
-        """Known masses of the sensors by node, kg.
+    column: str | int
+    role: Literal["input", "output"]
+    quantity: Literal["force", "acceleration", "velocity", "displacement"]
+    unit: str | None = None
+    sensitivity: str | None = None
+    dof: str | None = None
+    mass_kg: float = 0.0
 
-        A sensor that moves from hit to hit counts at each node with the share of recordings during which it sat there:
-        to first order in the mass, that is the structure whose FRFs are the mean over all recordings.
-        """
-        return self._masses(self.setups)
 
-    def masses_with(self, label: FrfLabel) -> dict[int, float]:
-        """Give the known masses of the sensors while one FRF was measured.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetupKeys:
+    """One ``[[hit]]`` or ``[[record]]``.
 
-        Parameters
-        ----------
-        label : FrfLabel
-            One of `labels`.
+    Parameters
+    ----------
+    dof : str
+        Where the force acts.
+    files : tuple of str
+        Globs, relative to the file or absolute.
+    output_dofs : dict of str to str
+        Column of a roving sensor and where it sits in these files.
+    """
 
-        Returns
-        -------
-        dict of int to float
-            Node and mass, kg.
-        """
-        return self._masses([setup for setup in self.setups if label in setup_labels(self.channels, setup)])
+    __pydantic_config__ = STRICT
 
-    def _masses(self, setups: Iterable[TestSetup]) -> dict[int, float]:
-        setups = list(setups)
-        n_files = sum(len(setup.files) for setup in setups)
-        masses: Counter[int] = Counter()
-        for setup in setups:
-            for channel, dof in zip(self.output_channels, setup.output_dofs, strict=True):
-                if channel.mass_kg:
-                    masses[dof.node] += channel.mass_kg * len(setup.files) / n_files  # type: ignore[assignment] # kg, no count
-        return dict(masses)
+    dof: str
+    files: tuple[str, ...]
+    output_dofs: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrfKeys:
+    """One ``[[frf]]``.
+
+    Parameters
+    ----------
+    file : str
+        Path of the file.
+    quantity : str
+        ``receptance``, ``mobility`` or ``accelerance``.
+    unit : str, optional
+        Of the values; SI where it is left out and the file does not say.
+    output_dof, input_dof : str, optional
+        Needed for a file that does not say what it connects.
+    columns : tuple of str
+        What the columns of a text file are.
+    skip_rows : int
+        Lines before the numbers of a text file; further lines of text are skipped without being counted.
+    """
+
+    __pydantic_config__ = STRICT
+
+    file: str
+    quantity: Literal["receptance", "mobility", "accelerance"]
+    unit: str | None = None
+    output_dof: str | None = None
+    input_dof: str | None = None
+    columns: tuple[str, ...] = ()
+    skip_rows: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignFileKeys:
+    """The whole file.
+
+    Parameters
+    ----------
+    test : TestKeys
+        ``[test]``.
+    channel : tuple of ChannelKeys
+        ``[[channel]]``.
+    hit, record : tuple of SetupKeys
+        ``[[hit]]`` of kind ``hammer``, ``[[record]]`` of kind ``random``.
+    frf : tuple of FrfKeys
+        ``[[frf]]`` of kind ``frf``.
+    """
+
+    __pydantic_config__ = STRICT
+
+    test: TestKeys
+    channel: tuple[ChannelKeys, ...] = ()
+    hit: tuple[SetupKeys, ...] = ()
+    record: tuple[SetupKeys, ...] = ()
+    frf: tuple[FrfKeys, ...] = ()
 
 
 def read_test(path: Path) -> VibrationTest:
@@ -201,7 +180,7 @@ def read_test(path: Path) -> VibrationTest:
     channels = _read_channels(path, keys)
     entries = keys.hit or keys.record
     setups = tuple(
-        _read_setup(path, entry, channels, f"[[{ENTRIES[keys.test.kind]}]] {entry.dof}") for entry in entries
+        _read_setup(path, entry, channels, f"[[{ENTRY_OF_KIND[keys.test.kind]}]] {entry.dof}") for entry in entries
     )
     _check_units(path, channels, setups)
     _check_files_once(path, setups)
@@ -221,60 +200,21 @@ def read_test(path: Path) -> VibrationTest:
     )
 
 
-def setup_labels(channels: tuple[Channel, ...], setup: TestSetup) -> tuple[FrfLabel, ...]:
-    """Name the FRFs that a run gives.
-
-    Parameters
-    ----------
-    channels : tuple of Channel
-        The input first.
-    setup : TestSetup
-        The run.
-
-    Returns
-    -------
-    tuple of FrfLabel
-        One an output channel, in their order.
-    """
-    return tuple(
-        FrfLabel(dof, setup.input_dof, frf_quantity_of(channel.quantity), channel.column, channels[0].column)
-        for channel, dof in zip(channels[1:], setup.output_dofs, strict=True)
-    )
-
-
-def frf_label(output_dof: Dof, input_dof: Dof, quantity: FrfQuantity) -> FrfLabel:
-    """Name an FRF that was estimated elsewhere; its channels are called after its DOFs.
-
-    Parameters
-    ----------
-    output_dof, input_dof : Dof
-        What it connects.
-    quantity : FrfQuantity
-        What it is.
-
-    Returns
-    -------
-    FrfLabel
-        The label.
-    """
-    return FrfLabel(output_dof, input_dof, quantity, f"output {output_dof}", f"input {input_dof}")
-
-
 def _labels_of_source(source: FrfSource) -> list[FrfLabel]:
     if source.output_dof is not None and source.input_dof is not None:
         return [frf_label(source.output_dof, source.input_dof, source.quantity)]
-    return [frf_label(frf.output_dof, frf.input_dof, source.quantity) for frf in read_frfs(source)]
+    return [frf.label for frf in read_frfs(source)]
 
 
 def _check_sections(path: Path, keys: CampaignFileKeys) -> None:
     kind = keys.test.kind
-    wanted = ENTRIES[kind]
-    given = [name for name in ("hit", "record", "frf") if getattr(keys, name)]
-    for name in given:
-        if name != wanted:
-            raise FileFormatError(path, f"a test of kind '{kind}' has [[{wanted}]] entries", where=f"key '{name}'")
-    if not given:
-        raise FileFormatError(path, f"a test of kind '{kind}' needs at least one [[{wanted}]]")
+    entry = ENTRY_OF_KIND[kind]
+    present = [name for name in ENTRY_OF_KIND.values() if getattr(keys, name)]
+    for name in present:
+        if name != entry:
+            raise FileFormatError(path, f"a test of kind '{kind}' has [[{entry}]] entries", where=f"key '{name}'")
+    if not present:
+        raise FileFormatError(path, f"a test of kind '{kind}' needs at least one [[{entry}]]")
     if kind == "frf" and keys.channel:
         problem = "a test of kind 'frf' has no channels: its FRFs say themselves what they connect"
         raise FileFormatError(path, problem, where="key 'channel'")
@@ -308,7 +248,9 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
     if keys.unit is not None and keys.sensitivity is not None:
         raise FileFormatError(path, "has both 'unit' and 'sensitivity'; a sensitivity replaces the unit", where=where)
     if keys.role == "input" and (keys.dof or keys.mass_kg):
-        raise FileFormatError(path, "an input has no 'dof' and no 'mass_kg': the hits say where it acts", where=where)
+        raise FileFormatError(
+            path, "an input has no 'dof' and no 'mass_kg': the [[hit]] or [[record]] says where it acts", where=where
+        )
     if keys.mass_kg < 0.0:
         raise FileFormatError(path, f"'mass_kg' is negative ({keys.mass_kg:g})", where=where)
     return Channel(
@@ -317,7 +259,7 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
         quantity=keys.quantity,
         unit=keys.unit or "",
         sensitivity=keys.sensitivity or "",
-        dof=None if keys.dof is None else _dof(path, keys.dof, where),
+        dof=None if keys.dof is None else _parse_dof(path, keys.dof, where),
         mass_kg=keys.mass_kg,
     )
 
@@ -341,40 +283,41 @@ def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], wher
         if column not in outputs:
             problem = f"'output_dofs' names '{column}', which is no output channel; {did_you_mean(column, outputs)}"
             raise FileFormatError(path, problem, where=where)
-        outputs[column] = _dof(path, text, where)
+        outputs[column] = _parse_dof(path, text, where)
     missing = [column for column, dof in outputs.items() if dof is None]
     if missing:
         problem = f"the output '{missing[0]}' has no DOF: give its channel a 'dof', or name it in 'output_dofs'"
         raise FileFormatError(path, problem, where=where)
-    _check_places(path, channels[1:], tuple(dof for dof in outputs.values() if dof is not None), where)
-    files = [file for pattern in keys.files for file in expand_pattern(path, pattern, where=where)]
+    output_dofs = tuple(dof for dof in outputs.values() if dof is not None)
+    _check_motions(path, channels[1:], output_dofs, where)
+    files = [file for pattern in keys.files for file in _expand_pattern(path, pattern, where)]
     if not files:
         raise FileFormatError(path, "'files' is empty; name at least one recording", where=where)
     return TestSetup(
-        input_dof=_dof(path, keys.dof, where),
-        output_dofs=tuple(dof for dof in outputs.values() if dof is not None),
+        input_dof=_parse_dof(path, keys.dof, where),
+        output_dofs=output_dofs,
         files=tuple(dict.fromkeys(files)),
     )
 
 
-def _check_places(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...], where: str) -> None:
-    """Refuse two outputs that would measure the same motion: FRFs are told apart by DOFs and quantity."""
-    owners: dict[tuple[int, str, str], Channel] = {}
+def _check_motions(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...], where: str) -> None:
+    """Refuse two outputs that would measure the same motion: FRFs are distinguished by DOFs and quantity."""
+    channel_of_motion: dict[tuple[int, str, str], Channel] = {}
     for channel, dof in zip(outputs, dofs, strict=True):
-        other = owners.setdefault((dof.node, dof.direction, channel.quantity), channel)
-        if other is not channel:
-            problem = f"'{other.column}' and '{channel.column}' both measure the {channel.quantity} at {dof}"
+        first = channel_of_motion.setdefault((dof.node, dof.direction, channel.quantity), channel)
+        if first is not channel:
+            problem = f"'{first.column}' and '{channel.column}' both measure the {channel.quantity} at {dof}"
             raise FileFormatError(path, f"{problem}; correct a 'dof', or take one channel out", where=where)
 
 
 def _check_files_once(path: Path, setups: tuple[TestSetup, ...]) -> None:
-    owners: dict[Path, TestSetup] = {}
+    setup_of_file: dict[Path, TestSetup] = {}
     for setup in setups:
         for file in setup.files:
-            other = owners.setdefault(file, setup)
-            if other is not setup:
-                problem = f"{file.name} belongs to the entries of {other.input_dof} and of {setup.input_dof}"
-                raise FileFormatError(path, f"{problem}; a recording has one place of the force")
+            first = setup_of_file.setdefault(file, setup)
+            if first is not setup:
+                problem = f"{file.name} belongs to the entries of {first.input_dof} and of {setup.input_dof}"
+                raise FileFormatError(path, f"{problem}; a recording has one excited DOF")
 
 
 def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
@@ -383,15 +326,29 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         path=path.parent / keys.file,
         quantity=FrfQuantity(keys.quantity),
         unit=keys.unit or "",
-        output_dof=None if keys.output_dof is None else _dof(path, keys.output_dof, where),
-        input_dof=None if keys.input_dof is None else _dof(path, keys.input_dof, where),
+        output_dof=None if keys.output_dof is None else _parse_dof(path, keys.output_dof, where),
+        input_dof=None if keys.input_dof is None else _parse_dof(path, keys.input_dof, where),
         columns=keys.columns,
         skip_rows=keys.skip_rows,
     )
 
 
-def _dof(path: Path, text: str, where: str) -> Dof:
+def _parse_dof(path: Path, text: str, where: str) -> Dof:
     try:
         return parse_dof(text)
     except InputError as error:
         raise FileFormatError(path, str(error), where=where) from None
+
+
+def _expand_pattern(path: Path, pattern: str, where: str) -> list[Path]:
+    """Find the files that a pattern names; it is relative to the folder of `test.toml`, or absolute."""
+    folder, relative = path.parent, Path(pattern)
+    if relative.is_absolute():
+        folder, relative = Path(relative.anchor), relative.relative_to(relative.anchor)
+    try:
+        files = sorted(file for file in folder.glob(str(relative)) if file.is_file())
+    except (ValueError, NotImplementedError, OSError) as error:
+        raise FileFormatError(path, f"'{pattern}' is no valid pattern of files: {error}", where=where) from None
+    if not files:
+        raise FileFormatError(path, f"no file fits '{pattern}' in {folder}; correct 'files'", where=where)
+    return files

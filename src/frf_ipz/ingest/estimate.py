@@ -10,7 +10,7 @@ from frf_ipz.ingest.kinds.random import estimate_random
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
 

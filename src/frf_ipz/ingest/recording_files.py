@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
-    from frf_ipz.ingest.campaign_file import Channel, TestSetup, VibrationTest
+    from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest
     from frf_ipz.ingest.formats.recording import RawRecording
 
 BUDGET = 64_000_000  # bytes of recordings that are kept

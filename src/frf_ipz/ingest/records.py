@@ -15,7 +15,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign_file import setup_labels
+from frf_ipz.ingest.campaign import setup_labels
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 from frf_ipz.ingest.survey.hammer import survey_hammer
@@ -25,7 +25,7 @@ from frf_ipz.progress import Progress, silent
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
 

@@ -9,7 +9,8 @@ from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
-from frf_ipz.ingest.campaign_file import VibrationTest, read_test
+from frf_ipz.ingest.campaign import VibrationTest
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.pipeline.config import Pipeline, read_pipeline
 from frf_ipz.pipeline.reference import read_reference
 from frf_ipz.pipeline.sensors import without_sensors

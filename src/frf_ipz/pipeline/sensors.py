@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
 
 
 def unweighed_sensors(test: VibrationTest, labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:

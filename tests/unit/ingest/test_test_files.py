@@ -3,7 +3,8 @@
 import pytest
 
 from frf_ipz.dofs import Dof
-from frf_ipz.ingest.campaign_file import read_test, setup_labels
+from frf_ipz.ingest.campaign import setup_labels
+from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
 from frf_ipz.ingest.options import IngestOptions

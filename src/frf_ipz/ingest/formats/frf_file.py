@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.dofs import Dof
+from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 
 
@@ -68,6 +69,29 @@ class MeasuredFrf:
     unit: str = ""
     coherence: FloatArray | None = None
     variance: FloatArray | None = None
+
+    @property
+    def label(self) -> FrfLabel:
+        """What it connects, and what it is."""
+        return frf_label(self.output_dof, self.input_dof, self.source.quantity)
+
+
+def frf_label(output_dof: Dof, input_dof: Dof, quantity: FrfQuantity) -> FrfLabel:
+    """Name an FRF that was estimated elsewhere; its channels are called after its DOFs.
+
+    Parameters
+    ----------
+    output_dof, input_dof : Dof
+        What it connects.
+    quantity : FrfQuantity
+        What it is.
+
+    Returns
+    -------
+    FrfLabel
+        The label.
+    """
+    return FrfLabel(output_dof, input_dof, quantity, f"output {output_dof}", f"input {input_dof}")
 
 
 @runtime_checkable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.frf import FrfLabel, FrfSet
-from frf_ipz.ingest.campaign_file import setup_labels
+from frf_ipz.ingest.campaign import setup_labels
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.spectra import SpectrumSums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.variance import frf_variance, power_to_variance
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.ingest.campaign_file import TestSetup, VibrationTest
+    from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.survey.record_info import Survey
 

@@ -18,7 +18,7 @@ from frf_ipz.ingest.spectra import empty_sums
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey

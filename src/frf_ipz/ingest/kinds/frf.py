@@ -9,7 +9,6 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
-from frf_ipz.ingest.campaign_file import frf_label
 from frf_ipz.ingest.formats.registry import read_frfs
 from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.kinds.record_table import empty_record_table
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
@@ -55,8 +54,8 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     frfs: list[MeasuredFrf] = []
     for done, source in enumerate(test.frf_sources):
         progress(done / len(test.frf_sources), f"reading {source.path.name}")
-        frfs += [_to_si(frf) for frf in read_frfs(source) if _label_of(frf) in test.labels]
-    labels = tuple(_label_of(frf) for frf in frfs)
+        frfs += [_to_si(frf) for frf in read_frfs(source) if frf.label in test.labels]
+    labels = tuple(frf.label for frf in frfs)
     _check(frfs, labels)
     lines, warnings = _common_lines(frfs)
     places = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
@@ -75,10 +74,6 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
         records=empty_record_table(),
         warnings=warnings,
     )
-
-
-def _label_of(frf: MeasuredFrf) -> FrfLabel:
-    return frf_label(frf.output_dof, frf.input_dof, frf.source.quantity)
 
 
 def _known(values: FloatArray | None, nothing: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions

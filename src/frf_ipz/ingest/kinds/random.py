@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions

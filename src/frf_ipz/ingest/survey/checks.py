@@ -15,7 +15,7 @@ from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign_file import VibrationTest
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.signals.pulses import Pulse
     from frf_ipz.ingest.survey.file_index import FileIndex
 

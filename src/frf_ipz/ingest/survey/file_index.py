@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.campaign_file import TestSetup
+from frf_ipz.ingest.campaign import TestSetup
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from frf_ipz.ingest.campaign_file import TestSetup
+from frf_ipz.ingest.campaign import TestSetup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from frf_ipz.ingest.signals.clipping import share_a_rail
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.ingest.campaign_file import TestSetup, VibrationTest
+    from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.survey.record_info import RecordInfo
 
