@@ -7,7 +7,7 @@ import numpy as np
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.rational import poles_from
+from frf_ipz.rational import underdamped_poles
 
 FOUND_FREQUENCY = 1e-3  # relative: the gate that the bench of peers uses
 FOUND_DAMPING = (0.5, 2.0)  # times the truth: the same
@@ -24,7 +24,7 @@ class Modes:
 
     @property
     def poles(self):
-        return poles_from(self.frequency_hz, self.damping_ratio)
+        return underdamped_poles(self.frequency_hz, self.damping_ratio)
 
     def residues(self):
         """Give the residues of the receptances, (n_modes, n_outputs * n_inputs)."""

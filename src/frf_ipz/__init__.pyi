@@ -32,7 +32,7 @@ from .frf import FrfSet as FrfSet
 from .identification.fit import fit_modes as fit_modes
 from .identification.fit import fit_residues as fit_residues
 from .identification.options import FitOptions as FitOptions
-from .identification.results.gains import gains_against as gains_against
+from .identification.results.gains import gains_from_shapes as gains_from_shapes
 from .ingest.campaign_file import read_test as read_test
 from .ingest.estimate import estimate_frfs as estimate_frfs
 from .ingest.options import IngestOptions as IngestOptions

@@ -174,7 +174,7 @@ def damping_ratio(poles: ComplexArray) -> FloatArray:
     return -poles.real / np.where((modulus > 0) & np.isfinite(modulus), modulus, 1.0)
 
 
-def poles_from(natural_frequency: FloatArray, damping: FloatArray) -> ComplexArray:
+def underdamped_poles(natural_frequency: FloatArray, damping: FloatArray) -> ComplexArray:
     """Poles of underdamped modes.
 
     Parameters
@@ -191,7 +191,7 @@ def poles_from(natural_frequency: FloatArray, damping: FloatArray) -> ComplexArr
 
     Examples
     --------
-    >>> p = poles_from(np.array([10.0]), np.array([0.01]))
+    >>> p = underdamped_poles(np.array([10.0]), np.array([0.01]))
     >>> round(float(natural_frequency_hz(p)[0]), 9), round(float(damping_ratio(p)[0]), 9)
     (10.0, 0.01)
     """

@@ -9,11 +9,11 @@ from scipy import sparse
 
 from frf_ipz.diagnosis.apply import corrector
 from frf_ipz.errors import InputError
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import stated_ratios
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
-from frf_ipz.updating.regions import motion_of_all
+from frf_ipz.updating.regions import motion_of_all_dofs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -96,9 +96,9 @@ def _values(diagnosis: Diagnosis, place: int, index: int, factor: float) -> list
 
 def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel) -> FloatArray:
     """Difference of mass, damping and stiffness of two models in the coordinates of the reduced one, (3, r, r)."""
-    motion, _ = motion_of_all(low, reduced)
+    motion, _ = motion_of_all_dofs(low, reduced)
     mass, viscous, stiffness = (
-        motion.T @ apply(sparse.csr_array(above - below), motion)
+        motion.T @ multiply(sparse.csr_array(above - below), motion)
         for above, below in (
             (high.mass_all, low.mass_all),
             (high.damping_all, low.damping_all),

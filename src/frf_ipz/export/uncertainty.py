@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.errors import InputError
-from frf_ipz.prediction.ensemble import Members
+from frf_ipz.prediction.ensemble import ModelEnsemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -114,8 +114,8 @@ def uncertainty_weights(
 def _relative_error(updated: UpdatedModel, output: Dof, inputs: Sequence[Dof], s: ComplexArray) -> FloatArray:
     model = updated.model
     lowest = float(np.abs(s).min())
-    mean = Members(ensemble=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
-    members = Members(ensemble=updated.ensemble, lowest_rad_s=lowest)
+    mean = ModelEnsemble(ensemble=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
+    members = ModelEnsemble(ensemble=updated.ensemble, lowest_rad_s=lowest)
     size, distance = np.zeros(len(s)), np.zeros((len(updated.ensemble), len(s)))
     for force in inputs:
         rows = model.row(output), model.row(force)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Matrix, Part
 
 
-def apply(matrix: Matrix, vectors: FloatArray) -> FloatArray:
+def multiply(matrix: Matrix, vectors: FloatArray) -> FloatArray:
     """Multiply a sparse matrix with full vectors.
 
     Parameters
@@ -34,7 +34,7 @@ def apply(matrix: Matrix, vectors: FloatArray) -> FloatArray:
     return np.asarray(matrix @ vectors)
 
 
-def add_up(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int) -> Matrix:
+def assemble(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int) -> Matrix:
     """Add up the shares of parts in a matrix.
 
     Parameters
@@ -61,7 +61,7 @@ def add_up(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int) -
     return sparse.csr_array(sparse.coo_array(triplets, shape=(n_all, n_all), dtype=np.float64))
 
 
-def mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matrix]:
+def assemble_mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matrix]:
     """Add up what parts contribute to mass and stiffness.
 
     Parameters
@@ -77,8 +77,8 @@ def mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matri
         kg and N/m (and their rotational counterparts).
     """
     several = tuple(parts)
-    mass = add_up(((part.indices, part.mass) for part in several), n_all)
-    return mass, add_up(((part.indices, part.stiffness) for part in several), n_all)
+    mass = assemble(((part.indices, part.mass) for part in several), n_all)
+    return mass, assemble(((part.indices, part.stiffness) for part in several), n_all)
 
 
 def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matrix) -> tuple[FloatArray, Matrix]:

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.errors import InputError
-from frf_ipz.fe.assembly import add_up, mass_and_stiffness
+from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness
 from frf_ipz.fe.beam_elements import deflection_polynomials, geometric_stiffness_matrices
 from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, beam_elements, element_parts
 
@@ -44,10 +44,10 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
     beam = replace(file.beam, formulation=formulation)
     elements = element_parts(beam)
     others = [part for part in model.parts if part.kind != "element"]
-    old_mass, old_stiffness = mass_and_stiffness(
+    old_mass, old_stiffness = assemble_mass_and_stiffness(
         [part for part in model.parts if part.kind == "element"], _order(model)
     )
-    mass, stiffness = mass_and_stiffness(elements, _order(model))
+    mass, stiffness = assemble_mass_and_stiffness(elements, _order(model))
     return replace(
         model,
         mass_all=sparse.csr_array(model.mass_all + (mass - old_mass)),
@@ -101,7 +101,7 @@ def geometric_stiffness(model: StructuralModel) -> Matrix:
     """
     elements = [part for part in model.parts if part.kind == "element"]
     shares = geometric_stiffness_matrices(beam_elements(beam_options(model)))
-    return add_up(zip((part.indices for part in elements), shares, strict=True), _order(model))
+    return assemble(zip((part.indices for part in elements), shares, strict=True), _order(model))
 
 
 def beam_options(model: StructuralModel) -> BeamOptions:
@@ -171,7 +171,7 @@ def slope_row(model: StructuralModel, x_m: float) -> FloatArray:
     return _row(model, x_m, derivative=1)
 
 
-def kink_at(model: StructuralModel, x_m: float) -> float:
+def shear_slope_at(model: StructuralModel, x_m: float) -> float:
     """Slope by shear on each side of a force: half of what jumps there.
 
     Parameters

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.fe.assembly import add_up, mass_and_stiffness
+from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness
 from frf_ipz.structure import Part
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def with_point_masses(model: StructuralModel, masses_kg: Mapping[int, float]) ->
         If there is no such node, it has no translational DOF, or a mass is negative.
     """
     parts = tuple(_point_mass(model, node, mass) for node, mass in masses_kg.items())
-    mass, _ = mass_and_stiffness(parts, len(model.all_dofs))
+    mass, _ = assemble_mass_and_stiffness(parts, len(model.all_dofs))
     return replace(model, mass_all=model.mass_all + mass, parts=(*model.parts, *parts))
 
 
@@ -113,11 +113,11 @@ def with_springs(model: StructuralModel, stiffness: Mapping[Dof, float]) -> Stru
         If the model lacks a DOF.
     """
     places = np.array([model.place(dof) for dof in stiffness], dtype=np.int64)
-    added = add_up([(places, np.diag(list(stiffness.values())))], len(model.all_dofs))
+    added = assemble([(places, np.diag(list(stiffness.values())))], len(model.all_dofs))
     return replace(model, stiffness_all=model.stiffness_all + added)
 
 
-def released(model: StructuralModel, stiffness: Mapping[Dof, float]) -> StructuralModel:
+def with_released_supports(model: StructuralModel, stiffness: Mapping[Dof, float]) -> StructuralModel:
     """Free DOFs that are held, and hold each by a spring instead.
 
     Parameters
@@ -194,10 +194,10 @@ def part_matrices(model: StructuralModel, kind: str, names: Sequence[str]) -> tu
     InputError
         If the model has no such part.
     """
-    return mass_and_stiffness(_parts(model, kind, names), len(model.all_dofs))
+    return assemble_mass_and_stiffness(_parts(model, kind, names), len(model.all_dofs))
 
 
-def scaled_parts(
+def with_scaled_parts(
     model: StructuralModel, kind: str, names: Sequence[str], *, stiffness_ratio: float = 1.0, mass_ratio: float = 1.0
 ) -> StructuralModel:
     """Make parts stiffer or heavier.

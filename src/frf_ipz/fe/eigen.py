@@ -16,7 +16,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.factorization import DENSE_ORDER, Factorization, factorize
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
@@ -111,17 +111,17 @@ class ModalBasis:
         (n, n_loads) array
             m; a sum over the modes left out of ``phi phi^T / omega^2`` times the loads.
         """
-        loads = loads - apply(self.mass, self.shapes @ (self.shapes.T @ loads))
+        loads = loads - multiply(self.mass, self.shapes @ (self.shapes.T @ loads))
         deflection = self._without_modes(self.factor.solve(loads))
         for _ in range(FLEXIBILITY_STEPS):
-            step = self._without_modes(self.factor.solve(loads - apply(self.stiffness, deflection)))
+            step = self._without_modes(self.factor.solve(loads - multiply(self.stiffness, deflection)))
             deflection += step
             if np.abs(step).max(initial=0.0) <= FLEXIBILITY_TOLERANCE * np.abs(deflection).max(initial=0.0):
                 break
         return deflection
 
     def _without_modes(self, motion: FloatArray) -> FloatArray:
-        return np.asarray(motion - self.shapes @ (self.shapes.T @ apply(self.mass, motion)))
+        return np.asarray(motion - self.shapes @ (self.shapes.T @ multiply(self.mass, motion)))
 
 
 def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz: float | None = None) -> ModeSet:
@@ -176,7 +176,7 @@ def damping_ratios(model: StructuralModel, basis: ModalBasis) -> FloatArray:
         0 for rigid-body modes.
     """
     ratios = stated_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
-    viscous = np.sum(basis.shapes * apply(model.damping, basis.shapes), 0)
+    viscous = np.sum(basis.shapes * multiply(model.damping, basis.shapes), 0)
     elastic = slice(basis.n_rigid, None)
     ratios[elastic] += viscous[elastic] / (2 * np.sqrt(basis.eigenvalues[elastic]))
     return ratios
@@ -326,17 +326,17 @@ def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_
 
 def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal, and their omega^2."""
-    weights, axes = linalg.eigh(motions.T @ apply(mass, motions))
+    weights, axes = linalg.eigh(motions.T @ multiply(mass, motions))
     kept = weights > DEPENDENT * weights[-1]
     motions = motions @ (axes[:, kept] / np.sqrt(weights[kept]))
-    _, axes = linalg.eigh(motions.T @ apply(stiffness, motions))
+    _, axes = linalg.eigh(motions.T @ multiply(stiffness, motions))
     motions = motions @ axes
-    return motions, np.sum(motions * apply(stiffness, motions), 0)
+    return motions, np.sum(motions * multiply(stiffness, motions), 0)
 
 
 def _unknown_energy(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
     """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or make up."""
-    sizes = np.sum(np.abs(shapes) * apply(abs(stiffness), np.abs(shapes)), 0)
+    sizes = np.sum(np.abs(shapes) * multiply(abs(stiffness), np.abs(shapes)), 0)
     return np.asarray(NO_ENERGY * _rounding(model, stiffness) * sizes)
 
 
@@ -350,9 +350,9 @@ def _cleaned(
 ) -> ModalBasis:
     """Make shapes exactly orthonormal, their frequencies exact to second order, and rigid-body modes rigid."""
     for _ in range(2):  # the second time takes off what rounding left in the first
-        lower = linalg.cholesky(shapes.T @ apply(mass, shapes), lower=True)
+        lower = linalg.cholesky(shapes.T @ multiply(mass, shapes), lower=True)
         shapes = linalg.solve_triangular(lower, shapes.T, lower=True).T
-    eigenvalues = np.sum(shapes * apply(stiffness, shapes), 0)
+    eigenvalues = np.sum(shapes * multiply(stiffness, shapes), 0)
     unknown = _unknown_energy(model, stiffness, shapes)
     if (eigenvalues < -unknown).any():
         raise _indefinite(model, float(eigenvalues.min()))
@@ -379,9 +379,9 @@ def _rounding(model: StructuralModel, stiffness: Matrix) -> float:
     """
     found = [EPS]
     for translation in rigid_body_motions(model.dofs, model.geometry)[:, :3].T:
-        sizes = apply(abs(stiffness), np.abs(translation))
+        sizes = multiply(abs(stiffness), np.abs(translation))
         if sizes.any():
-            left = np.abs(apply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
+            left = np.abs(multiply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
             found.append(float(np.quantile(left, MOST_ROWS)))
     return max(rounding for rounding in found if rounding <= MAX_ROUNDING)
 

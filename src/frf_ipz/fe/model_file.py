@@ -119,7 +119,7 @@ def model_files(path: Path) -> tuple[Path, ...]:
     return (path, *kind.files(file, path))
 
 
-def known_kinds() -> Mapping[str, Kind]:
+def model_kinds() -> Mapping[str, Kind]:
     """Find the kinds of models.
 
     Returns
@@ -135,7 +135,7 @@ def known_kinds() -> Mapping[str, Kind]:
 
 def _read_options(path: Path) -> tuple[Kind, object]:
     head = read_toml(path, _Head, required="model")
-    available = known_kinds()
+    available = model_kinds()
     if head.model.kind not in available:
         advice = did_you_mean(head.model.kind, available)
         raise FileFormatError(path, f"'{head.model.kind}' is no kind of model; {advice}", where="key 'model.kind'")

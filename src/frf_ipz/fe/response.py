@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
 from frf_ipz.fe.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import damped_poles
@@ -166,7 +166,7 @@ def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     stated = 2 * ratios * np.sqrt(basis.eigenvalues)
     if not model.damping_all.count_nonzero():
         return stated
-    viscous = np.asarray(basis.shapes.T @ apply(model.damping, basis.shapes))
+    viscous = np.asarray(basis.shapes.T @ multiply(model.damping, basis.shapes))
     own = np.diag(viscous)
     across = np.abs(viscous - np.diag(own))
     if (across <= COUPLING * np.sqrt(np.outer(np.abs(own), np.abs(own)))).all():
@@ -184,7 +184,7 @@ def _series(basis: ModalBasis, output_rows: list[int], input_rows: list[int]) ->
     for _ in range(SERIES_TERMS):
         deflection = basis.residual_flexibility(loads)
         terms.append(deflection[read] if loaded is input_rows else deflection[read].T)
-        loads = np.asarray(apply(basis.mass, deflection))
+        loads = np.asarray(multiply(basis.mass, deflection))
     return np.array(terms)
 
 

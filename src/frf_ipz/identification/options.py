@@ -10,7 +10,7 @@ from frf_ipz.toml_files import STRICT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StruckPole:
+class RejectedPole:
     """A pole that the user has struck out.
 
     Parameters
@@ -57,7 +57,7 @@ class FitOptions:
         Stretches to leave out: mains lines, a band of low coherence.
     pin_hz : tuple of float or PinnedPole
         Frequencies at which a mode must be, with or without the reason: never dropped.
-    strike : tuple of StruckPole
+    strike : tuple of RejectedPole
         Poles that are no modes, and why.
     modes : str
         ``complex`` or ``real`` (normal modes: proportional damping).
@@ -80,7 +80,7 @@ class FitOptions:
     band_hz: tuple[float, float] | None = None
     exclude_hz: tuple[tuple[float, float], ...] = ()
     pin_hz: tuple[float | PinnedPole, ...] = ()
-    strike: tuple[StruckPole, ...] = ()
+    strike: tuple[RejectedPole, ...] = ()
     modes: Literal["complex", "real"] = "complex"
     max_order: int | None = None
     delay: bool = False

@@ -16,7 +16,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 Columns = TypeVar("Columns", FloatArray, ComplexArray)
 
 
-def even(columns: Columns) -> tuple[Columns, FloatArray]:
+def scale_columns(columns: Columns) -> tuple[Columns, FloatArray]:
     """Bring columns to a norm of one.
 
     Parameters
@@ -35,7 +35,7 @@ def even(columns: Columns) -> tuple[Columns, FloatArray]:
     return columns / sizes, sizes
 
 
-def solve_columns(columns: Columns, right: Columns, cut: float | None = None) -> Columns:
+def solve_scaled_columns(columns: Columns, right: Columns, cut: float | None = None) -> Columns:
     """Solve least squares by columns of one size.
 
     Parameters
@@ -52,11 +52,11 @@ def solve_columns(columns: Columns, right: Columns, cut: float | None = None) ->
     (n,) array
         Of the columns as they were given.
     """
-    scaled, sizes = even(columns)
+    scaled, sizes = scale_columns(columns)
     return np.asarray(np.linalg.lstsq(scaled, right, rcond=cut)[0] / sizes, dtype=columns.dtype)
 
 
-def factor_with_prior(rows: FloatArray) -> FloatArray:
+def cholesky_with_prior(rows: FloatArray) -> FloatArray:
     """Give the Cholesky factor of rows rows^T + 1, however large the rows are: the product is not formed.
 
     Parameters

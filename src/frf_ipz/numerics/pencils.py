@@ -127,7 +127,7 @@ def damped_zeros(
     return _quadratic(mass, damping, stiffness, complement(input_row), complement(output_row))
 
 
-def eigh_of_two(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+def generalised_eigh(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve first @ v = value * second @ v, each symmetric.
 
     Parameters
@@ -172,7 +172,7 @@ def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
         If the mass is not positive definite.
     """
     try:
-        values, vectors = eigh_of_two(stiffness, mass)
+        values, vectors = generalised_eigh(stiffness, mass)
     except np.linalg.LinAlgError:
         message = "the mass matrix of the reduced model is not positive definite: check masses and units"
         raise NumericalError(message) from None

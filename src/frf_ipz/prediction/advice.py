@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.prediction.ensemble import Members
+    from frf_ipz.prediction.ensemble import ModelEnsemble
     from frf_ipz.rational import ZeroSet
     from frf_ipz.structure import ReducedModel
 
@@ -29,7 +29,7 @@ Q95 = 1.645  # standard deviations of half a 90 % band
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stretch:
+class WideBand:
     """Lines where the band is wide.
 
     Parameters
@@ -47,7 +47,7 @@ class Stretch:
     half_width_db: float
 
 
-def wide_stretches(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) -> tuple[Stretch, ...]:
+def wide_bands(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) -> tuple[WideBand, ...]:
     """Find where bands are wide.
 
     Parameters
@@ -59,7 +59,7 @@ def wide_stretches(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) 
 
     Returns
     -------
-    tuple of Stretch
+    tuple of WideBand
         The widest of each FRF.
     """
     stretches = []
@@ -69,7 +69,7 @@ def wide_stretches(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) 
         lines = np.flatnonzero(half[:, frf] > WIDE_DB)
         gaps = np.flatnonzero(np.diff(frequency_hz[lines]) > JOINED * frequency_hz[lines][:-1]) + 1
         found = [
-            Stretch(frf=frf, lines=part, half_width_db=float(half[part, frf].max()))
+            WideBand(frf=frf, lines=part, half_width_db=float(half[part, frf].max()))
             for part in np.split(lines, gaps)
             if len(part) >= FEWEST_LINES
         ]
@@ -77,10 +77,10 @@ def wide_stretches(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) 
     return tuple(stretches)
 
 
-def explain(
-    stretch: Stretch,
+def explain_wide_band(
+    stretch: WideBand,
     model: ReducedModel,
-    members: Members,
+    members: ModelEnsemble,
     measured: Sequence[FrfLabel],
     predicted: FrfLabel,
     frequency_hz: FloatArray,
@@ -90,11 +90,11 @@ def explain(
 
     Parameters
     ----------
-    stretch : Stretch
+    stretch : WideBand
         Where.
     model : ReducedModel
         The updated model.
-    members : Members
+    members : ModelEnsemble
         The ensemble.
     measured : sequence of FrfLabel
         What was measured.
@@ -121,7 +121,7 @@ def explain(
     return f"{text}; {_advice(model, members, measured, predicted, logs)}"
 
 
-def _logs(members: Members, model: ReducedModel, label: FrfLabel, s: np.ndarray) -> FloatArray:
+def _logs(members: ModelEnsemble, model: ReducedModel, label: FrfLabel, s: np.ndarray) -> FloatArray:
     """Magnitudes of all members in dB without their mean, (m, lines)."""
     values = np.abs(members.receptance(model.row(label.output_dof), model.row(label.input_dof), s))
     logs = 20 * np.log10(np.maximum(values, np.finfo(float).tiny))
@@ -129,9 +129,9 @@ def _logs(members: Members, model: ReducedModel, label: FrfLabel, s: np.ndarray)
 
 
 def _reason(
-    stretch: Stretch,
+    stretch: WideBand,
     model: ReducedModel,
-    members: Members,
+    members: ModelEnsemble,
     predicted: FrfLabel,
     logs: FloatArray,
     frequency_hz: FloatArray,
@@ -153,7 +153,7 @@ def _reason(
 
 
 def _advice(
-    model: ReducedModel, members: Members, measured: Sequence[FrfLabel], predicted: FrfLabel, logs: FloatArray
+    model: ReducedModel, members: ModelEnsemble, measured: Sequence[FrfLabel], predicted: FrfLabel, logs: FloatArray
 ) -> str:
     before = float(np.sqrt(np.mean(logs**2)))
     best, words = before, ""
@@ -166,7 +166,7 @@ def _advice(
     return f"{words} would narrow it most, from {Q95 * before:.1f} to about {Q95 * best:.1f} dB on the mean"
 
 
-def _modes(members: Members) -> int:
+def _modes(members: ModelEnsemble) -> int:
     """Count the modes that a further measurement would tell of: about half the order of the model."""
     return max(int(members.modes[0].shape[1]) // 2, 1)
 

@@ -13,8 +13,8 @@ SOFT = 1e-3  # of the lowest line: frequency given to rigid-body modes, whose do
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Members:
-    """Members of an ensemble, in modes.
+class ModelEnsemble:
+    """ModelEnsemble of an ensemble, in modes.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
-from frf_ipz.prediction.advice import explain, wide_stretches
-from frf_ipz.prediction.ensemble import Members
+from frf_ipz.prediction.advice import explain_wide_band, wide_bands
+from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.zeros import predicted_zeros
 
@@ -62,12 +62,12 @@ def predict_frfs(
     s = 2j * np.pi * np.asarray(frequency_hz, float)
     band = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())
-    members = Members(ensemble=updated.ensemble, lowest_rad_s=lowest)
+    members = ModelEnsemble(ensemble=updated.ensemble, lowest_rad_s=lowest)
     low, high = _bands(updated, members, wanted, s)
     zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, wanted, band)
     warnings = tuple(
-        explain(stretch, updated.model, members, labels, wanted[stretch.frf], frequency_hz, zeros)
-        for stretch in wide_stretches(frequency_hz, low, high)
+        explain_wide_band(stretch, updated.model, members, labels, wanted[stretch.frf], frequency_hz, zeros)
+        for stretch in wide_bands(frequency_hz, low, high)
     )
     return Prediction(
         frequency_hz=np.asarray(frequency_hz, float),
@@ -88,7 +88,7 @@ def _evaluated(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray)
 
 
 def _bands(
-    updated: UpdatedModel, members: Members, labels: Sequence[FrfLabel], s: ComplexArray
+    updated: UpdatedModel, members: ModelEnsemble, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):

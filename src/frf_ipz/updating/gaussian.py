@@ -83,7 +83,7 @@ def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> 
     )
 
 
-def enough_slack(
+def slack_by_discrepancy(
     sensitivity: FloatArray, data: FloatArray, noise: FloatArray, slack: FloatArray, factor: float
 ) -> float:
     """Find the smallest factor on the slack with which the misfit is no more than the number of data.
@@ -113,7 +113,9 @@ def enough_slack(
     return factor
 
 
-def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float, *, least: float = 0.0) -> int:
+def most_contradicted(
+    sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float, *, least: float = 0.0
+) -> int:
     """Find the datum that all others and the prior contradict most.
 
     Parameters
@@ -140,7 +142,7 @@ def unlikely(sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit
     return worst if distance[worst] > limit else -1
 
 
-def draw(
+def draw_posterior(
     step: GaussianStep, sensitivity: FloatArray, noise: FloatArray, rng: np.random.Generator, count: int
 ) -> FloatArray:
     """Draw whitened parameters from the posterior: a draw of the prior, corrected by what its data would have shown.
@@ -168,7 +170,7 @@ def draw(
     return np.asarray(step.mean + prior - (prior @ sensitivity.T + errors) @ step.gain.T)
 
 
-def likely_scales(
+def most_likely_scales(
     parts: Sequence[FloatArray], terms: Sequence[PriorTerm], data: FloatArray, noise: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Find the standard deviations of the prior terms under which the data are most likely.

@@ -207,12 +207,12 @@ def structural_basis(
     else:
         basis = _part_basis(regions, stiffness=True)
         if mass:
-            basis = join(basis, _part_basis(regions, stiffness=False))
-        basis = join(basis, generic_basis(model, std=REST_STD, common=False))
-    return join(basis, _sensor_basis(model, sensors)) if sensors else basis
+            basis = join_bases(basis, _part_basis(regions, stiffness=False))
+        basis = join_bases(basis, generic_basis(model, std=REST_STD, common=False))
+    return join_bases(basis, _sensor_basis(model, sensors)) if sensors else basis
 
 
-def join(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
+def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
     """Put two sets of parameters together; their priors are independent.
 
     Parameters

@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.updating.parameters import ParameterBasis
-from frf_ipz.updating.tracking import WantedRoots
+from frf_ipz.updating.tracking import TargetRoots
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -86,7 +86,7 @@ class UpdateProblem:
         (n,) complex array
             The model's, one to one, imaginary part > 0, rad/s.
         """
-        wanted = WantedRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
+        wanted = TargetRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
         values = np.zeros(len(near), complex)
         for number, roots in wanted.damped(model.mass, model.damping, model.stiffness).items():
             places = np.flatnonzero(wanted.frf == number)

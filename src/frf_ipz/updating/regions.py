@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
     from frf_ipz.structure import Matrix, Part, ReducedModel, StructuralModel
@@ -58,7 +58,7 @@ def reduced_regions(full: StructuralModel, model: ReducedModel) -> tuple[Region,
     tuple of Region
         Parts that have stiffness, at most `MAX_REGIONS`; none where the model names no parts.
     """
-    motion, known = motion_of_all(full, model)
+    motion, known = motion_of_all_dofs(full, model)
     parts = [part for part in full.parts if part.kind != "point" and known[part.indices].all()]
     if not parts:
         return ()
@@ -70,7 +70,7 @@ def reduced_regions(full: StructuralModel, model: ReducedModel) -> tuple[Region,
     return tuple(region for region in regions if np.abs(region.stiffness).max() > 0)
 
 
-def motion_of_all(full: StructuralModel, model: ReducedModel) -> tuple[FloatArray, BoolArray]:
+def motion_of_all_dofs(full: StructuralModel, model: ReducedModel) -> tuple[FloatArray, BoolArray]:
     """Give the motion of every DOF of an FE model for unit motions of the retained ones.
 
     Parameters
@@ -118,7 +118,7 @@ def _region(parts: list[Part], middle: FloatArray, motion: FloatArray) -> Region
 
 
 def _share(motion: FloatArray, matrix: FloatArray | Matrix) -> FloatArray:
-    share = motion.T @ apply(sparse.csr_array(matrix), motion)
+    share = motion.T @ multiply(sparse.csr_array(matrix), motion)
     return np.asarray((share + share.T) / 2)
 
 

@@ -13,7 +13,7 @@ from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WantedRoots:
+class TargetRoots:
     """Which poles and zeros are looked for.
 
     Parameters
@@ -91,12 +91,12 @@ class TrackedRoots:
         return everything
 
 
-def first_roots(wanted: WantedRoots, mass: FloatArray, stiffness: FloatArray, computed: ComplexArray) -> TrackedRoots:
+def nominal_roots(wanted: TargetRoots, mass: FloatArray, stiffness: FloatArray, computed: ComplexArray) -> TrackedRoots:
     """Find the undamped roots that the pairing named, by their modulus.
 
     Parameters
     ----------
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which.
     mass, stiffness : (r, r) array
         Of the nominal model.
@@ -117,12 +117,12 @@ def first_roots(wanted: WantedRoots, mass: FloatArray, stiffness: FloatArray, co
     return TrackedRoots(groups=tuple(groups))
 
 
-def follow(wanted: WantedRoots, before: TrackedRoots, mass: FloatArray, stiffness: FloatArray) -> TrackedRoots:
+def track(wanted: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffness: FloatArray) -> TrackedRoots:
     """Find the same roots in a changed model.
 
     Parameters
     ----------
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which.
     before : TrackedRoots
         In the model before the change.
@@ -143,13 +143,13 @@ def follow(wanted: WantedRoots, before: TrackedRoots, mass: FloatArray, stiffnes
 
 
 def with_damping(
-    wanted: WantedRoots, undamped: TrackedRoots, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+    wanted: TargetRoots, undamped: TrackedRoots, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
 ) -> TrackedRoots:
     """Find the damped roots that belong to undamped ones, by their vectors.
 
     Parameters
     ----------
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which.
     undamped : TrackedRoots
         Squared roots of the same model without damping.

@@ -24,7 +24,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.rational import poles_from
+from frf_ipz.rational import underdamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.options import UpdateOptions
 from frf_testbench.updating.synthetic_fit import Truth, fit_of_targets, in_order
@@ -63,7 +63,7 @@ def section_4() -> PaperCase:
     label = FrfLabel(parse_dof("4:z"), parse_dof("3:z"), FrfQuantity.RECEPTANCE)
     zeros = truth.zeros(label)
     zeros = zeros[np.abs(zeros.real) < SHOWN * np.abs(zeros)][:3]
-    poles = poles_from(truth.omega[:4] / (2 * np.pi), truth.damping[:4])
+    poles = underdamped_poles(truth.omega[:4] / (2 * np.pi), truth.damping[:4])
     fit = fit_of_targets(poles, zeros, label, band)
     return PaperCase(
         full=nominal,

@@ -18,7 +18,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.rational import PoleResidueModel, ZeroSet, poles_from
+from frf_ipz.rational import PoleResidueModel, ZeroSet, underdamped_poles
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -100,7 +100,7 @@ def fit_of_modes(
 ) -> ModalFit:
     """Give the fit with some of the modes only."""
     s = 2j * np.pi * np.linspace(*band_hz, N_LINES)
-    poles = poles_from(truth.omega[inside] / 2 / np.pi, truth.damping[inside])
+    poles = underdamped_poles(truth.omega[inside] / 2 / np.pi, truth.damping[inside])
     powers = (-2, 0, 2)
     scale = float(np.abs(s).max())
     residues, coefficients, zeros, kinds, where, frf_noise = [], [], [], [], [], []

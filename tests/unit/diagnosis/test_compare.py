@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
 from frf_ipz.diagnosis.comparing.nominal import LEAST_SQUARE, as_fitted
 from frf_ipz.diagnosis.measured.source import divide
 from frf_ipz.errors import InputError
-from frf_ipz.fe.changes import scaled_parts, with_point_masses
+from frf_ipz.fe.changes import with_point_masses, with_scaled_parts
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import model_frfs
 
@@ -74,7 +74,7 @@ def test_a_mass_that_is_gone_is_found(nominal):
 
 
 def test_softer_elements_are_found_with_their_place(nominal, real):
-    after = scaled_parts(real, "element", ["7", "8"], stiffness_ratio=0.8)
+    after = with_scaled_parts(real, "element", ["7", "8"], stiffness_ratio=0.8)
     found = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
     (change,) = found.changes
     assert (change.effect, dict(change.location)) == ("local_stiffness", {"elements": [7, 8]})

@@ -19,7 +19,7 @@ from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.hypothesis import Cause, suppose
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.beam_models import with_axial_force, with_formulation
-from frf_ipz.fe.changes import released, scaled_parts, with_point_masses, with_springs
+from frf_ipz.fe.changes import with_point_masses, with_released_supports, with_scaled_parts, with_springs
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.frf import FrfLabel
@@ -110,11 +110,11 @@ def damped_frfs(model, stiffness, mass, names, ratio=0.01):
 
 def test_local_stiffness_of_a_stretch_and_of_a_spring(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
+    expected = model_frfs(with_scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
     assert_same(changed_frfs(model, "local_stiffness", ("element", 5, 6), [0.6]), expected, REDUCED)
     frame = lumped(tmp_path)
     names = labels(("3:+x", "1:-x"), ("2:+x",))
-    expected = model_frfs(scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
+    expected = model_frfs(with_scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
     assert_same(changed_frfs(frame, "local_stiffness", ("spring", "k2"), [1.4], names), expected, REDUCED)
 
 
@@ -127,7 +127,7 @@ def test_global_stiffness_moves_all_frequencies_alike(tmp_path):
 
 def test_boundary_compliance(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(released(model, {Dof(1, "ry"): 200.0}), labels(), S)
+    expected = model_frfs(with_released_supports(model, {Dof(1, "ry"): 200.0}), labels(), S)
     assert_same(changed_frfs(model, "boundary_compliance", ("left", ("ry",)), [200.0]), expected, REDUCED)
 
 

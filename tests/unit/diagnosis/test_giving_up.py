@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.search import search
 from frf_ipz.diagnosis.search.global_scan.grid_scan import causes_of
 from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.fe.changes import with_point_masses
-from frf_ipz.numerics.pencils import eigh_of_two
+from frf_ipz.numerics.pencils import generalised_eigh
 
 MASS_KG = 0.02
 START = np.array([MASS_KG / 1.1])
@@ -98,8 +98,8 @@ def test_the_modes_of_the_same_values_are_solved_for_once(bench, monkeypatch):
 def test_a_generalised_eigenproblem_is_scipys():
     rng = np.random.default_rng(3)
     first, second = (part @ part.T for part in rng.standard_normal((2, 9, 9)))
-    values, vectors = eigh_of_two(first, second)
+    values, vectors = generalised_eigh(first, second)
     assert_allclose(values, linalg.eigvalsh(first, second), rtol=1e-9)
     assert_allclose(vectors.T @ second @ vectors, np.eye(9), atol=1e-9)
     with pytest.raises(linalg.LinAlgError):
-        eigh_of_two(first, -second)
+        generalised_eigh(first, -second)

@@ -9,11 +9,11 @@ from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import (
     part_matrices,
-    released,
-    scaled_parts,
     support_blocks,
     with_default_damping,
     with_point_masses,
+    with_released_supports,
+    with_scaled_parts,
     with_springs,
 )
 from frf_ipz.fe.eigen import solve_basis
@@ -71,7 +71,7 @@ def test_springs_stand_on_the_diagonal():
 
 
 def test_a_released_support_is_the_other_support():
-    pinned = released(beam(left="clamped"), {Dof(1, "ry"): 0.0})
+    pinned = with_released_supports(beam(left="clamped"), {Dof(1, "ry"): 0.0})
     assert pinned.fixed.tolist() == beam(left="pinned").fixed.tolist()
     elastic = solve_basis(pinned, n_modes=4).eigenvalues[1:]
     assert_allclose(elastic, solve_basis(beam(left="pinned"), n_modes=4).eigenvalues[1:], rtol=1e-9)
@@ -79,7 +79,7 @@ def test_a_released_support_is_the_other_support():
 
 def test_a_very_stiff_spring_holds_like_the_support():
     plain = beam(left="clamped")
-    held = released(plain, {Dof(1, "ry"): 1e9})
+    held = with_released_supports(plain, {Dof(1, "ry"): 1e9})
     assert_allclose(solve_basis(held, n_modes=3).eigenvalues, solve_basis(plain, n_modes=3).eigenvalues, rtol=1e-6)
 
 
@@ -92,7 +92,7 @@ def test_support_blocks_release_as_a_change_of_low_rank():
     own = blocks.stiffness_own + s**2 * blocks.mass_own + stiffness * np.eye(1)
     held = (s**2 * model.mass + model.stiffness).toarray()
     corrected = np.linalg.inv(held - across @ np.linalg.solve(own, across.T))
-    soft = released(model, {dofs[0]: stiffness})
+    soft = with_released_supports(model, {dofs[0]: stiffness})
     whole = np.linalg.inv((s**2 * soft.mass + soft.stiffness).toarray())
     rows = [soft.index(dof) for dof in model.dofs]
     assert_allclose(corrected, whole[np.ix_(rows, rows)], rtol=0, atol=1e-8 * np.abs(whole).max())
@@ -100,7 +100,7 @@ def test_support_blocks_release_as_a_change_of_low_rank():
 
 def test_only_what_is_held_can_be_released():
     with pytest.raises(InputError, match="2:z of the model 'beam' is not held"):
-        released(beam(left="clamped"), {Dof(2, "z"): 1.0})
+        with_released_supports(beam(left="clamped"), {Dof(2, "z"): 1.0})
     with pytest.raises(InputError, match="no node 40"):
         support_blocks(beam(left="clamped"), [Dof(40, "z")])
 
@@ -114,7 +114,7 @@ def test_parts_add_up_to_the_model():
 
 def test_all_elements_twice_as_stiff_are_the_modulus_twice():
     every = [str(number) for number in range(1, 21)]
-    stiffer = scaled_parts(beam(left="clamped"), "element", every, stiffness_ratio=2.0)
+    stiffer = with_scaled_parts(beam(left="clamped"), "element", every, stiffness_ratio=2.0)
     modulus = beam(left="clamped", youngs_modulus_Pa=2 * 69e9)
     assert_allclose(
         stiffer.stiffness.toarray(), modulus.stiffness.toarray(), rtol=0, atol=1e-9 * modulus.stiffness.max()
@@ -125,7 +125,7 @@ def test_all_elements_twice_as_stiff_are_the_modulus_twice():
 
 def test_a_scaled_part_is_scaled_in_mass_and_in_place():
     model = beam()
-    heavier = scaled_parts(model, "element", ["4"], mass_ratio=3.0)
+    heavier = with_scaled_parts(model, "element", ["4"], mass_ratio=3.0)
     difference = (heavier.mass_all - model.mass_all).toarray()
     assert_allclose(difference[6:10, 6:10], 2 * model.parts[3].mass, rtol=1e-9)
     assert np.count_nonzero(difference) <= 16
@@ -136,4 +136,4 @@ def test_an_unknown_part_is_said(tmp_path):
     with pytest.raises(InputError, match="no spring 'k3'; known are k1, k2"):
         part_matrices(read_text_model(tmp_path, LUMPED_TEXT), "spring", ["k3"])
     with pytest.raises(InputError, match="no group 'a'; known are none"):
-        scaled_parts(beam(), "group", ["a"])
+        with_scaled_parts(beam(), "group", ["a"])

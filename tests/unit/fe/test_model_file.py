@@ -6,7 +6,7 @@ from fe_models import BEAM_TEXT, LUMPED_TEXT, read_text_model
 from frf_ipz.dofs import Dof
 from frf_ipz.fe import kinds
 from frf_ipz.fe.kinds.beam import build_beam
-from frf_ipz.fe.model_file import known_kinds, model_files, read_model
+from frf_ipz.fe.model_file import model_files, model_kinds, read_model
 
 NEW_KIND = """
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ def read(file, path):
 
 
 def test_the_three_kinds_are_known():
-    assert set(known_kinds()) == {"beam", "lumped", "matrices"}
+    assert set(model_kinds()) == {"beam", "lumped", "matrices"}
 
 
 def test_a_module_that_is_put_there_is_a_kind(tmp_path, monkeypatch):

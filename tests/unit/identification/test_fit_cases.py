@@ -7,7 +7,7 @@ import pytest
 
 from frf_ipz.errors import InputError, NumericalError
 from frf_ipz.identification.fit import fit_modes, fit_residues
-from frf_ipz.identification.options import FitOptions, PinnedPole, StruckPole
+from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.quantities import FrfQuantity
 from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
 
@@ -229,13 +229,13 @@ def test_delays_of_channels():
 def test_pinned_and_struck_poles():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    struck = FitOptions(strike=(StruckPole(hz=430.0, why="the shaker's own resonance"),))
+    struck = FitOptions(strike=(RejectedPole(hz=430.0, why="the shaker's own resonance"),))
     fit = fit_modes(frfs, struck)
     rest = np.delete(SPREAD, 4)
     assert np.abs(np.abs(poles_of(fit)) / 2 / np.pi - 430.0).min() > 8.0
     assert all(np.abs(np.abs(poles_of(fit)) / 2 / np.pi - hz).min() < 1.0 for hz in rest)
     assert "the shaker's own resonance" in set(fit.decisions["reason"])
-    nowhere = fit_modes(frfs, FitOptions(strike=(StruckPole(hz=250.0, why="a lamp"),)))
+    nowhere = fit_modes(frfs, FitOptions(strike=(RejectedPole(hz=250.0, why="a lamp"),)))
     assert list(nowhere.decisions.loc[nowhere.decisions["action"] == "struck", "reason"]) == ["a lamp"]
     pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0, PinnedPole(hz=430.0, why="seen by eye"))))
     is_pinned = pinned.decisions["action"] == "pinned"

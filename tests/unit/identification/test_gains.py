@@ -9,7 +9,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.identification.results.gains import gains_against
+from frf_ipz.identification.results.gains import gains_from_shapes
 from frf_ipz.identification.results.shapes import mode_shapes
 from frf_ipz.modes import ModeSet
 from synthetic_frfs import accelerances, random_modes
@@ -113,7 +113,7 @@ def test_frfs_that_differ_by_more_than_a_gain():
     assert any("differ by more than a gain" in said for said in fit.warnings)
 
 
-def test_gains_against_known_shapes():
+def test_gains_from_known_shapes():
     fit = fit_modes(measured(output4=GAIN), FitOptions())
     shapes = ModeSet(
         natural_frequency_hz=TRUTH.frequency_hz,
@@ -121,7 +121,7 @@ def test_gains_against_known_shapes():
         shapes=TRUTH.outputs * np.array([2.0, 1.0, 3.0, 1.0, 5.0]) + 0j,  # the scale of a mode does not matter
         dofs=tuple(dict.fromkeys(label.output_dof for label in fit.labels)),
     )
-    table = gains_against(fit, shapes)
+    table = gains_from_shapes(fit, shapes)
     expected = np.where([label.output_dof.node == 4 for label in fit.labels], GAIN, 1.0)
     error = np.abs(table["gain"] - expected) / table["gain_std"]
     assert error.max() < STANDARD_DEVIATIONS

@@ -11,7 +11,7 @@ from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.identification.fit import fit_modes, fit_residues
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.identification.results.gains import gains_against
+from frf_ipz.identification.results.gains import gains_from_shapes
 from frf_ipz.identification.results.shapes import mode_shapes
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -80,7 +80,7 @@ def test_free_beam_weighs_the_same_by_three_of_its_modes(recordings, beam_fit):
 @pytest.mark.slow
 def test_driving_point_of_the_free_beam_is_lower_than_the_others(recordings, beam_fit):
     modes = solve_modes(read_model(recordings / "freefree_beam" / "model.toml"), n_modes=8)
-    table = gains_against(beam_fit, modes)
+    table = gains_from_shapes(beam_fit, modes)
     is_driving = np.array([dof[:2] == "99" for dof in table["input_dof"]])
     assert float(table["gain"][is_driving].iloc[0]) == pytest.approx(0.86, abs=0.04)  # two standard deviations
     np.testing.assert_allclose(table["gain"][~is_driving], 1.0, rtol=0, atol=0.05)  # two standard deviations

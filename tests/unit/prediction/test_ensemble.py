@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from chains import chain, label
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.numerics.pencils import undamped_poles
-from frf_ipz.prediction.ensemble import Members
+from frf_ipz.prediction.ensemble import ModelEnsemble
 
 S = 2j * np.pi * np.linspace(2.0, 100.0, 30)
 SAME = 1e-8  # relative to the peak: modes and matrices solve one problem in two ways
@@ -17,7 +17,7 @@ SAME = 1e-8  # relative to the peak: modes and matrices solve one problem in two
 
 def members(models):
     ensemble = np.array([(model.mass, model.damping, model.stiffness) for model in models])
-    return Members(ensemble=ensemble, lowest_rad_s=float(np.abs(S).min()))
+    return ModelEnsemble(ensemble=ensemble, lowest_rad_s=float(np.abs(S).min()))
 
 
 @pytest.mark.parametrize("damping", [0.001, 0.3], ids=["light", "heavy"])

@@ -12,7 +12,7 @@ from chains import updated as as_updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import model_frfs
-from frf_ipz.prediction.advice import WIDE_DB, wide_stretches
+from frf_ipz.prediction.advice import WIDE_DB, wide_bands
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_testbench.updating.study import set_up, study
@@ -130,7 +130,7 @@ def test_wide_stretches_are_joined_and_short_ones_left_out():
     wide = 10 ** (2.2 * WIDE_DB / 20)
     high[10:20] = high[22:30] = wide  # two stretches with a narrow gap
     high[60:62] = wide  # too short
-    found = wide_stretches(lines, np.ones((101, 1)), high)
+    found = wide_bands(lines, np.ones((101, 1)), high)
     assert len(found) == 1
     assert (found[0].lines[0], found[0].lines[-1]) == (10, 29)
     assert_allclose(found[0].half_width_db, 1.1 * WIDE_DB, rtol=1e-9)

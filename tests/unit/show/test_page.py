@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.identification.options import FitOptions, PinnedPole, StruckPole
+from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.prediction.options import PredictOptions
@@ -22,7 +22,7 @@ CHOICES = PipelineFile(
     fit=FitOptions(
         band_hz=(5.0, 500.0),
         pin_hz=(20.0, PinnedPole(hz=33.0, why="seen by eye")),
-        strike=(StruckPole(hz=50.0, why="mains"),),
+        strike=(RejectedPole(hz=50.0, why="mains"),),
         exclude_hz=((49.0, 51.0),),
     ),
     reduce=ReduceOptions(dofs=("3:z", "5:z")),

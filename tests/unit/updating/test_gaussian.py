@@ -5,7 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from frf_ipz.updating.gaussian import draw, enough_slack, likely_scales, solve_step, unlikely
+from frf_ipz.updating.gaussian import (
+    draw_posterior,
+    most_contradicted,
+    most_likely_scales,
+    slack_by_discrepancy,
+    solve_step,
+)
 from frf_ipz.updating.parameters import PriorTerm
 
 DRAWS = 40_000
@@ -39,7 +45,7 @@ def test_the_step_is_the_posterior_mean(problem):
 def test_draws_have_the_posterior_mean_and_covariance(problem):
     sensitivity, data, noise = problem
     step = solve_step(sensitivity, data, noise)
-    members = draw(step, sensitivity, noise, np.random.default_rng(1), DRAWS)
+    members = draw_posterior(step, sensitivity, noise, np.random.default_rng(1), DRAWS)
     mean, covariance = posterior(*problem)
     assert np.abs(members.mean(0) - mean).max() < SAMPLED
     assert np.abs(np.cov(members.T) - covariance).max() < SAMPLED * covariance.max()
@@ -57,7 +63,7 @@ def test_the_likely_scales_have_the_largest_evidence():
         believed = sum(0.5 * np.log(s / 0.5) ** 2 for s in scales)
         return multivariate_normal(np.zeros(12), total).logpdf(data) - believed
 
-    found = likely_scales(parts, terms, data, noise, np.array([0.5, 0.5]))
+    found = most_likely_scales(parts, terms, data, noise, np.array([0.5, 0.5]))
     best = evidence(found)
     for factor in (0.9, 1.1):
         assert evidence(found * [factor, 1.0]) < best
@@ -71,7 +77,7 @@ def test_a_scale_without_doubt_stays():
         PriorTerm(name="sure", root=np.eye(4), std=0.2, doubt=0.0),
         PriorTerm(name="open", root=np.eye(1), std=0.2),
     ]
-    found = likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))
+    found = most_likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))
     assert found[0] == 0.2
     assert found[1] > 1.0
 
@@ -80,22 +86,22 @@ def test_slack_grows_until_the_misfit_is_that_of_noise():
     """The discrepancy principle: two data that no parameter tells apart disagree by a hundred deviations."""
     sensitivity, noise, slack = np.ones((2, 1)), 1e-4 * np.eye(2), np.full(2, 1e-3)
     data = np.array([1.0, 2.0])
-    factor = enough_slack(sensitivity, data, noise, slack, 1.0)
+    factor = slack_by_discrepancy(sensitivity, data, noise, slack, 1.0)
     met = solve_step(sensitivity, data, noise + np.diag((factor * slack) ** 2)).misfit
     before = solve_step(sensitivity, data, noise + np.diag((factor / 3 * slack) ** 2)).misfit
     assert met <= 2 < before
 
 
 def test_slack_stays_where_data_agree():
-    assert enough_slack(np.eye(2), np.array([0.1, -0.2]), 0.01 * np.eye(2), np.full(2, 0.1), 0.7) == 0.7
+    assert slack_by_discrepancy(np.eye(2), np.array([0.1, -0.2]), 0.01 * np.eye(2), np.full(2, 0.1), 0.7) == 0.7
 
 
 def test_the_datum_that_all_others_contradict_is_found():
     sensitivity, noise = np.ones((5, 1)), 1e-4 * np.eye(5)
     data = np.array([1.0, 1.01, 3.0, 0.99, 1.0])
-    assert unlikely(sensitivity, data, noise, 6.0) == 2
+    assert most_contradicted(sensitivity, data, noise, 6.0) == 2
     data[2] = 1.0
-    assert unlikely(sensitivity, data, noise, 6.0) == -1
+    assert most_contradicted(sensitivity, data, noise, 6.0) == -1
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
@@ -104,5 +110,5 @@ def test_the_search_for_scales_stays_within_reason(size):
     rng = np.random.default_rng(4)
     parts = [1e-3 * rng.standard_normal((9, 2)), rng.standard_normal((9, 3)), 1e-5 * np.eye(9)]
     terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.1) for k, part in enumerate(parts)]
-    found = likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
+    found = most_likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
     assert np.all(np.abs(np.log(found / 0.1)) <= 6.0 + 1e-9)

@@ -18,7 +18,7 @@ from frf_ipz.updating.parameters import (
     GLOBAL_STD,
     STRETCH_STD,
     generic_basis,
-    join,
+    join_bases,
     structural_basis,
     unwhiten,
 )
@@ -160,7 +160,7 @@ def test_slopes_are_the_derivatives_of_the_amounts(full):
 
 def test_joined_parameters_have_independent_priors():
     one, other = generic_basis(chain(3)), generic_basis(chain(3), std=0.2, common=False)
-    both = join(one, other)
+    both = join_bases(one, other)
     stds = np.array([term.std for term in both.terms])
     prior = covariance(both.terms, stds)
     assert not prior[:6, 6:].any()

@@ -12,7 +12,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.layout import Layout, extents
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.basis import Basis
@@ -68,7 +68,7 @@ class ModelContext:
         """Mass of the structure, held parts included."""
         direction = self.directions[0]
         rigid = np.array([float(dof.direction == direction) for dof in self.model.all_dofs])
-        return float(rigid @ apply(self.model.mass_all, rigid))
+        return float(rigid @ multiply(self.model.mass_all, rigid))
 
     @cached_property
     def positions(self) -> dict[int, FloatArray]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg, sparse
 
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -46,7 +46,7 @@ def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     modes = hypothesis.modes(np.zeros(0), values)
     model, m = hypothesis.specimen.model, hypothesis.nuisance.n_modes
     plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)
-    momentum = apply(model.mass_all, hypothesis.basis.vectors @ plain)
+    momentum = multiply(model.mass_all, hypothesis.basis.vectors @ plain)
     momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
     back = linalg.inv(modes.rotation)
     mass = back.T @ back - np.eye(m)

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.numerics.least_squares import factor_with_prior
+from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +64,7 @@ def _evidence(bench: InferenceProblem, null: Fit) -> Callable[[Hypothesis, Float
     data, nothing = bench.data, np.zeros(bench.nuisance.size)
     nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
     columns = data.slopes(nominal, nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout))
-    factor = factor_with_prior(columns.T)
+    factor = cholesky_with_prior(columns.T)
 
     def evidence(hypothesis: Hypothesis, values: FloatArray) -> float:
         changed = hypothesis.respond(values, nothing, data.measured.s)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, IntArray
-from frf_ipz.numerics.least_squares import even, solve_columns
+from frf_ipz.numerics.least_squares import scale_columns, solve_scaled_columns
 
 WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
 ROUNDS = 4  # of weights
@@ -75,10 +75,10 @@ def pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> LocalPol
     for _ in range(ROUNDS):
         weight = 1 / np.abs(s - pole)
         columns = np.asarray(np.column_stack([values, np.ones_like(s), away, away**2]) * weight[:, None], np.complex128)
-        found = solve_columns(columns, np.asarray(s * values * weight, np.complex128))
+        found = solve_scaled_columns(columns, np.asarray(s * values * weight, np.complex128))
         left = s * values * weight - columns @ found
         variance = float(np.vdot(left, left).real) / (len(s) - columns.shape[1])
-        scaled, sizes = even(columns)
+        scaled, sizes = scale_columns(columns)
         covariance = np.linalg.pinv(scaled.conj().T @ scaled)[0, 0].real * variance
         pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2) / sizes[0])
     size = abs(pole)

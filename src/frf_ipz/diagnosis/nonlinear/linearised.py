@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import Linearised
-from frf_ipz.numerics.least_squares import solve_columns
+from frf_ipz.numerics.least_squares import solve_scaled_columns
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -53,7 +53,7 @@ def linearise(fit: LawFit, plant: ModalModel) -> Linearised:
 
 def _spring_and_damper(motion: FloatArray, velocity: FloatArray, force: FloatArray) -> tuple[float, float]:
     columns = np.stack([motion, velocity], axis=1)
-    found = solve_columns(columns, force)
+    found = solve_scaled_columns(columns, force)
     if found[1] < 0:  # no law of the catalogue gives energy: motion that dies away leaves a little of a spring's force
         return float(motion @ force / (motion @ motion)), 0.0
     return float(found[0]), float(found[1])

@@ -21,7 +21,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.forces import CUT_OFF, cut_off, isolate_pulse
 from frf_ipz.diagnosis.measured.lines import same_places
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
-from frf_ipz.numerics.least_squares import solve_columns
+from frf_ipz.numerics.least_squares import solve_scaled_columns
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
@@ -188,7 +188,7 @@ def _left_by(degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray
     for _ in range(ROUNDS):
         weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
         weighted = np.asarray(columns * weight[:, None], np.complex128)
-        found = solve_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
+        found = solve_scaled_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
         denominator = 1 + below @ found[:poles]
         frf = (above @ found[poles : poles + zeros + 1]) / denominator
         left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator

@@ -21,7 +21,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
-from frf_ipz.numerics.least_squares import even, solve_columns
+from frf_ipz.numerics.least_squares import scale_columns, solve_scaled_columns
 
 WINDOWS_APART = 0.5  # of a window: from one to the next
 STEPS = 12
@@ -247,7 +247,7 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
         columns, found = _amplitudes(signal, time, poles)
         slopes = _slopes(time, poles, found)
         left = signal - columns @ found
-        step = solve_columns(np.hstack([columns, slopes]), left, CUT)[columns.shape[1] :]
+        step = solve_scaled_columns(np.hstack([columns, slopes]), left, CUT)[columns.shape[1] :]
         change = step[: len(poles)] + 1j * step[len(poles) :]
         decay = np.clip(-(poles + change).real / np.abs(poles), SLOWEST, FASTEST) * np.abs(poles)
         poles = -decay + 1j * (poles + change).imag
@@ -257,7 +257,7 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     all_columns = np.hstack([columns, _slopes(time, poles, found)])
     left = signal - columns @ found
     variance = float(left @ left) / max(len(signal) - all_columns.shape[1], 1)
-    scaled, sizes = even(all_columns)
+    scaled, sizes = scale_columns(all_columns)
     covariance = variance * np.linalg.pinv(scaled.T @ scaled, hermitian=True) / sizes / sizes[:, None]
     return _Window(
         poles=poles,
@@ -272,7 +272,7 @@ def _amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tu
     """Columns of cosines, sines and a constant, and how much of each is in a signal."""
     turning = np.exp(np.outer(time, poles))
     columns = np.hstack([turning.real, turning.imag, np.ones((len(time), 1))])
-    return columns, solve_columns(columns, signal, CUT)
+    return columns, solve_scaled_columns(columns, signal, CUT)
 
 
 def _slopes(time: FloatArray, poles: ComplexArray, found: FloatArray) -> FloatArray:

@@ -16,10 +16,10 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
 from frf_ipz.fe.factorization import DENSE_ORDER
-from frf_ipz.numerics.pencils import eigh_of_two
+from frf_ipz.numerics.pencils import generalised_eigh
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +81,7 @@ class Basis:
         (q, q) array
             The same in the basis.
         """
-        return np.asarray(self.vectors.T @ apply(matrix, self.vectors))
+        return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
 
 
 def make_basis(model: StructuralModel, highest_rad_s: float, places: Sequence[int]) -> Basis:
@@ -151,10 +151,10 @@ def enrich(basis: Basis, change: Change) -> Basis:
     around = np.hstack([basis.loaded, *shapes])
     for matrix in (change.stiffness, change.mass):
         if matrix is not None:
-            first = apply(matrix, around)
+            first = multiply(matrix, around)
             loads.append(first)
             if np.linalg.matrix_rank(first, tol=1e-9 * np.linalg.norm(first)) > 2:
-                loads.append(apply(matrix, _deflections(basis, first)))
+                loads.append(multiply(matrix, _deflections(basis, first)))
     loads += [attachment.motions for attachment in change.attachments]
     if change.moved:
         loads.append(_unit_loads(basis, tuple(change.moved.values())))
@@ -195,7 +195,7 @@ def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
         mass = mass + basis.project(change.mass)
     shift = basis.modes.shift
     try:
-        inverses, vectors = eigh_of_two(mass, stiffness + shift * mass)
+        inverses, vectors = generalised_eigh(mass, stiffness + shift * mass)
     except linalg.LinAlgError:
         squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
         return squares, vectors
@@ -237,7 +237,7 @@ def _constraint_shapes(basis: Basis, released: tuple[int, ...]) -> FloatArray:
 
 
 def _inertia(model: StructuralModel, shapes: FloatArray) -> FloatArray:
-    return apply(model.mass_all, shapes)
+    return multiply(model.mass_all, shapes)
 
 
 def _joined(basis: Basis, shapes: FloatArray) -> Basis:
@@ -246,10 +246,10 @@ def _joined(basis: Basis, shapes: FloatArray) -> Basis:
     for _ in range(2):  # the second time takes off what rounding left in the first
         sizes = _sizes(model, shapes)
         shapes = shapes / np.where(sizes > 0, sizes, 1.0)
-        shapes = shapes - basis.vectors @ (basis.vectors.T @ apply(model.mass_all, shapes))
+        shapes = shapes - basis.vectors @ (basis.vectors.T @ multiply(model.mass_all, shapes))
         shapes = shapes[:, _sizes(model, shapes) > INDEPENDENT]
     shapes = shapes / _sizes(model, shapes)
-    values, axes = linalg.eigh(shapes.T @ apply(model.mass_all, shapes))
+    values, axes = linalg.eigh(shapes.T @ multiply(model.mass_all, shapes))
     kept = values > ALIKE
     fresh = shapes @ (axes[:, kept] / np.sqrt(values[kept]))
     vectors = np.hstack([basis.vectors, fresh])
@@ -257,15 +257,15 @@ def _joined(basis: Basis, shapes: FloatArray) -> Basis:
         model=model,
         modes=basis.modes,
         vectors=vectors,
-        stiffness=_symmetric(vectors.T @ apply(model.stiffness_all, vectors)),
-        damping=_symmetric(vectors.T @ apply(model.damping_all, vectors)),
+        stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
+        damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
         highest_rad_s=basis.highest_rad_s,
         places=basis.places,
     )
 
 
 def _sizes(model: StructuralModel, shapes: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.maximum(np.sum(shapes * apply(model.mass_all, shapes), 0), 0.0)))
+    return np.asarray(np.sqrt(np.maximum(np.sum(shapes * multiply(model.mass_all, shapes), 0), 0.0)))
 
 
 def _symmetric(matrix: FloatArray) -> FloatArray:

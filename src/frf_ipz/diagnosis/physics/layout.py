@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.beam_models import kink_at, slope_row
+from frf_ipz.fe.beam_models import shear_slope_at, slope_row
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -173,7 +173,9 @@ def kink_beside(model: StructuralModel, dof: Dof) -> float:
     """
     if model.kind != "beam" or dof.direction not in AXES:
         return 0.0
-    return kink_at(model, float(model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, dof.node), 0]))
+    return shear_slope_at(
+        model, float(model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, dof.node), 0])
+    )
 
 
 @lru_cache(maxsize=1024)  # every hypothesis asks for the same few

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.physics.layout import motion_row
 from frf_ipz.diagnosis.physics.modified import coupling
 from frf_ipz.diagnosis.physics.nuisance import all_shift_rows
 from frf_ipz.dofs import Dof
-from frf_ipz.numerics.pencils import eigh_of_two
+from frf_ipz.numerics.pencils import generalised_eigh
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.physics.basis import Basis
@@ -199,7 +199,7 @@ def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tupl
     if np.linalg.norm(mu) > MOST_OF_MASS:  # no step may take all mass away
         least = float(linalg.eigvalsh(mu, subset_by_index=(0, 0), check_finite=False)[0])
         mu = mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))
-    values, rotation = eigh_of_two(block, np.eye(m) + mu)
+    values, rotation = generalised_eigh(block, np.eye(m) + mu)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation
 

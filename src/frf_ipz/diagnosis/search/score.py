@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
-from frf_ipz.numerics.least_squares import factor_with_prior
+from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
@@ -121,7 +121,7 @@ def score_on(bench: InferenceProblem, base: Fit, data: Data) -> Score:
         data=data,
         misfit=data.misfit(response) + columns @ pulls,
         columns=columns,
-        factor=factor_with_prior(columns.T),
+        factor=cholesky_with_prior(columns.T),
         pulls=pulls,
         response=response,
     )

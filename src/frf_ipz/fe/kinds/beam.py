@@ -10,7 +10,7 @@ from pydantic import Field
 
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
-from frf_ipz.fe.assembly import mass_and_stiffness, stated_damping
+from frf_ipz.fe.assembly import assemble_mass_and_stiffness, stated_damping
 from frf_ipz.fe.beam_elements import BeamElements, mass_matrices, shear_coefficient, stiffness_matrices
 from frf_ipz.fe.model_options import Count, DampingSection, ModelSection, Node, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
@@ -216,7 +216,7 @@ def build_beam(file: BeamFile) -> StructuralModel:
     beam = file.beam
     dofs = tuple(Dof(node, direction) for node in range(1, beam.elements + 2) for direction in DIRECTIONS)
     parts = (*element_parts(beam), *_point_parts(beam))
-    mass, stiffness = mass_and_stiffness(parts, len(dofs))
+    mass, stiffness = assemble_mass_and_stiffness(parts, len(dofs))
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
     return StructuralModel(
         name=file.model.name,

@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
-from frf_ipz.fe.assembly import add_up, mass_and_stiffness, stated_damping
+from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness, stated_damping
 from frf_ipz.fe.model_options import DampingSection, ModelSection, Name, Node, NodeOrGround, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT
@@ -156,7 +156,7 @@ def read(file: LumpedFile, path: Path) -> StructuralModel:
     nodes = sorted({mass.node for mass in lumped.mass} | {node for spring in lumped.spring for node in spring.nodes})
     place = {node: index for index, node in enumerate(nodes)}
     parts = (*_mass_parts(lumped, place), *_spring_parts(lumped, place))
-    mass, stiffness = mass_and_stiffness(parts, len(nodes))
+    mass, stiffness = assemble_mass_and_stiffness(parts, len(nodes))
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
     dampers = [(_rows(spring, place), spring.damping_Ns_m * ACROSS) for spring in lumped.spring if spring.damping_Ns_m]
     return StructuralModel(
@@ -166,7 +166,7 @@ def read(file: LumpedFile, path: Path) -> StructuralModel:
         fixed=np.array([node == GROUND for node in nodes]),
         mass_all=mass,
         stiffness_all=stiffness,
-        damping_all=damping + add_up(dampers, len(nodes)),
+        damping_all=damping + assemble(dampers, len(nodes)),
         modal_damping=modal_damping,
         geometry=_geometry(lumped, nodes),
         parts=parts,

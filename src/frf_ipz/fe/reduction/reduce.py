@@ -19,7 +19,7 @@ from scipy import linalg
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import IllConditionedError, InputError
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
@@ -143,7 +143,7 @@ def _with_residual_vectors(model: StructuralModel, basis: ModalBasis, plan: Redu
         notes.append(f"residual flexibility: {at}")
     weights = np.zeros(0)
     if kept:
-        stiffness, mass = (vectors.T @ apply(matrix, vectors) for matrix in (basis.stiffness, basis.mass))
+        stiffness, mass = (vectors.T @ multiply(matrix, vectors) for matrix in (basis.stiffness, basis.mass))
         weights, axes = linalg.eigh(stiffness, mass)
         vectors = vectors @ axes
     return _Ritz(
@@ -167,8 +167,8 @@ def _residual_vectors(model: StructuralModel, basis: ModalBasis, plan: Reduction
     vectors = np.zeros((len(basis.shapes), 0))
     kept: list[Dof] = []
     for column, (dof, row) in enumerate(zip(plan.residual, rows, strict=True)):
-        rest = deflections[:, column] - vectors @ (vectors.T @ apply(basis.mass, deflections[:, column]))
-        size = float(np.sqrt(rest @ apply(basis.mass, rest)))
+        rest = deflections[:, column] - vectors @ (vectors.T @ multiply(basis.mass, deflections[:, column]))
+        size = float(np.sqrt(rest @ multiply(basis.mass, rest)))
         own = abs(deflections[row, column])
         is_new = own > NOTHING_LEFT * in_modes[column] and abs(rest[row]) > NOTHING_LEFT * own and len(kept) < most
         if is_new and size > 0:
@@ -239,7 +239,7 @@ def _reduced(
     _require_modes(mass, stiffness, ritz)
     ratios = stated_ratios(model.modal_damping, len(ritz.eigenvalues), ritz.n_rigid)
     rates = 2 * ratios * np.sqrt(ritz.eigenvalues)
-    viscous = ritz.shapes.T @ apply(model.damping, ritz.shapes)
+    viscous = ritz.shapes.T @ multiply(model.damping, ritz.shapes)
     dashpots = inverse.T @ ((viscous + viscous.T) / 2) @ inverse
     damping = _gram(np.sqrt(rates)[:, None] * inverse) + dashpots
     states_both = np.any(rates) and np.any(viscous)

@@ -116,7 +116,7 @@ def _said(channel: str, gain: float, std: float) -> str:
     return f"the channel '{channel}' records {gain:.4g} times the true signal (standard deviation {std:.2g})"
 
 
-def gains_against(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
+def gains_from_shapes(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     """Find one gain an FRF, against shapes that are known from elsewhere, such as those of an FE model.
 
     The scale of each mode is free: only how an FRF stands against the others is found.

@@ -14,7 +14,7 @@ from scipy.optimize import linear_sum_assignment
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.numerics.pencils import Roots, damped_sensitivity
 from frf_ipz.updating.ipz.step import ILL_CONDITIONED
-from frf_ipz.updating.tracking import WantedRoots
+from frf_ipz.updating.tracking import TargetRoots
 from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def iterate_parameters(
         One row an iteration.
     """
     theta = np.zeros(len(basis.names))
-    wanted = WantedRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
+    wanted = TargetRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
     values, previous, rows = problem.computed, np.inf, []
     status = UpdateStatus.MAX_ITERATIONS
     for iteration in range(1, max_iterations + 1):
@@ -74,7 +74,7 @@ def iterate_parameters(
 
 
 def _roots_and_slopes(
-    problem: UpdateProblem, basis: ParameterBasis, wanted: WantedRoots, theta: FloatArray, near: ComplexArray
+    problem: UpdateProblem, basis: ParameterBasis, wanted: TargetRoots, theta: FloatArray, near: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
     amounts, moves = basis.amounts(theta), basis.slopes(theta)
     model = problem.model

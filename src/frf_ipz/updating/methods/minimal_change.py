@@ -24,7 +24,7 @@ from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, basis_inside
 from frf_ipz.updating.minimal_change.outliers import contradicted, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
-from frf_ipz.updating.tracking import TrackedRoots, WantedRoots
+from frf_ipz.updating.tracking import TargetRoots, TrackedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
     damping = _damping(problem, frame, inner, phase, result)
-    damped = iterate(damping, damping.first_roots(), start=damping.start())
+    damped = iterate(damping, damping.initial_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
     shift = _by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
     if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(result.noise))):
@@ -107,7 +107,7 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
     return StiffnessPhase(
         eigenvalues=frame.eigenvalues,
         basis=basis_inside(frame, basis),
-        wanted=WantedRoots(frf=problem.frf, rows=_rows(problem, frame)),
+        wanted=TargetRoots(frf=problem.frf, rows=_rows(problem, frame)),
         targets=np.log(size),
         noise=_projected(problem.covariance, gradient) + SMALLEST_NOISE**2 * np.eye(len(size)),
         changes_mass=bool(np.any(basis.mass)),
@@ -122,7 +122,7 @@ def _damping(
     return damping_phase(
         phase.basis,
         inner,
-        WantedRoots(
+        TargetRoots(
             frf=problem.frf, rows={number: (out @ inner.shapes, force @ inner.shapes) for number, (out, force) in rows}
         ),
         inner.inside(frame.inside(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),

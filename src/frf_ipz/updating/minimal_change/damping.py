@@ -18,7 +18,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.rational import damping_ratio
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, unwhiten
-from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, with_damping
+from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, with_damping
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
 MODE_STD = 0.3  # of the logarithm of each mode's own factor
@@ -54,7 +54,7 @@ class DampingPhase:
         Prior of all parameters: common, each mode's, couplings, chosen ones.
     undamped : TrackedRoots
         Squared roots of the same model without damping that belong to the targets.
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which roots are targets.
     targets : (n,) array
         Measured real parts with their sign changed, rad/s.
@@ -73,7 +73,7 @@ class DampingPhase:
     chosen: FloatArray
     terms: tuple[PriorTerm, ...]
     undamped: TrackedRoots
-    wanted: WantedRoots
+    wanted: TargetRoots
     targets: FloatArray
     sizes: FloatArray
     noise: FloatArray
@@ -121,7 +121,7 @@ class DampingPhase:
             whitened[0] = np.log(np.median(ratios[ratios > 0])) / self.terms[0].std
         return whitened
 
-    def first_roots(self) -> TrackedRoots:
+    def initial_roots(self) -> TrackedRoots:
         """Give the roots of the model to start from."""
         stds = np.array([term.std for term in self.terms])
         return self._roots(self.damping(unwhiten(self.terms, stds, self.start())))
@@ -236,7 +236,7 @@ class DampingPhase:
 def damping_phase(
     basis: ParameterBasis,
     inner: ModalFrame,
-    wanted: WantedRoots,
+    wanted: TargetRoots,
     matrix: FloatArray,
     dashpots: FloatArray,
     values: ComplexArray,
@@ -251,7 +251,7 @@ def damping_phase(
         Parameters in the coordinates of the stiffness phase.
     inner : ModalFrame
         Modes of the model with updated stiffness, in the same coordinates.
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which roots are targets, with rows in the inner coordinates.
     matrix : (r, r) array
         The nominal damping matrix in the inner coordinates.
@@ -286,7 +286,7 @@ def damping_phase(
         dashpots=dashpots,
         chosen=chosen,
         terms=_make_terms(len(rates), len(chosen), terms),
-        undamped=first_roots(wanted, np.eye(len(rates)), np.diag(inner.eigenvalues), moduli.astype(complex)),
+        undamped=nominal_roots(wanted, np.eye(len(rates)), np.diag(inner.eigenvalues), moduli.astype(complex)),
         wanted=wanted,
         targets=-values.real,
         sizes=sizes,

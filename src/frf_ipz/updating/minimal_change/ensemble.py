@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.updating.gaussian import draw
+from frf_ipz.updating.gaussian import draw_posterior
 from frf_ipz.updating.minimal_change.damping import DampingPhase
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
@@ -79,7 +79,7 @@ def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    whitened = draw_posterior(result.step, result.sensitivity, result.noise, rng, count)
     theta = unwhiten(phase.terms, result.scales[:-1], whitened)
     mass, stiffness = phase.matrices(theta)
     # what the linear step promised for the poles is imposed: far from the mean, second-order terms would blur them
@@ -105,7 +105,7 @@ def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wan
 
 def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
     phase, result = posterior.damping, posterior.damping_result
-    whitened = draw(result.step, result.sensitivity, result.noise, rng, count)
+    whitened = draw_posterior(result.step, result.sensitivity, result.noise, rng, count)
     members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
     values, vectors = np.linalg.eigh(members)
     members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.updating.gaussian import GaussianStep, enough_slack, likely_scales, solve_step
+from frf_ipz.updating.gaussian import GaussianStep, most_likely_scales, slack_by_discrepancy, solve_step
 from frf_ipz.updating.parameters import PriorTerm, unwhiten
 from frf_ipz.updating.tracking import TrackedRoots
 
@@ -207,11 +207,11 @@ def iterate(
         data = place.error + slopes @ place.theta
         bent = np.diag(bend**2)
         if not known and iteration <= SCALE_ITERATIONS:
-            found = likely_scales([*parts, np.diag(phase.slack)], terms, data, phase.noise + bent, scales)
+            found = most_likely_scales([*parts, np.diag(phase.slack)], terms, data, phase.noise + bent, scales)
             place = replace(place, whitened=_rescaled(phase.terms, scales / found, place.whitened))
             scales = found
         sensitivity = np.hstack([scale * part for scale, part in zip(scales[:-1], parts, strict=True)])
-        scales[-1] = enough_slack(sensitivity, data, phase.noise + bent, phase.slack, scales[-1])
+        scales[-1] = slack_by_discrepancy(sensitivity, data, phase.noise + bent, phase.slack, scales[-1])
         noise = phase.noise + np.diag((scales[-1] * phase.slack) ** 2)
         step = solve_step(sensitivity, data, noise + bent)
         before, (place, part) = place, _walk(phase, scales[:-1], place, step.mean, noise + bent)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import IntArray
-from frf_ipz.updating.gaussian import likely_scales, unlikely
+from frf_ipz.updating.gaussian import most_contradicted, most_likely_scales
 
 if TYPE_CHECKING:
     from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
@@ -47,9 +47,9 @@ def contradicted(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
     scales = np.array([term.std for term in phase.terms])
     found: list[int] = []
     while len(found) <= MOST * len(error):
-        scales = likely_scales(parts, phase.terms, error, noise, scales)
+        scales = most_likely_scales(parts, phase.terms, error, noise, scales)
         sensitivity = np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)])
-        worst = unlikely(sensitivity, error, noise, CONTRADICTED, least=LEAST_ERROR)
+        worst = most_contradicted(sensitivity, error, noise, CONTRADICTED, least=LEAST_ERROR)
         if worst < 0:
             return np.array(found, int)
         found.append(worst)

@@ -13,7 +13,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.numerics.pencils import undamped_sensitivity
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
-from frf_ipz.updating.tracking import TrackedRoots, WantedRoots, first_roots, follow
+from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, track
 
 POLE_SLACK = 1e-7  # relative standard deviation of what a reduced model cannot express of a real pole: it has its modes
 ZERO_SLACK = 1e-5  # the same of a zero, which the modes left out move as well
@@ -30,7 +30,7 @@ class StiffnessPhase:
         Squared natural frequencies of the nominal model, (rad/s)^2: its stiffness; its mass is the unit matrix.
     basis : ParameterBasis
         In the same coordinates.
-    wanted : WantedRoots
+    wanted : TargetRoots
         Which roots are targets.
     targets : (n,) array
         Logarithms of the moduli of measured poles and zeros, less what damping adds to them in the model.
@@ -42,7 +42,7 @@ class StiffnessPhase:
 
     eigenvalues: FloatArray
     basis: ParameterBasis
-    wanted: WantedRoots
+    wanted: TargetRoots
     targets: FloatArray
     noise: FloatArray
     changes_mass: bool
@@ -89,7 +89,7 @@ class StiffnessPhase:
         TrackedRoots
             Where the iteration starts.
         """
-        return first_roots(self.wanted, *self.matrices(np.zeros(len(self.basis.names))), computed)
+        return nominal_roots(self.wanted, *self.matrices(np.zeros(len(self.basis.names))), computed)
 
     def roots(self, theta: FloatArray, near: TrackedRoots) -> TrackedRoots | None:
         """Give the squared roots that belong to the targets; see `Phase`.
@@ -110,7 +110,7 @@ class StiffnessPhase:
         values = np.linalg.eigvalsh(stiffness)
         if values[0] < -INDEFINITE * values[-1] or (self.changes_mass and np.linalg.eigvalsh(mass)[0] <= 0):
             return None
-        return follow(self.wanted, near, mass, stiffness)
+        return track(self.wanted, near, mass, stiffness)
 
     def errors(self, tracked: TrackedRoots) -> FloatArray:
         """Give targets minus model.

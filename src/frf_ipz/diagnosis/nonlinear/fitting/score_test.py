@@ -17,7 +17,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock, place_motion
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, nominal_values, respond
-from frf_ipz.numerics.least_squares import factor_with_prior
+from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,7 +119,7 @@ def fit_linear(stretches: SegmentSet, freedom: NuisancePrior) -> LinearFit:
     nothing = np.zeros((stretches.n_records, len(used)), complex)
     columns = as_real(freedom.columns(stretches, on_used, nothing, None))
     misfit = as_real(beyond[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
-    factor = factor_with_prior(columns)
+    factor = cholesky_with_prior(columns)
     seen = linalg.solve_triangular(factor, columns @ misfit, lower=True)
     unknowns = linalg.solve_triangular(factor.T, seen, lower=False)
     beyond[freedom.moving] -= freedom.sensor_starts(unknowns, response)

@@ -16,7 +16,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
-from frf_ipz.fe.assembly import apply
+from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, damping_ratios, solve_basis
 from frf_ipz.fe.factorization import DENSE_ORDER
 
@@ -281,7 +281,7 @@ def _points(low: ModalBasis, basis: ModalBasis, weights: FloatArray) -> Points:
         static, inertial = rest @ (loaded / values[:, None]), rest @ (loaded / values[:, None] ** 2)
     else:
         static = low.residual_flexibility(weights.T)
-        inertial = low.residual_flexibility(apply(low.mass, static))
+        inertial = low.residual_flexibility(multiply(low.mass, static))
     return Points(shapes=weights @ low.shapes, weights=weights, static=static, inertial=inertial)
 
 
