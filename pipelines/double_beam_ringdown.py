@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from frf_ipz.diagnosis.nonlinear.ringdown import (
+from frf_testbench.ringdown import (
     AmplitudeLaw,
     RingdownTrack,
     fit_amplitude_law,

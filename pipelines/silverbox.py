@@ -80,12 +80,12 @@ def main(folder: Path) -> None:
     dof = parse_dof("1:+x")
     sensors = (Sensor(channel="V2", dof=dof, quantity=FrfQuantity.RECEPTANCE),)
     cuts = np.array_split(np.arange(len(force)), PIECES)
-    blows = tuple(
+    records = tuple(
         ObservedRecord(name=f"piece {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
              force=force[cut], responses=motion[None, cut], rested=i == 0)
         for i, cut in enumerate(cuts)
     )  # fmt: skip
-    observations = Observations(kind="random", blows=blows, band_hz=(20.0, 180.0), exclude_hz=(MAINS_HZ,))
+    observations = Observations(kind="random", records=records, band_hz=(20.0, 180.0), exclude_hz=(MAINS_HZ,))
     print(f"weak: {np.sqrt(stiffness / mass) / 2 / np.pi:.2f} Hz, damping ratio {ratio:.4f}, k1 {stiffness:.4g}")
     show(search_laws(model, observations, TOLERANCES), stiffness)
     own = replace(TOLERANCES, extra_effects=("silverbox.py:CubicWithSquare",))
