@@ -23,8 +23,8 @@ from frf_ipz.pairing.pair import pair
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.update import update_model
-from frf_testbench.updating.random_structures import random_beam, scaled, stiffness_errors
-from frf_testbench.updating.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
+from frf_testbench.updating.random_structures import draw_beam, draw_stiffness_errors, scale_stiffness
+from frf_testbench.updating.synthetic_fit import TrueModes, choose_band, list_labels, simulate_fit
 
 NOISE = 0.002
 SEED = 3
@@ -64,15 +64,16 @@ def synthetic_folder(*, without=(), diagnosed=False):
 def synthetic_results():
     """Results of all stages by their names."""
     rng = np.random.default_rng(SEED)
-    nominal = random_beam(rng)
-    factors, _ = stiffness_errors(nominal, rng)
+    nominal = draw_beam(rng)
+    factors, _ = draw_stiffness_errors(nominal, rng)
     free = [dof for dof in nominal.dofs if dof.direction == "z"]
     sensors, input_dofs, points = (free[-1], free[len(free) // 3]), (free[-3],), (free[len(free) // 2],)
-    case = SimpleNamespace(sensors=sensors, input_dofs=input_dofs)
-    truth = Truth(scaled(nominal, factors), np.full(200, 0.004))
-    labels = tuple(replace(label, output_channel=f"acc{label.output_dof.node}") for label in labels_of(case))
-    band = band_of(truth, 5)
-    fit = synthetic_fit(truth, labels, band, noise=NOISE, rng=rng)
+    truth = TrueModes(scale_stiffness(nominal, factors), np.full(200, 0.004))
+    labels = tuple(
+        replace(label, output_channel=f"acc{label.output_dof.node}") for label in list_labels(input_dofs, sensors)
+    )
+    band = choose_band(truth, 5)
+    fit = simulate_fit(truth, labels, band, noise=NOISE, rng=rng)
     recordings = recordings_of(truth, labels, band, rng)
     fit = with_tables(replace(fit, used_lines=recordings.frfs.in_band(band)), recordings.frfs)
     reduced = reduce_model(

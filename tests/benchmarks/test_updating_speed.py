@@ -13,8 +13,8 @@ from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
-from frf_testbench.updating.paper_cases import section_4
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.paper_cases import build_section_4
+from frf_testbench.updating.study import make_update_case
 
 UPDATE_MS = 50.0  # one minimal-change update of a reduced model of order 12
 LAPACK_RATIO = 4.0  # a published iteration over its two bare dgeev calls of order 12
@@ -33,15 +33,15 @@ def cpu_us(work, rounds=ROUNDS):
 
 
 def order_12():
-    return next(bench for bench in map(set_up, range(100)) if len(bench.reduced.dofs) == 12)
+    return next(case for case in map(make_update_case, range(100)) if len(case.reduced_model.dofs) == 12)
 
 
 def test_minimal_change(benchmark):
-    bench = order_12()
-    basis = structural_basis(bench.case.nominal, bench.reduced)
+    case = order_12()
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
     update = {
-        "with its ensemble of 200": lambda: update_model(bench.reduced, bench.fit, bench.pairs, basis=basis),
-        "alone": lambda: update_model(bench.reduced, bench.fit, bench.pairs, UpdateOptions(ensemble=0), basis=basis),
+        "with its ensemble of 200": lambda: update_model(case.reduced_model, case.fit, case.pairs, basis=basis),
+        "alone": lambda: update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(ensemble=0), basis=basis),
     }
     found = {name: cpu_us(work, 5) / 1e3 for name, work in update.items()}
     print("\n" + ", ".join(f"{name} {ms:.1f} ms" for name, ms in found.items()) + f" (at most {UPDATE_MS} ms)")
@@ -51,8 +51,8 @@ def test_minimal_change(benchmark):
 
 
 def test_published_iteration(benchmark):
-    case = section_4()
-    model, label = case.reduced, case.fit.labels[0]
+    case = build_section_4()
+    model, label = case.reduced_model, case.fit.labels[0]
     step = PublishedStep(
         model.mass,
         model.damping,
@@ -93,7 +93,7 @@ def state_matrix(model):
 
 def plain_numpy(case):
     """One iteration as one would write it down: two eigenvalue problems with left vectors, one least-squares step."""
-    model, label = case.reduced, case.fit.labels[0]
+    model, label = case.reduced_model, case.fit.labels[0]
     everything = list(range(len(model.dofs)))
     keep_rows = [k for k in everything if model.dofs[k] != label.input_dof]
     keep_columns = [k for k in everything if model.dofs[k] != label.output_dof]

@@ -1,13 +1,15 @@
 """`ipz` against tables 2 and 5 of [Dorosti2018] (doi:10.1016/j.conengprac.2017.11.002)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.paper_cases import published, section_4, section_5, table
-from frf_testbench.updating.paper_comparison import epsilon, fitted_place_cm
+from frf_testbench.updating.paper_cases import build_section_4, build_section_5, published_options, read_table
+from frf_testbench.updating.paper_comparison import compute_epsilon, fit_impact_location_cm
 from printed_digits import cut
 
 EPSILON = 0.01  # the damping that enters it is printed with three digits
@@ -22,22 +24,22 @@ TABLE_5 = (
 
 
 def updated(case, options):
-    return update_model(case.reduced, case.fit, case.pairs, options)
+    return update_model(case.reduced_model, case.fit, case.pairs, options)
 
 
 @pytest.fixture(scope="module")
 def fine():
-    return updated(section_4(), published(4, 1e-5))
+    return updated(build_section_4(), published_options(4, 1e-5))
 
 
 @pytest.fixture(scope="module")
 def coarse():
-    return updated(section_4(), published(4, 1e-1))
+    return updated(build_section_4(), published_options(4, 1e-1))
 
 
 @pytest.fixture(scope="module", params=["88:z", "89:z"])
 def experiment(request):
-    return updated(section_5(request.param), published(5, 1e-3))
+    return updated(build_section_5(request.param), published_options(5, 1e-3))
 
 
 def test_table_2_in_as_many_iterations(fine):
@@ -47,7 +49,7 @@ def test_table_2_in_as_many_iterations(fine):
 
 
 def test_table_2_to_every_printed_digit(fine):
-    assert_allclose(cut(fine.after.imag), table(2)["updated_imag"], rtol=1e-9)
+    assert_allclose(cut(fine.after.imag), read_table(2)["updated_imag"], rtol=1e-9)
 
 
 def test_the_stiffness_is_as_unsymmetric_as_published(fine):
@@ -58,20 +60,20 @@ def test_the_stiffness_is_as_unsymmetric_as_published(fine):
 
 
 def test_epsilon_is_that_of_the_reached_poles_and_zeros(fine):
-    assert_allclose(epsilon(fine.after, section_4().targets), fine.history.misfit.iloc[-1], rtol=SOLVERS)
+    assert_allclose(compute_epsilon(fine.after, build_section_4().targets), fine.history.misfit.iloc[-1], rtol=SOLVERS)
 
 
 def test_table_2_with_a_coarse_stop(coarse):
     assert_allclose(coarse.history.iteration.iloc[-1], COARSE["iterations"], rtol=ITERATIONS)
     assert_allclose(coarse.history.misfit.iloc[-1], COARSE["epsilon"], rtol=EPSILON)
-    assert_allclose(cut(coarse.after.imag), table(2)["updated_coarse_imag"], rtol=1e-9)
+    assert_allclose(cut(coarse.after.imag), read_table(2)["updated_coarse_imag"], rtol=1e-9)
 
 
 @pytest.mark.slow
 def test_without_cross_sensitivities_it_takes_fifteen_to_thirty_times_as_long(fine):
     taken = int(fine.history.iteration.iloc[-1])
-    options = published(4, 0.0, cross_sensitivities=False, max_iterations=30 * taken)
-    history = updated(section_4(), options).history
+    options = replace(published_options(4, 0.0), cross_sensitivities=False, max_iterations=30 * taken)
+    history = updated(build_section_4(), options).history
     reached = history.iteration[history.misfit <= fine.history.misfit.iloc[-1]]
     assert len(reached)
     assert reached.iloc[0] > 15 * taken  # published: 21 times
@@ -85,10 +87,10 @@ def test_section_5_converges_as_fast_as_published(experiment):
 
 
 def test_section_5_reaches_table_5():
-    case = section_5("88:z")
-    found = updated(case, published(5, 1e-3)).after.imag / (2 * np.pi)
-    assert_allclose(found, table(5)["updated_imag"], rtol=TABLE_5)
+    case = build_section_5("88:z")
+    found = updated(case, published_options(5, 1e-3)).after.imag / (2 * np.pi)
+    assert_allclose(found, read_table(5)["updated_imag"], rtol=TABLE_5)
 
 
 def test_the_blow_of_section_5_was_half_a_centimetre_from_where_the_text_says():
-    assert 43.4 < fitted_place_cm() < 43.6  # text: 44
+    assert 43.4 < fit_impact_location_cm() < 43.6  # text: 44

@@ -9,8 +9,8 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.paper_cases import section_4, section_5
-from frf_testbench.updating.paper_comparison import compare_section_4, judge
+from frf_testbench.updating.paper_cases import build_section_4, build_section_5
+from frf_testbench.updating.paper_comparison import compare_section_4, judge_model
 
 MOST_ITERATIONS = 5
 IMAGINARY = 1e-5  # of the imaginary part: the bar for poles and zeros
@@ -22,9 +22,9 @@ PRINTED = 1e-4  # of the targets of table 5, which have three digits and contrad
 
 @pytest.fixture(scope="module", params=["any stiffness", "elements"])
 def update(request):
-    case = section_4()
-    basis = structural_basis(case.full, case.reduced) if request.param == "elements" else None
-    return case, update_model(case.reduced, case.fit, case.pairs, UpdateOptions(), basis=basis)
+    case = build_section_4()
+    basis = structural_basis(case.full_model, case.reduced_model) if request.param == "elements" else None
+    return case, update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(), basis=basis)
 
 
 def test_it_converges_in_five_iterations(update):
@@ -51,7 +51,7 @@ def test_the_matrices_stay_those_of_a_structure(update):
 
 def test_the_point_of_interest_is_right(update):
     case, updated = update
-    row = judge(case, updated.model, updated)
+    row = judge_model(case, updated.model, updated)
     assert row["X_S"] >= ALIKE
     assert row["X_A"] >= ALIKE
     assert row["dB"] <= WITHIN_DB
@@ -68,15 +68,15 @@ def test_it_beats_the_trivial_answer_in_db_and_zeros_and_so_does_the_table():
 
 
 def test_the_trivial_answer_has_the_measured_poles():
-    case = section_4()
-    trivial = with_measured_poles(case.reduced, case.pairs)
+    case = build_section_4()
+    trivial = with_measured_poles(case.reduced_model, case.pairs)
     values = np.linalg.eigvals(np.linalg.solve(trivial.mass, trivial.stiffness)).real
     assert_allclose(np.sqrt(np.sort(values)[:4]), np.abs(case.targets[:4]), rtol=1e-9)
 
 
 @pytest.mark.parametrize("blow", ["88:z", "89:z"])
 def test_it_meets_the_targets_of_section_5(blow):
-    case = section_5(blow)
-    updated = update_model(case.reduced, case.fit, case.pairs, UpdateOptions())
+    case = build_section_5(blow)
+    updated = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions())
     assert updated.status is UpdateStatus.CONVERGED
     assert_allclose(updated.after.imag, case.targets.imag, rtol=PRINTED)

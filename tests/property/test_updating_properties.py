@@ -13,7 +13,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.study import make_update_case
 
 EXAMPLES = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])  # an update each
 SEEDS = st.integers(2000, 10**6)  # beyond all that constants were chosen or reported on
@@ -21,36 +21,36 @@ ROUNDING = 1e-9  # of the largest value
 
 
 def updated(seed, *, parts, mass=False):
-    bench = set_up(seed)
-    basis = structural_basis(bench.case.nominal, bench.reduced, mass=mass) if parts else None
-    return bench, update_model(bench.reduced, bench.fit, bench.pairs, UpdateOptions(ensemble=5), basis=basis)
+    case = make_update_case(seed)
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model, mass=mass) if parts else None
+    return case, update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(ensemble=5), basis=basis)
 
 
 @EXAMPLES
 @given(SEEDS, st.booleans(), st.booleans())
 def test_an_update_keeps_a_structure_a_structure(seed, parts, mass):
-    bench, found = updated(seed, parts=parts, mass=mass)
+    case, found = updated(seed, parts=parts, mass=mass)
     assert found.status in {UpdateStatus.CONVERGED, UpdateStatus.MAX_ITERATIONS, UpdateStatus.NOTHING_TO_DO}
     for members in ((found.model.mass, found.model.damping, found.model.stiffness), *found.ensemble):
         for matrix in members:
             assert np.array_equal(matrix, matrix.T)
             assert np.linalg.eigvalsh(matrix)[0] >= -ROUNDING * np.abs(matrix).max() * len(matrix)
-    nominal = undamped_poles(bench.reduced.mass, bench.reduced.stiffness).values.real
-    rigid = int(np.count_nonzero(nominal < 1e-6 * np.abs(bench.fit.model.poles[0]) ** 2))
+    nominal = undamped_poles(case.reduced_model.mass, case.reduced_model.stiffness).values.real
+    rigid = int(np.count_nonzero(nominal < 1e-6 * np.abs(case.fit.model.poles[0]) ** 2))
     after = undamped_poles(found.model.mass, found.model.stiffness).values.real
-    assert np.all(after[:rigid] < 1e-5 * np.abs(bench.fit.model.poles[0]) ** 2)
+    assert np.all(after[:rigid] < 1e-5 * np.abs(case.fit.model.poles[0]) ** 2)
 
 
 @EXAMPLES
 @given(SEEDS)
 def test_an_update_is_reciprocal_and_its_export_the_same_model(seed):
-    bench, found = updated(seed, parts=True)
-    first = bench.labels[0]
+    case, found = updated(seed, parts=True)
+    first = case.labels[0]
     back = FrfLabel(first.input_dof, first.output_dof, first.quantity)
-    s = 2j * np.pi * np.linspace(*bench.fit.band_hz, 20)
+    s = 2j * np.pi * np.linspace(*case.fit.band_hz, 20)
     there, again = model_frfs(found.model, [first, back], s).T
     assert np.abs(there - again).max() < ROUNDING * np.abs(there).max()
-    exported = to_control(to_state_space(found, bench.labels, bench.case.points))(s)
+    exported = to_control(to_state_space(found, case.labels, case.structure.points))(s)
     row = exported.reshape(-1, exported.shape[-1])[0]
     assert np.abs(row - there).max() < 1e-6 * np.abs(there).max()
 
@@ -59,8 +59,8 @@ def test_an_update_is_reciprocal_and_its_export_the_same_model(seed):
 @given(SEEDS, st.sampled_from([1e-3, 1e3]))
 def test_units_do_not_matter(seed, factor):
     """Masses and stiffnesses in other units are the same structure: poles and zeros stay, and so do the ratios."""
-    bench, found = updated(seed, parts=False)
-    model = bench.reduced
+    case, found = updated(seed, parts=False)
+    model = case.reduced_model
     other = type(model)(
         mass=factor * model.mass,
         damping=factor * model.damping,
@@ -70,5 +70,5 @@ def test_units_do_not_matter(seed, factor):
         expanded_dofs=model.expanded_dofs,
         n_modes=model.n_modes,
     )
-    again = update_model(other, bench.fit, bench.pairs, UpdateOptions(ensemble=0))
+    again = update_model(other, case.fit, case.pairs, UpdateOptions(ensemble=0))
     assert_allclose(again.after, found.after, rtol=1e-6)

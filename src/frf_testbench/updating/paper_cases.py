@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 import pandas as pd
@@ -27,10 +28,10 @@ from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import underdamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.options import UpdateOptions
-from frf_testbench.updating.synthetic_fit import Truth, fit_of_targets, in_order
+from frf_testbench.updating.synthetic_fit import TrueModes, make_fit_of_targets, pair_in_order
 
 TABLES = Path(__file__).parent / "paper_tables"
-SHOWN = 0.1  # real part over modulus up to which a zero is an antiresonance
+ANTIRESONANCE_LIMIT = 0.1  # real part over modulus up to which a zero is an antiresonance
 STATED_RATIO = 0.001  # of every mode, in the text of section 4
 TABLE_5_RATIO = 0.00066  # of every mode, in the numbers of table 5, where the text says 0.001
 
@@ -39,12 +40,12 @@ TABLE_5_RATIO = 0.00066  # of every mode, in the numbers of table 5, where the t
 class PaperCase:
     """An example: full and reduced model, targets as a fit, pairs, and the real structure where it is known."""
 
-    full: StructuralModel
-    reduced: ReducedModel
+    full_model: StructuralModel
+    reduced_model: ReducedModel
     fit: ModalFit
     pairs: Pairs
     point: FrfLabel
-    truth: Truth | None = None
+    true_modes: TrueModes | None = None
 
     @property
     def targets(self) -> ComplexArray:
@@ -52,92 +53,112 @@ class PaperCase:
         return np.concatenate([self.fit.model.poles, self.fit.zeros.values])
 
 
-def section_4() -> PaperCase:
+def build_section_4() -> PaperCase:
     """Set up the numerical example: a beam whose last element is another one than modelled."""
-    nominal = _pinned_sliding()
+    nominal_model = _build_pinned_sliding_beam()
     changed = BeamSection(elements=(12, 12), thickness_m=3.0e-2, width_m=1.333e-2)
-    truth = Truth(_pinned_sliding((changed,)), np.full(60, STATED_RATIO))
+    true_modes = TrueModes(_build_pinned_sliding_beam((changed,)), np.full(60, STATED_RATIO))
     band = 40 / (2 * np.pi), 5000 / (2 * np.pi)
     dofs = tuple(f"{node}:z" for node in (3, 4, 5, 7, 9, 11))
-    reduced = _reduced(nominal, dofs, "3:z", "3:z", "4:z", "7:z", band)
+    reduced_model = _reduce(nominal_model, dofs, "3:z", "3:z", "4:z", "7:z", band)
     label = FrfLabel(parse_dof("4:z"), parse_dof("3:z"), FrfQuantity.RECEPTANCE)
-    zeros = truth.zeros(label)
-    zeros = zeros[np.abs(zeros.real) < SHOWN * np.abs(zeros)][:3]
-    poles = underdamped_poles(truth.omega[:4] / (2 * np.pi), truth.damping[:4])
-    fit = fit_of_targets(poles, zeros, label, band)
+    zeros = true_modes.zeros(label)
+    zeros = zeros[np.abs(zeros.real) < ANTIRESONANCE_LIMIT * np.abs(zeros)][:3]
+    poles = underdamped_poles(true_modes.omega[:4] / (2 * np.pi), true_modes.damping[:4])
+    fit = make_fit_of_targets(poles, zeros, label, band)
     return PaperCase(
-        full=nominal,
-        reduced=reduced,
+        full_model=nominal_model,
+        reduced_model=reduced_model,
         fit=fit,
-        pairs=in_order(fit, model_poles(reduced)[:4], shown_zeros(reduced, label)[:3]),
+        pairs=pair_in_order(fit, model_poles(reduced_model)[:4], find_antiresonances(reduced_model, label)[:3]),
         point=replace(label, output_dof=parse_dof("7:z")),
-        truth=truth,
+        true_modes=true_modes,
     )
 
 
-def section_5(blow: str = "89:z") -> PaperCase:
+def build_section_5(struck_dof: str = "89:z") -> PaperCase:
     """Set up the experiment: the targets are those printed in table 5; node 88 or 89 was struck."""
-    full = _beam(4, poisson_ratio=0.33, elements=100, formulation="timoshenko", left="clamped", ratio=TABLE_5_RATIO)
+    full_model = _build_beam(
+        BeamOptions(**_read_rectangle(4), poisson_ratio=0.33, elements=100, formulation="timoshenko", left="clamped"),
+        TABLE_5_RATIO,
+    )
     band = 10.0, 700.0
-    dofs = tuple(f"{node}:z" for node in (9, 29, 49, 69, int(blow.split(":")[0]), 101))
-    reduced = _reduced(full, dofs, "101:z", blow, "101:z", "49:z", band)
-    label = FrfLabel(parse_dof("101:z"), parse_dof(blow), FrfQuantity.ACCELERANCE)
-    printed = table(5)
-    values = 2 * np.pi * (printed.experimental_real + 1j * printed.experimental_imag).to_numpy()
+    dofs = tuple(f"{node}:z" for node in (9, 29, 49, 69, int(struck_dof.split(":")[0]), 101))
+    reduced_model = _reduce(full_model, dofs, "101:z", struck_dof, "101:z", "49:z", band)
+    label = FrfLabel(parse_dof("101:z"), parse_dof(struck_dof), FrfQuantity.ACCELERANCE)
+    printed = read_table(5)
+    values = 2 * np.pi * (printed.experimental_real.to_numpy() + 1j * printed.experimental_imag.to_numpy())
     is_pole = (printed.kind == "pole").to_numpy()
-    fit = fit_of_targets(values[is_pole], values[~is_pole], label, band)
+    fit = make_fit_of_targets(values[is_pole], values[~is_pole], label, band)
     return PaperCase(
-        full=full,
-        reduced=reduced,
+        full_model=full_model,
+        reduced_model=reduced_model,
         fit=fit,
-        pairs=in_order(fit, model_poles(reduced)[:4], shown_zeros(reduced, label)[:3]),
+        pairs=pair_in_order(fit, model_poles(reduced_model)[:4], find_antiresonances(reduced_model, label)[:3]),
         point=replace(label, output_dof=parse_dof("49:z")),
     )
 
 
-def published(section: int, delta: float, **others: object) -> UpdateOptions:
+def published_options(section: int, delta: float) -> UpdateOptions:
     """Give the settings of a section; delta in its units."""
     if section == 4:
-        return replace(UpdateOptions(method="ipz", delta=delta, damping=False), **others)
+        return UpdateOptions(method="ipz", delta=delta, damping=False)
     hertz = (2 * np.pi) ** 2
-    options = UpdateOptions(method="ipz", beta=1.0, delta=delta * hertz, delta_damping=0.1 * hertz)
-    return replace(options, **others)
+    return UpdateOptions(method="ipz", beta=1.0, delta=delta * hertz, delta_damping=0.1 * hertz)
 
 
-def table(number: int) -> pd.DataFrame:
+def read_table(number: int) -> pd.DataFrame:
     """Read a table of the paper."""
     return pd.read_csv(TABLES / f"dorosti2018_table{number}.csv", comment="#")
 
 
-def shown_zeros(model: ReducedModel, label: FrfLabel) -> ComplexArray:
+def find_antiresonances(model: ReducedModel, label: FrfLabel) -> ComplexArray:
     """Give the zeros that a measurement shows as antiresonances, by ascending imaginary part, rad/s."""
     rows = model.row(label.output_dof), model.row(label.input_dof)
     roots = damped_zeros(model.mass, model.damping, model.stiffness, *rows).values
-    shown = roots[(roots.imag > 0) & (np.abs(roots.real) < SHOWN * np.abs(roots))]
-    return shown[np.argsort(shown.imag)]
+    antiresonances = roots[(roots.imag > 0) & (np.abs(roots.real) < ANTIRESONANCE_LIMIT * np.abs(roots))]
+    return antiresonances[np.argsort(antiresonances.imag)]
 
 
-def _pinned_sliding(section: tuple[BeamSection, ...] = ()) -> StructuralModel:
-    ends = {"left": "pinned", "right": "sliding"}
-    return _beam(1, elements=12, formulation="euler-bernoulli", section=section, ratio=STATED_RATIO, **ends)
-
-
-def _beam(table_number: int, *, ratio: float, **options: object) -> StructuralModel:
-    values = table(table_number).set_index("property")["value"]
+def _build_pinned_sliding_beam(section: tuple[BeamSection, ...] = ()) -> StructuralModel:
     beam = BeamOptions(
-        youngs_modulus_Pa=float(values["youngs_modulus"]),
-        density_kg_m3=float(values["mass_density"]),
-        thickness_m=float(values["thickness"]),
-        width_m=float(values["width"]),
-        length_m=float(values["length"]),
-        **options,
+        **_read_rectangle(1),
+        elements=12,
+        formulation="euler-bernoulli",
+        left="pinned",
+        right="sliding",
+        section=section,
     )
-    return build_beam(
-        BeamFile(model=ModelSection(kind="beam", name="beam"), damping=DampingSection(modal_ratio=(ratio,)), beam=beam)
-    )
+    return _build_beam(beam, STATED_RATIO)
 
 
-def _reduced(
+class _Rectangle(TypedDict):
+    """Material and dimensions of a uniform beam, as `BeamOptions` calls them."""
+
+    youngs_modulus_Pa: float
+    density_kg_m3: float
+    thickness_m: float
+    width_m: float
+    length_m: float
+
+
+def _read_rectangle(table_number: int) -> _Rectangle:
+    values = read_table(table_number).set_index("property")["value"]
+    return {
+        "youngs_modulus_Pa": float(values["youngs_modulus"]),
+        "density_kg_m3": float(values["mass_density"]),
+        "thickness_m": float(values["thickness"]),
+        "width_m": float(values["width"]),
+        "length_m": float(values["length"]),
+    }
+
+
+def _build_beam(beam: BeamOptions, damping_ratio: float) -> StructuralModel:
+    damping = DampingSection(modal_ratio=(damping_ratio,))
+    return build_beam(BeamFile(model=ModelSection(kind="beam", name="beam"), damping=damping, beam=beam))
+
+
+def _reduce(
     model: StructuralModel,
     dofs: tuple[str, ...],
     residual: str,

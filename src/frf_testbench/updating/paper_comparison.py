@@ -19,7 +19,14 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel
-from frf_testbench.updating.paper_cases import PaperCase, published, section_4, section_5, shown_zeros, table
+from frf_testbench.updating.paper_cases import (
+    PaperCase,
+    build_section_4,
+    build_section_5,
+    find_antiresonances,
+    published_options,
+    read_table,
+)
 
 BAND_RAD_S = np.linspace(40.0, 3900.0, 4000)  # section 4: where the paper compares FRFs
 
@@ -28,60 +35,75 @@ def print_comparison() -> None:
     """Print the tables."""
     with pd.option_context("display.width", 200, "display.max_columns", 20, "display.float_format", "{:.5g}".format):
         print("Section 4 (poles and zeros in rad/s)\n", compare_section_4().to_string(), "\n")
-        for blow, where in (("89:z", "44 cm, as the text says"), ("88:z", "43.5 cm, as the table's zeros say")):
-            print(f"Section 5, table 5 (Hz), the blow at {where}\n", compare_section_5(blow).to_string(), "\n")
-        print("Where the blow was: misfit to the three numerical zeros of table 5\n", places_struck().to_string())
-        print(f"Smallest misfit at {fitted_place_cm():.2f} cm from the clamp")
+        for struck_dof, location in (
+            ("89:z", "44 cm, as the text says"),
+            ("88:z", "43.5 cm, as the table's zeros say"),
+        ):
+            print(
+                f"Section 5, table 5 (Hz), the impact at {location}\n", compare_section_5(struck_dof).to_string(), "\n"
+            )
+        print(
+            "Location of the impact: misfit to the three numerical zeros of table 5\n",
+            compare_impact_locations().to_string(),
+        )
+        print(f"Smallest misfit at {fit_impact_location_cm():.2f} cm from the clamp")
 
 
 def compare_section_4() -> pd.DataFrame:
-    """One row a method: how it ended and how good the point of interest is."""
-    case = section_4()
-    rows = {"nominal": judge(case, case.reduced)}
-    rows["measured poles, nominal shapes"] = judge(case, with_measured_poles(case.reduced, case.pairs))
-    for name, options, parts in (
-        ("ipz, delta 1e-5", published(4, 1e-5), False),
-        ("ipz, delta 1e-1", published(4, 1e-1), False),
+    """Tabulate one row a method: how it ended and how good the point of interest is."""
+    case = build_section_4()
+    rows = {"nominal": judge_model(case, case.reduced_model)}
+    rows["measured poles, nominal shapes"] = judge_model(case, with_measured_poles(case.reduced_model, case.pairs))
+    for name, options, by_element in (
+        ("ipz, delta 1e-5", published_options(4, 1e-5), False),
+        ("ipz, delta 1e-1", published_options(4, 1e-1), False),
         ("minimal-change, any stiffness", UpdateOptions(), False),
         ("minimal-change, elements", UpdateOptions(), True),
     ):
         start = process_time()
-        basis = structural_basis(case.full, case.reduced) if parts else None
-        updated = update_model(case.reduced, case.fit, case.pairs, options, basis=basis)
-        rows[name] = judge(case, updated.model, updated) | {"cpu_s": process_time() - start}
+        basis = structural_basis(case.full_model, case.reduced_model) if by_element else None
+        updated = update_model(case.reduced_model, case.fit, case.pairs, options, basis=basis)
+        rows[name] = judge_model(case, updated.model, updated) | {"cpu_s": process_time() - start}
     return pd.DataFrame(rows).T
 
 
-def judge(case: PaperCase, model: ReducedModel, updated: UpdatedModel | None = None) -> dict[str, float]:
+def judge_model(case: PaperCase, model: ReducedModel, updated: UpdatedModel | None = None) -> dict[str, float]:
     """Judge a model by its FRF and its zeros at the point of interest, and an update by its targets."""
-    s = 1j * BAND_RAD_S
-    agreement = compare_frfs(case.truth.receptance(s, case.point)[:, None], model_frfs(model, [case.point], s))
-    real = case.truth.zeros(case.point)
-    real = real[(real.imag < BAND_RAD_S[-1]) & (np.abs(real.real) < 0.1 * np.abs(real))]
-    zeros = shown_zeros(model, case.point)[: len(real)]
+    if case.true_modes is None:
+        raise ValueError("the truth of this example is not known: only section 4 has one")
+    s = np.asarray(1j * BAND_RAD_S, np.complex128)
+    agreement = compare_frfs(case.true_modes.receptance(s, case.point)[:, None], model_frfs(model, [case.point], s))
+    true_zeros = case.true_modes.zeros(case.point)
+    is_antiresonance = np.abs(true_zeros.real) < 0.1 * np.abs(true_zeros)
+    true_zeros = true_zeros[(true_zeros.imag < BAND_RAD_S[-1]) & is_antiresonance]
+    zeros = find_antiresonances(model, case.point)[: len(true_zeros)]
     row = {
         "dB": float(agreement.median_db[0]),
         "X_S": float(agreement.shape[0]),
         "X_A": float(agreement.amplitude[0]),
-        "zeros_%": worst_percent(zeros, real),
+        "zeros_%": worst_percent(zeros, true_zeros),
     }
     if updated is not None:
         matrix = model.stiffness
         row["iterations"] = float(updated.history.groupby("phase").iteration.max().sum())
         row["targets_%"] = worst_percent(updated.after, case.targets)
-        row["epsilon"] = epsilon(updated.after, case.targets)
+        row["epsilon"] = compute_epsilon(updated.after, case.targets)
         row["eta"] = float(np.linalg.norm(matrix - matrix.T, 2) / np.linalg.norm(matrix + matrix.T, 2))
     return row
 
 
-def compare_section_5(blow: str) -> pd.DataFrame:
-    """Table 5 side by side: one row a pole or zero, Hz."""
-    case, printed = section_5(blow), table(5)
-    columns = {"kind": printed.kind, "experimental": printed.experimental_imag, "numerical": printed.numerical_imag}
+def compare_section_5(struck_dof: str) -> pd.DataFrame:
+    """Put table 5 side by side: one row a pole or zero, Hz."""
+    case, printed = build_section_5(struck_dof), read_table(5)
+    columns: dict[str, pd.Series | FloatArray] = {
+        "kind": printed.kind,
+        "experimental": printed.experimental_imag,
+        "numerical": printed.numerical_imag,
+    }
     columns["numerical here"] = np.array([pair.computed_value.imag for pair in case.pairs.targets]) / (2 * np.pi)
     columns["ipz, paper"] = printed.updated_imag
-    for name, options in (("ipz", published(5, 1e-3)), ("minimal-change", UpdateOptions())):
-        updated = update_model(case.reduced, case.fit, case.pairs, options)
+    for name, options in (("ipz", published_options(5, 1e-3)), ("minimal-change", UpdateOptions())):
+        updated = update_model(case.reduced_model, case.fit, case.pairs, options)
         counts = updated.history.groupby("phase", sort=False).iteration.max()
         hertz = updated.after / (2 * np.pi)
         columns[f"{name}, {' + '.join(str(count) for count in counts)} iterations"] = hertz.imag
@@ -90,41 +112,43 @@ def compare_section_5(blow: str) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def places_struck() -> pd.DataFrame:
-    """Deviation of the nominal zeros from those printed in table 5, for every node near the one of the text."""
+def compare_impact_locations() -> pd.DataFrame:
+    """Compare the nominal zeros with those printed in table 5, for every node near the one of the text."""
     nodes = np.arange(84, 94)
-    deviations = np.array([zero_deviations(node) for node in nodes])
-    places = {"from_clamp_cm": place_cm(nodes), "zeros_rms_%": 100 * np.sqrt(np.mean(deviations**2, axis=1))}
-    return pd.DataFrame(places, index=pd.Index(nodes, name="node"))
+    deviations = np.array([zero_deviations(node) for node in nodes.tolist()])
+    columns = {"from_clamp_cm": location_cm(nodes), "zeros_rms_%": 100 * np.sqrt(np.mean(deviations**2, axis=1))}
+    return pd.DataFrame(columns, index=pd.Index(nodes, name="node"))
 
 
-def fitted_place_cm() -> float:
-    """Place of the blow that fits the printed zeros best, between the nodes; zeros move linearly over one element."""
+def fit_impact_location_cm() -> float:
+    """Fit the location of the impact to the printed zeros, between the nodes; zeros move linearly over one element."""
     nodes = np.array([88, 89])
-    near, next_to_it = (zero_deviations(node) for node in nodes)
-    slope = next_to_it - near
-    part = -float(slope @ near) / float(slope @ slope)
-    return float(np.interp(part, [0.0, 1.0], place_cm(nodes)))
+    at_first, at_second = (zero_deviations(node) for node in nodes)
+    slope = at_second - at_first
+    fraction = -float(slope @ at_first) / float(slope @ slope)
+    return float(np.interp(fraction, [0.0, 1.0], location_cm(nodes)))
 
 
 def zero_deviations(node: int) -> FloatArray:
-    """Relative deviation of each nominal zero from the printed one, (3,), if that node was struck."""
-    printed = table(5).query("kind == 'zero'").numerical_imag.to_numpy()
-    zeros = [pair.computed_value.imag / (2 * np.pi) for pair in section_5(f"{node}:z").pairs.targets if pair.frf >= 0]
+    """Give the relative deviation of each nominal zero from the printed one, (3,), if that node was struck."""
+    printed = read_table(5).query("kind == 'zero'").numerical_imag.to_numpy()
+    zeros = [
+        pair.computed_value.imag / (2 * np.pi) for pair in build_section_5(f"{node}:z").pairs.targets if pair.frf >= 0
+    ]
     return np.asarray(np.array(zeros) / printed - 1)
 
 
-def place_cm(nodes: IntArray) -> FloatArray:
-    """Distance of nodes from the clamp, cm."""
+def location_cm(nodes: IntArray) -> FloatArray:
+    """Give the distance of nodes from the clamp, cm."""
     return np.asarray(49.95 * (nodes - 1) / 100)
 
 
-def worst_percent(found: ComplexArray, wanted: ComplexArray) -> float:
-    """Largest deviation in per cent of the modulus."""
-    return float(100 * np.max(np.abs(found - wanted) / np.abs(wanted)))
+def worst_percent(computed: ComplexArray, target: ComplexArray) -> float:
+    """Give the largest deviation in per cent of the modulus."""
+    return float(100 * np.max(np.abs(computed - target) / np.abs(target)))
 
 
-def epsilon(found: ComplexArray, wanted: ComplexArray) -> float:
-    """Eq. (6) with the weights of eq. (7)."""
-    weights = np.abs(found).max() / np.abs(found)
-    return float(np.sum(np.abs(weights * (found - wanted)) ** 2))
+def compute_epsilon(computed: ComplexArray, target: ComplexArray) -> float:
+    """Compute eq. (6) with the weights of eq. (7)."""
+    weights = np.abs(computed).max() / np.abs(computed)
+    return float(np.sum(np.abs(weights * (computed - target)) ** 2))

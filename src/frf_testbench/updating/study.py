@@ -30,8 +30,8 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
-from frf_testbench.updating.random_structures import Case, random_case
-from frf_testbench.updating.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
+from frf_testbench.updating.random_structures import RandomStructure, draw_structure
+from frf_testbench.updating.synthetic_fit import TrueModes, choose_band, list_labels, simulate_fit
 
 FIRST_SEED, COUNT = 1000, 200
 NOISE = 0.002  # standard deviation of a line over the root mean square of its FRF
@@ -41,14 +41,14 @@ METHODS = ("nominal", "trivial", "ipz", "minimal-change")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench:
-    """One structure with its measurement, paired."""
+class UpdateCase:
+    """One structure with its measurement, reduced and paired: what an update starts from."""
 
-    case: Case
-    truth: Truth
+    structure: RandomStructure
+    true_modes: TrueModes
     labels: tuple[FrfLabel, ...]
     fit: ModalFit
-    reduced: ReducedModel
+    reduced_model: ReducedModel
     pairs: Pairs
 
 
@@ -64,76 +64,95 @@ def print_study(first: int, count: int) -> None:
     """
     frames = []
     for seed in range(first, first + count):
-        frames.append(study(seed))
+        frames.append(study_structure(seed))
         if (seed - first + 1) % 20 == 0:
             print(f"{seed - first + 1} of {count} structures", file=sys.stderr, flush=True)
     points = pd.concat(frames, ignore_index=True)
     with pd.option_context("display.width", 200, "display.max_columns", 20, "display.float_format", "{:.3g}".format):
-        print(summary(points).to_string())
+        print(summarise_points(points).to_string())
         worse = points[points["minimal-change"] > points["nominal"]]
         print("worse than nominal:\n", worse[["seed", "kind", "frfs", *METHODS]].to_string(index=False))
-        print(about_updates(points).to_string())
+        print(summarise_updates(points).to_string())
 
 
-def study(seed: int, *, with_ipz: bool = True) -> pd.DataFrame:
+def study_structure(seed: int, *, with_ipz: bool = True) -> pd.DataFrame:
     """Judge one structure: one row a point of interest."""
-    bench = set_up(seed)
-    basis = structural_basis(bench.case.nominal, bench.reduced)
+    case = make_update_case(seed)
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
     start = process_time()
-    updated = update_model(bench.reduced, bench.fit, bench.pairs, UpdateOptions(), basis=basis)
-    taken = process_time() - start
-    published = by_ipz(bench) if with_ipz else None
+    updated = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(), basis=basis)
+    cpu_s = process_time() - start
+    ipz_update = update_by_ipz(case) if with_ipz else None
     models = {
-        "nominal": bench.reduced,
-        "trivial": with_measured_poles(bench.reduced, bench.pairs),
-        "ipz": None if published is None else published.model,
+        "nominal": case.reduced_model,
+        "trivial": with_measured_poles(case.reduced_model, case.pairs),
+        "ipz": None if ipz_update is None else ipz_update.model,
         "minimal-change": updated.model,
     }
-    about = {
+    common_columns = {
         "seed": seed,
-        "kind": bench.case.nominal.name,
-        "frfs": len(bench.labels),
-        "order": len(bench.reduced.dofs),
+        "kind": case.structure.nominal_model.name,
+        "frfs": len(case.labels),
+        "order": len(case.reduced_model.dofs),
         "converged": updated.status is UpdateStatus.CONVERGED,
         "iterations": len(updated.history),
         "unmet": len(updated.unmet),
-        "cpu_s": taken,
-        "ipz_status": "failed" if published is None else published.status.name,
+        "cpu_s": cpu_s,
+        "ipz_status": "failed" if ipz_update is None else ipz_update.status.name,
     }
-    return pd.DataFrame([about | row for row in judge(bench, updated, models)])
+    return pd.DataFrame([common_columns | row for row in judge_points(case, updated, models)])
 
 
-def set_up(seed: int) -> Bench:
+def make_update_case(seed: int) -> UpdateCase:
     """Draw a structure, measure it as a fitter would report it, reduce its model and pair."""
-    case = random_case(seed)
-    truth, labels = Truth(case.truth, case.damping), labels_of(case)
-    band = band_of(truth, case.n_modes)
-    fit = synthetic_fit(truth, labels, band, noise=NOISE, rng=np.random.default_rng(seed + 7))
-    ends = {"actuators": case.input_dofs, "sensors": case.sensors, "points": case.points}
-    reduced = reduce_model(case.nominal, ReduceOptions(), band_hz=band, **ends)
-    return Bench(case=case, truth=truth, labels=labels, fit=fit, reduced=reduced, pairs=pair(fit, reduced))
+    structure = draw_structure(seed)
+    true_modes = TrueModes(structure.true_model, structure.damping)
+    labels = list_labels(structure.input_dofs, structure.sensors)
+    band = choose_band(true_modes, structure.n_modes)
+    fit = simulate_fit(true_modes, labels, band, noise=NOISE, rng=np.random.default_rng(seed + 7))
+    reduced_model = reduce_model(
+        structure.nominal_model,
+        ReduceOptions(),
+        actuators=structure.input_dofs,
+        sensors=structure.sensors,
+        points=structure.points,
+        band_hz=band,
+    )
+    return UpdateCase(
+        structure=structure,
+        true_modes=true_modes,
+        labels=labels,
+        fit=fit,
+        reduced_model=reduced_model,
+        pairs=pair(fit, reduced_model),
+    )
 
 
-def by_ipz(bench: Bench) -> UpdatedModel | None:
+def update_by_ipz(case: UpdateCase) -> UpdatedModel | None:
     """Update as published; None where the method cannot begin."""
     try:
         return update_model(
-            bench.reduced, bench.fit, bench.pairs, UpdateOptions(method="ipz", max_iterations=IPZ_ITERATIONS)
+            case.reduced_model,
+            case.fit,
+            case.pairs,
+            UpdateOptions(method="ipz", max_iterations=IPZ_ITERATIONS),
         )
     except FrfIpzError:
         return None
 
 
-def judge(bench: Bench, updated: UpdatedModel, models: dict[str, ReducedModel | None]) -> list[dict[str, float]]:
-    """Compare the FRFs from the first blow to every point of interest with the truth."""
-    lines = np.linspace(*bench.fit.band_hz, LINES)
-    predicted = predict_frfs(updated, bench.case.points, bench.labels, lines)
+def judge_points(
+    case: UpdateCase, updated: UpdatedModel, models: dict[str, ReducedModel | None]
+) -> list[dict[str, float]]:
+    """Compare the FRFs from the first input to every point of interest with the truth."""
+    lines = np.linspace(*case.fit.band_hz, LINES)
+    predicted = predict_frfs(updated, case.structure.points, case.labels, lines)
     rows = []
     for number, label in enumerate(predicted.labels):
-        if label.input_dof != bench.case.input_dofs[0]:
+        if label.input_dof != case.structure.input_dofs[0]:
             continue
-        s = 2j * np.pi * lines
-        truth = bench.truth.receptance(s, label)[:, None]
+        s = np.asarray(2j * np.pi * lines, np.complex128)
+        truth = case.true_modes.receptance(s, label)[:, None]
         row = {
             name: np.nan if model is None else float(compare_frfs(truth, model_frfs(model, [label], s)).median_db[0])
             for name, model in models.items()
@@ -146,42 +165,42 @@ def judge(bench: Bench, updated: UpdatedModel, models: dict[str, ReducedModel | 
     return rows
 
 
-def summary(points: pd.DataFrame) -> pd.DataFrame:
-    """Medians over the points of interest, of all and of each kind: errors in dB, and how many times below others."""
+def summarise_points(points: pd.DataFrame) -> pd.DataFrame:
+    """Take medians over the points of interest, of all and of each kind: errors in dB, and ratios of errors."""
     groups = {"all": points} | {f"{n} FRF": points[points.frfs == n] for n in range(1, 5)}
     groups |= {kind: points[points.kind == kind] for kind in ("beam", "frame", "plate")}
-    return pd.DataFrame({name: _one_group(group) for name, group in groups.items() if len(group)}).T
+    return pd.DataFrame({name: _summarise_group(group) for name, group in groups.items() if len(group)}).T
 
 
-def _one_group(group: pd.DataFrame) -> dict[str, float]:
+def _summarise_group(group: pd.DataFrame) -> dict[str, float]:
     medians = {name: group[name].median() for name in METHODS}
-    ours = medians["minimal-change"]
+    minimal_change = medians["minimal-change"]
     return {
         "points": len(group),
         **medians,
-        "below nominal": medians["nominal"] / ours,
-        "below trivial": medians["trivial"] / ours,
-        "worse than nominal %": 100 * np.mean(group["minimal-change"] > group["nominal"]),
+        "below nominal": medians["nominal"] / minimal_change,
+        "below trivial": medians["trivial"] / minimal_change,
+        "worse than nominal %": float(100 * np.mean(group["minimal-change"] > group["nominal"])),
         "covered %": 100 * group["covered"].mean(),
         "band dB": group["band_db"].median(),
     }
 
 
-def about_updates(points: pd.DataFrame) -> pd.Series:
-    """How the updates went, one structure at a time."""
-    each = points.groupby("seed").first()
+def summarise_updates(points: pd.DataFrame) -> pd.Series:
+    """Count how the updates went, one structure at a time."""
+    updates = points.groupby("seed").first()
     medians = points.groupby("seed")[["nominal", "minimal-change"]].median()
     return pd.Series(
         {
-            "structures": len(each),
-            "converged": int(each.converged.sum()),
+            "structures": len(updates),
+            "converged": int(updates.converged.sum()),
             "worse than nominal %": 100 * np.mean(medians["minimal-change"] > medians["nominal"]),
-            "with a target unmet": int((each.unmet > 0).sum()),
-            "iterations, median": each.iterations.median(),
-            "iterations, most": each.iterations.max(),
-            "order, median": each.order.median(),
-            "CPU ms an update, median": 1e3 * each.cpu_s.median(),
-            "ipz converged": int((each.ipz_status == "CONVERGED").sum()),
-            "ipz diverged or failed": int(each.ipz_status.isin(["DIVERGED", "failed"]).sum()),
+            "with a target unmet": int((updates.unmet > 0).sum()),
+            "iterations, median": updates.iterations.median(),
+            "iterations, most": updates.iterations.max(),
+            "order, median": updates.order.median(),
+            "CPU ms an update, median": 1e3 * updates.cpu_s.median(),
+            "ipz converged": int((updates.ipz_status == "CONVERGED").sum()),
+            "ipz diverged or failed": int(updates.ipz_status.isin(["DIVERGED", "failed"]).sum()),
         }
     )

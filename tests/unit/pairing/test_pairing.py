@@ -17,8 +17,8 @@ from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet
-from frf_testbench.updating.study import set_up
-from frf_testbench.updating.synthetic_fit import as_fit
+from frf_testbench.updating.study import make_update_case
+from frf_testbench.updating.synthetic_fit import make_modal_fit
 
 SEEDS = range(500, 512)  # none of them was looked at when the constants were chosen
 LABELS = (label(2, 1), label(4, 1))
@@ -47,7 +47,7 @@ def measured(model, labels=LABELS, *, poles=None, zeros=True, gain=1.0):
     kinds = [kind for _, kinds in shown for kind in kinds]
     std = np.repeat(1e-5 * np.abs(np.concatenate([values, all_zeros])), 2)
     nothing = np.zeros((len(values), len(labels), 2, 2))
-    return as_fit(fitted, labels, BAND, all_zeros, where, kinds, np.diag(std**2), nothing)
+    return make_modal_fit(fitted, labels, BAND, all_zeros, where, kinds, np.diag(std**2), nothing)
 
 
 def complex_zeros(model, one):
@@ -135,7 +135,7 @@ def test_a_mode_that_the_model_lacks_is_said_and_is_no_target():
     poles = np.append(fit.model.poles, extra)
     residues = np.vstack([fit.model.residues, fit.model.residues[:1]])
     larger = replace(fit.model, poles=poles, residues=residues)
-    more = as_fit(
+    more = make_modal_fit(
         larger, LABELS, (5.0, 250.0), np.zeros(0, complex), np.zeros(0, int), [], np.eye(12), np.zeros((6, 2, 2, 2))
     )
     pairs = pair(more, model)
@@ -189,9 +189,9 @@ def test_quadruples_are_listed_once():
     """Far from the blow a beam's zeros leave the axis; each stands for four."""
     seeds_with = 0
     for seed in SEEDS:
-        bench = set_up(seed)
-        for one in bench.labels:
-            zeros = model_zeros(bench.reduced, one)
+        case = make_update_case(seed)
+        for one in case.labels:
+            zeros = model_zeros(case.reduced_model, one)
             quadruples = zeros.values[np.array(zeros.kind) == "quadruple"]
             seeds_with += len(quadruples) > 0
             assert np.all(quadruples.real < 0)
@@ -207,15 +207,15 @@ def test_quadruples_are_listed_once():
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_pole_is_paired_wrongly(seed):
     """The truth is which modes are alike: the real structure's shapes at all DOFs against the nominal ones."""
-    bench = set_up(seed)
-    nominal = type(bench.truth)(bench.case.nominal, bench.case.damping)
-    mass = bench.case.nominal.mass.toarray()
-    alike = np.abs(bench.truth.shapes.T @ mass @ nominal.shapes)
+    case = make_update_case(seed)
+    nominal = type(case.true_modes)(case.structure.nominal_model, case.structure.damping)
+    mass = case.structure.nominal_model.mass.toarray()
+    alike = np.abs(case.true_modes.shapes.T @ mass @ nominal.shapes)
     rows, columns = linear_sum_assignment(-alike)
     partner = dict(zip(rows.tolist(), columns.tolist(), strict=True))
-    for row in bench.pairs.targets:
+    for row in case.pairs.targets:
         if row.kind == "pole":
-            real = int(np.argmin(np.abs(bench.truth.omega - abs(row.measured_value))))
+            real = int(np.argmin(np.abs(case.true_modes.omega - abs(row.measured_value))))
             sure = alike[real, partner[real]] > 0.8  # below, two modes have mixed and neither answer is wrong
             found = int(np.argmin(np.abs(nominal.omega - abs(row.computed_value))))
             assert found == partner[real] or not sure

@@ -15,7 +15,7 @@ from frf_ipz.fe.response import model_frfs
 from frf_ipz.prediction.advice import WIDE_DB, wide_bands
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
-from frf_testbench.updating.study import set_up, study
+from frf_testbench.updating.study import make_update_case, study_structure
 
 LINES = np.linspace(3.0, 110.0, 400)
 LABELS = (label(2, 1, FrfQuantity.ACCELERANCE), label(-4, -3, FrfQuantity.ACCELERANCE))
@@ -145,7 +145,7 @@ def test_a_point_that_the_model_does_not_know_is_refused():
 
 def test_bands_cover_the_truth_on_held_back_structures():
     """A slice of the study in frf_testbench/updating/study.py; the whole of it is what is reported."""
-    rows = pd.concat([study(seed, with_ipz=False) for seed in range(700, 712)])
+    rows = pd.concat([study_structure(seed, with_ipz=False) for seed in range(700, 712)])
     assert 0.8 < rows.covered.mean() < 0.97  # 36 FRFs: two standard deviations of the mean are 0.06
     assert rows["minimal-change"].median() < rows.nominal.median() / 8
     assert rows["minimal-change"].median() < rows.trivial.median() / 1.5
@@ -154,8 +154,8 @@ def test_bands_cover_the_truth_on_held_back_structures():
 
 
 def test_points_need_not_be_retained():
-    bench = set_up(3)
-    expanded = [dof for dof in bench.reduced.expanded_dofs if dof not in bench.reduced.dofs]
-    model = updated(bench.reduced)
-    found = predict_frfs(model, expanded[:2], bench.labels, np.linspace(*bench.fit.band_hz, 50))
+    case = make_update_case(3)
+    expanded = [dof for dof in case.reduced_model.expanded_dofs if dof not in case.reduced_model.dofs]
+    model = updated(case.reduced_model)
+    found = predict_frfs(model, expanded[:2], case.labels, np.linspace(*case.fit.band_hz, 50))
     assert np.isfinite(found.values).all()

@@ -11,41 +11,41 @@ from frf_ipz.runs.codec import load_result, save_result
 from frf_ipz.updating.along_structure import change_along_structure, notable_changes
 from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.study import make_update_case
 
 LOCAL, GLOBAL = 11, 7  # a beam that is off in stretches, and a plate whose stiffness is 20 % lower throughout
 SEEDS = range(800, 810)
 
 
-def updated(bench, *, parts=True):
-    basis = structural_basis(bench.case.nominal, bench.reduced) if parts else None
-    return update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+def updated(case, *, parts=True):
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model) if parts else None
+    return update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
 
 
-def true_ratios(bench):
-    pairs = zip(bench.case.truth.parts, bench.case.nominal.parts, strict=True)
+def true_ratios(case):
+    pairs = zip(case.structure.true_model.parts, case.structure.nominal_model.parts, strict=True)
     return np.array([np.trace(real.stiffness) / np.trace(drawn.stiffness) for real, drawn in pairs])
 
 
 @pytest.fixture(scope="module")
 def local():
-    bench = set_up(LOCAL)
-    return bench, updated(bench)
+    case = make_update_case(LOCAL)
+    return case, updated(case)
 
 
 def test_a_local_change_is_found_where_it_is(local):
-    bench, found = local
-    table = change_along_structure(found, bench.case.nominal)
-    truth = true_ratios(bench)
+    case, found = local
+    table = change_along_structure(found, case.structure.nominal_model)
+    truth = true_ratios(case)
     assert len(table) == len(truth)
     assert np.corrcoef(table.stiffness_ratio, truth)[0, 1] > 0.9
     assert np.abs(table.stiffness_ratio - truth).mean() < np.abs(1 - truth).mean() / 2
 
 
 def test_the_sentences_name_the_stretches(local):
-    bench, found = local
-    truth = true_ratios(bench)
-    texts = notable_changes(change_along_structure(found, bench.case.nominal))
+    case, found = local
+    truth = true_ratios(case)
+    texts = notable_changes(change_along_structure(found, case.structure.nominal_model))
     assert texts
     for text in texts:
         element = int(text.split("most at element ")[1].split(":")[0])
@@ -53,18 +53,18 @@ def test_the_sentences_name_the_stretches(local):
 
 
 def test_a_common_factor_is_found_everywhere():
-    bench = set_up(GLOBAL)
-    table = change_along_structure(updated(bench), bench.case.nominal)
-    assert_allclose(table.stiffness_ratio, true_ratios(bench), rtol=0.01)
+    case = make_update_case(GLOBAL)
+    table = change_along_structure(updated(case), case.structure.nominal_model)
+    assert_allclose(table.stiffness_ratio, true_ratios(case), rtol=0.01)
     assert len(notable_changes(table)) == 1
 
 
 def test_bands_cover_the_true_ratios_on_held_back_structures():
     covered = []
     for seed in SEEDS:
-        bench = set_up(seed)
-        table = change_along_structure(updated(bench), bench.case.nominal)
-        truth = true_ratios(bench)
+        case = make_update_case(seed)
+        table = change_along_structure(updated(case), case.structure.nominal_model)
+        truth = true_ratios(case)
         covered.append(np.mean((truth >= table.stiffness_ratio_low) & (truth <= table.stiffness_ratio_high)))
     assert (
         0.8 < np.mean(covered) <= 1
@@ -72,27 +72,27 @@ def test_bands_cover_the_true_ratios_on_held_back_structures():
 
 
 def test_a_change_of_the_matrices_is_read_back(local):
-    bench, _ = local
-    found = updated(bench, parts=False)
+    case, _ = local
+    found = updated(case, parts=False)
     assert found.parts.empty
-    table = change_along_structure(found, bench.case.nominal)
-    assert np.corrcoef(table.stiffness_ratio, true_ratios(bench))[0, 1] > 0.6
+    table = change_along_structure(found, case.structure.nominal_model)
+    assert np.corrcoef(table.stiffness_ratio, true_ratios(case))[0, 1] > 0.6
     assert table.stiffness_ratio_low.isna().all()
     assert notable_changes(table) == ()
 
 
 def test_what_is_read_back_of_parts_alone_is_exact(local):
     """A change that the parts can express: all of them softer by a tenth."""
-    bench, found = local
+    case, found = local
     softer = replace(found.nominal, stiffness=0.9 * found.nominal.stiffness)
-    table = change_along_structure(replace(found, model=softer, parts=pd.DataFrame()), bench.case.nominal)
+    table = change_along_structure(replace(found, model=softer, parts=pd.DataFrame()), case.structure.nominal_model)
     assert_allclose(table.stiffness_ratio, 0.9, rtol=5e-3)  # READ_BACK: the free end hardly bends
 
 
 def test_a_model_without_parts_has_no_table(local):
-    bench, found = local
+    case, found = local
     none = replace(found, parts=pd.DataFrame())
-    assert change_along_structure(none, replace(bench.case.nominal, parts=())).empty
+    assert change_along_structure(none, replace(case.structure.nominal_model, parts=())).empty
 
 
 def test_the_table_survives_a_run_folder(local, tmp_path):

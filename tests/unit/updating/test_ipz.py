@@ -12,8 +12,8 @@ from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.update import method_names, update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.paper_cases import section_4, section_5
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.paper_cases import build_section_4, build_section_5
+from frf_testbench.updating.study import make_update_case
 
 STEP = 1e-4  # relative change of the root that moves most
 SLOPES = 1e-4  # of the largest entry of a row: roots are good to 1e-9 without balancing, and bend by the step
@@ -23,7 +23,7 @@ IPZ = UpdateOptions(method="ipz", damping=False, max_iterations=5)
 
 def step_of(case, *, damping=False, cross=True, ratio=1.0):
     """The published step of a paper's case; `ratio` multiplies the damping, so that vectors are complex in earnest."""
-    model, targets = case.reduced, case.pairs.targets
+    model, targets = case.reduced_model, case.pairs.targets
     label = case.fit.labels[0]
     return PublishedStep(
         model.mass,
@@ -59,7 +59,7 @@ def sensitivity_by_differences(case, step, place, size_of_step, *, damping):
 
 
 @pytest.mark.parametrize("damping", [False, True], ids=["stiffness", "damping"])
-@pytest.mark.parametrize("make", [section_4, section_5], ids=["section 4", "section 5"])
+@pytest.mark.parametrize("make", [build_section_4, build_section_5], ids=["section 4", "section 5"])
 def test_all_sensitivities_against_differences(make, damping):
     case = make()
     step = step_of(case, damping=damping, ratio=RATIO)
@@ -73,7 +73,7 @@ def test_all_sensitivities_against_differences(make, damping):
 
 
 def test_cross_sensitivities_are_left_out_on_request():
-    step = step_of(section_4(), cross=False)
+    step = step_of(build_section_4(), cross=False)
     step.evaluate(step.stiffness.take(step.back))
     step._eigenvectors()
     found = step._sensitivity()
@@ -83,7 +83,7 @@ def test_cross_sensitivities_are_left_out_on_request():
 
 
 def test_a_step_goes_towards_the_targets():
-    step = step_of(section_4())
+    step = step_of(build_section_4())
     matrix = step.stiffness.take(step.back)
     before = step.evaluate(matrix)
     step.settings = replace(step.settings, beta=0.01)
@@ -92,54 +92,56 @@ def test_a_step_goes_towards_the_targets():
 
 
 def test_a_pencil_without_the_wanted_roots_is_refused():
-    case = section_4()
+    case = build_section_4()
     with pytest.raises(NumericalError, match="fewer poles or zeros"):
         step_of(replace(case, fit=case.fit), ratio=1e4)
 
 
 def test_the_sensor_must_be_retained():
-    case = section_4()
-    model = replace(case.reduced, dofs=tuple(Dof(dof.node + 100, "z") for dof in case.reduced.dofs))
+    case = build_section_4()
+    model = replace(case.reduced_model, dofs=tuple(Dof(dof.node + 100, "z") for dof in case.reduced_model.dofs))
     with pytest.raises(InputError, match="among \\[reduce\\] dofs"):
         update_model(model, case.fit, case.pairs, IPZ)
 
 
 def test_several_frfs_take_turns():
-    bench = set_up(0)
-    assert len(bench.labels) == 1
-    bench = set_up(4)
-    assert len(bench.labels) > 1
-    updated = update_model(bench.reduced, bench.fit, bench.pairs, replace(IPZ, beta=0.05, max_iterations=200))
+    case = make_update_case(0)
+    assert len(case.labels) == 1
+    case = make_update_case(4)
+    assert len(case.labels) > 1
+    updated = update_model(case.reduced_model, case.fit, case.pairs, replace(IPZ, beta=0.05, max_iterations=200))
     assert updated.history.misfit.iloc[-1] < updated.history.misfit.iloc[0]
     assert any("(FRF 2)" in name for name in updated.history.columns)
-    alone = Pairs(rows=tuple(row for row in bench.pairs.rows if row.frf <= 0))
-    other = update_model(bench.reduced, bench.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
+    alone = Pairs(rows=tuple(row for row in case.pairs.rows if row.frf <= 0))
+    other = update_model(case.reduced_model, case.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
     assert np.abs(updated.model.stiffness - other.model.stiffness).max() > 1e-6 * np.abs(other.model.stiffness).max()
 
 
 def test_without_targets_there_is_nothing_to_do():
-    case = section_4()
-    updated = update_model(case.reduced, case.fit, Pairs(rows=()), IPZ)
+    case = build_section_4()
+    updated = update_model(case.reduced_model, case.fit, Pairs(rows=()), IPZ)
     assert updated.status is UpdateStatus.NOTHING_TO_DO
 
 
 def test_the_limit_of_iterations_is_said():
-    case = section_4()
-    updated = update_model(case.reduced, case.fit, case.pairs, IPZ)
+    case = build_section_4()
+    updated = update_model(case.reduced_model, case.fit, case.pairs, IPZ)
     assert updated.status is UpdateStatus.MAX_ITERATIONS
     assert updated.history.iteration.tolist() == [1, 2, 3, 4, 5]
     assert updated.ensemble.shape == (0, 3, 6, 6)
 
 
 def test_a_step_that_is_too_large_diverges_and_returns_the_best():
-    case = section_4()
-    updated = update_model(case.reduced, case.fit, case.pairs, replace(IPZ, beta=30.0, alpha=0.0, max_iterations=500))
+    case = build_section_4()
+    updated = update_model(
+        case.reduced_model, case.fit, case.pairs, replace(IPZ, beta=30.0, alpha=0.0, max_iterations=500)
+    )
     assert updated.status is UpdateStatus.DIVERGED
     assert np.isfinite(updated.model.stiffness).all()
 
 
 def test_methods_are_found_by_their_modules():
     assert method_names() == ("ipz", "minimal-change")
-    case = section_4()
+    case = build_section_4()
     with pytest.raises(InputError, match="did you mean 'minimal-change'"):
-        update_model(case.reduced, case.fit, case.pairs, UpdateOptions(method="minimal"))
+        update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(method="minimal"))

@@ -17,39 +17,39 @@ from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, structural_ba
 from frf_ipz.updating.regions import reduced_regions
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.random_structures import random_case, scaled
-from frf_testbench.updating.study import set_up
-from frf_testbench.updating.synthetic_fit import Truth, band_of, labels_of, synthetic_fit
+from frf_testbench.updating.random_structures import draw_structure, scale_stiffness
+from frf_testbench.updating.study import make_update_case
+from frf_testbench.updating.synthetic_fit import TrueModes, choose_band, list_labels, simulate_fit
 
 SEEDS = (3, 7, 11, 21)  # structures with one to four FRFs, one of them free to fly
 WITHIN_NOISE = 4.0  # standard deviations: hardly one of a hundred targets lies beyond
 
 
 @pytest.fixture(params=SEEDS, scope="module")
-def bench(request):
-    return set_up(request.param)
+def case(request):
+    return make_update_case(request.param)
 
 
 @pytest.fixture(scope="module")
-def updated(bench):
-    basis = structural_basis(bench.case.nominal, bench.reduced)
-    return update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+def updated(case):
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    return update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
 
 
-def deviations(bench):
+def deviations(case):
     """Standard deviations of the modulus of every target, relative."""
-    places = [pair.measured + (bench.fit.n_modes if pair.kind == "zero" else 0) for pair in bench.pairs.targets]
-    values = np.array([pair.measured_value for pair in bench.pairs.targets])
-    blocks = np.array([bench.fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in places])
+    places = [pair.measured + (case.fit.n_modes if pair.kind == "zero" else 0) for pair in case.pairs.targets]
+    values = np.array([pair.measured_value for pair in case.pairs.targets])
+    blocks = np.array([case.fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in places])
     gradient = np.stack([values.real, values.imag], 1) / np.abs(values)[:, None] ** 2
     return np.sqrt(np.einsum("ki,kij,kj->k", gradient, blocks, gradient))
 
 
-def test_targets_are_met_as_far_as_their_noise_deserves(bench, updated):
+def test_targets_are_met_as_far_as_their_noise_deserves(case, updated):
     assert updated.status is UpdateStatus.CONVERGED
-    values = np.array([pair.measured_value for pair in bench.pairs.targets])
+    values = np.array([pair.measured_value for pair in case.pairs.targets])
     off = np.abs(np.log(np.abs(updated.after) / np.abs(values)))
-    assert np.all(off < WITHIN_NOISE * deviations(bench) + 1e-4)
+    assert np.all(off < WITHIN_NOISE * deviations(case) + 1e-4)
     before = np.abs(np.log(np.abs(updated.before) / np.abs(values)))
     assert off.max() < before.max() / 10
 
@@ -62,20 +62,20 @@ def test_matrices_stay_symmetric_and_positive(updated):
         assert np.linalg.eigvalsh(matrices[0])[0] > 0
 
 
-def test_the_mass_stays_as_it_was(bench, updated):
-    assert np.abs(updated.model.mass - bench.reduced.mass).max() < 1e-9 * np.abs(bench.reduced.mass).max()
+def test_the_mass_stays_as_it_was(case, updated):
+    assert np.abs(updated.model.mass - case.reduced_model.mass).max() < 1e-9 * np.abs(case.reduced_model.mass).max()
 
 
-def test_what_is_said_is_what_the_matrices_have(bench, updated):
+def test_what_is_said_is_what_the_matrices_have(case, updated):
     poles = damped_poles(updated.model.mass, updated.model.damping, updated.model.stiffness).values
-    for row, value in zip(bench.pairs.targets, updated.after, strict=True):
+    for row, value in zip(case.pairs.targets, updated.after, strict=True):
         if row.kind == "pole":
             assert np.abs(poles - value).min() < 1e-7 * abs(value)
 
 
-def test_the_ensemble_has_the_measured_poles_within_their_noise(bench, updated):
-    std = deviations(bench)
-    for place, row in enumerate(bench.pairs.targets[:3]):
+def test_the_ensemble_has_the_measured_poles_within_their_noise(case, updated):
+    std = deviations(case)
+    for place, row in enumerate(case.pairs.targets[:3]):
         near = []
         for mass, _, stiffness in updated.ensemble:
             omega = np.sqrt(np.maximum(undamped_poles(mass, stiffness).values.real, 0))
@@ -87,58 +87,58 @@ def test_the_ensemble_has_the_measured_poles_within_their_noise(bench, updated):
 def free_case():
     """A structure that hangs free, with the truth beside it."""
     for seed in range(100):
-        case = random_case(seed)
-        values = np.linalg.eigvalsh(case.nominal.stiffness.toarray())
+        structure = draw_structure(seed)
+        values = np.linalg.eigvalsh(structure.nominal_model.stiffness.toarray())
         if values[0] < 1e-9 * values[-1] / len(values):
             return seed
     raise AssertionError
 
 
 def test_rigid_body_modes_stay():
-    bench = set_up(free_case())
-    basis = structural_basis(bench.case.nominal, bench.reduced)
-    updated = update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
-    for model in (bench.reduced, updated.model):
+    case = make_update_case(free_case())
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    updated = update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
+    for model in (case.reduced_model, updated.model):
         values = np.abs(undamped_poles(model.mass, model.stiffness).values.real)
-        assert np.count_nonzero(values < 1e-6 * np.abs(bench.fit.model.poles[0]) ** 2) >= 2
+        assert np.count_nonzero(values < 1e-6 * np.abs(case.fit.model.poles[0]) ** 2) >= 2
 
 
 def test_the_same_seed_gives_the_same_ensemble_and_another_another():
-    bench = set_up(3)
-    first, again = (update_model(bench.reduced, bench.fit, bench.pairs) for _ in range(2))
-    other = update_model(bench.reduced, bench.fit, bench.pairs, UpdateOptions(seed=1, ensemble=7))
+    case = make_update_case(3)
+    first, again = (update_model(case.reduced_model, case.fit, case.pairs) for _ in range(2))
+    other = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(seed=1, ensemble=7))
     assert np.array_equal(first.ensemble, again.ensemble)
     assert len(other.ensemble) == 7
     assert not np.array_equal(first.ensemble[:7], other.ensemble)
 
 
 def test_without_targets_the_model_is_left_alone():
-    bench = set_up(3)
-    updated = update_model(bench.reduced, bench.fit, Pairs(rows=()))
+    case = make_update_case(3)
+    updated = update_model(case.reduced_model, case.fit, Pairs(rows=()))
     assert updated.status is UpdateStatus.NOTHING_TO_DO
-    assert updated.model is bench.reduced
+    assert updated.model is case.reduced_model
     assert updated.warnings
 
 
 def test_a_target_that_all_others_contradict_is_left_out_and_said():
-    bench = set_up(11)
-    rows = list(bench.pairs.rows)
-    place = next(k for k, row in enumerate(rows) if row in bench.pairs.targets and row.kind == "pole" and k > 0)
+    case = make_update_case(11)
+    rows = list(case.pairs.rows)
+    place = next(k for k, row in enumerate(rows) if row in case.pairs.targets and row.kind == "pole" and k > 0)
     rows[place] = replace(rows[place], measured_value=1.25 * rows[place].measured_value)
-    basis = structural_basis(bench.case.nominal, bench.reduced)
-    updated = update_model(bench.reduced, bench.fit, replace(bench.pairs, rows=tuple(rows)), basis=basis)
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    updated = update_model(case.reduced_model, case.fit, replace(case.pairs, rows=tuple(rows)), basis=basis)
     assert len(updated.unmet) == 1
     assert "contradict it" in updated.unmet[0]
     assert f"{abs(rows[place].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
-    honest = update_model(bench.reduced, bench.fit, bench.pairs, basis=basis)
+    honest = update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
     assert not honest.unmet
 
 
 def test_noisier_targets_are_met_less():
-    bench = set_up(11)
-    loud = replace(bench.fit, covariance=1e4 * bench.fit.covariance)
-    near = [update_model(bench.reduced, fit, bench.pairs) for fit in (bench.fit, loud)]
-    values = np.array([row.measured_value for row in bench.pairs.targets])
+    case = make_update_case(11)
+    loud = replace(case.fit, covariance=1e4 * case.fit.covariance)
+    near = [update_model(case.reduced_model, fit, case.pairs) for fit in (case.fit, loud)]
+    values = np.array([row.measured_value for row in case.pairs.targets])
     error = [np.abs(np.log(np.abs(each.after) / np.abs(values))).max() for each in near]
     assert error[1] > 3 * error[0]
     assert near[1].history.size_of_change.iloc[0] < near[0].history.size_of_change.iloc[0]
@@ -146,23 +146,27 @@ def test_noisier_targets_are_met_less():
 
 def test_the_mass_of_a_sensor_is_found():
     """What a test adds to every structure: without it the stiffness has to make up for it, and is wrong."""
-    bench = set_up(21)
-    sensor, grams = bench.case.sensors[0], 3e-3
-    place = bench.case.nominal.place(sensor)
-    added = np.zeros(bench.case.nominal.mass_all.shape)
+    case = make_update_case(21)
+    sensor, grams = case.structure.sensors[0], 3e-3
+    place = case.structure.nominal_model.place(sensor)
+    added = np.zeros(case.structure.nominal_model.mass_all.shape)
     added[place, place] = grams
-    real = replace(bench.case.nominal, mass_all=bench.case.nominal.mass_all + sparse.csr_array(added))
-    fit = synthetic_fit(Truth(real, bench.case.damping), bench.labels, bench.fit.band_hz, rng=np.random.default_rng(0))
-    basis = structural_basis(bench.case.nominal, bench.reduced, sensors=bench.case.sensors[:1])
-    updated = update_model(bench.reduced, fit, pair(fit, bench.reduced), basis=basis)
-    row = bench.reduced.row(sensor)
-    found = row @ (updated.model.mass - bench.reduced.mass) @ row / (row @ row) ** 2
+    real = replace(
+        case.structure.nominal_model, mass_all=case.structure.nominal_model.mass_all + sparse.csr_array(added)
+    )
+    fit = simulate_fit(
+        TrueModes(real, case.structure.damping), case.labels, case.fit.band_hz, rng=np.random.default_rng(0)
+    )
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model, sensors=case.structure.sensors[:1])
+    updated = update_model(case.reduced_model, fit, pair(fit, case.reduced_model), basis=basis)
+    row = case.reduced_model.row(sensor)
+    found = row @ (updated.model.mass - case.reduced_model.mass) @ row / (row @ row) ** 2
     assert_allclose(found, grams, rtol=0.2)
 
 
-def chosen_parameters(bench, elements):
+def chosen_parameters(case, elements):
     """One factor for a stretch of elements and nothing else, as a diagnosis would name it."""
-    regions = reduced_regions(bench.case.nominal, bench.reduced)
+    regions = reduced_regions(case.structure.nominal_model, case.reduced_model)
     stiffness = sum(regions[k].stiffness for k in elements)[None]
     nothing = np.zeros_like(stiffness)
     return ParameterBasis(
@@ -179,18 +183,21 @@ def chosen_parameters(bench, elements):
 
 @pytest.mark.parametrize("method", ["minimal-change", "ipz"])
 def test_parameters_that_a_diagnosis_has_chosen_find_the_truth(method):
-    case = random_case(21)
+    structure = draw_structure(21)
     elements = range(3, 9)
-    factors = np.ones(len(case.nominal.parts))
+    factors = np.ones(len(structure.nominal_model.parts))
     factors[list(elements)] = 0.8
-    truth, labels = Truth(scaled(case.nominal, factors), case.damping), labels_of(case)
-    band = band_of(truth, case.n_modes)
-    ends = {"actuators": case.input_dofs, "sensors": case.sensors, "points": case.points}
-    reduced = reduce_model(case.nominal, ReduceOptions(), band_hz=band, **ends)
-    fit = synthetic_fit(truth, labels, band, noise=1e-4, rng=np.random.default_rng(0))
-    bench = replace(set_up(21), reduced=reduced, fit=fit, pairs=pair(fit, reduced))
+    truth, labels = (
+        TrueModes(scale_stiffness(structure.nominal_model, factors), structure.damping),
+        list_labels(structure.input_dofs, structure.sensors),
+    )
+    band = choose_band(truth, structure.n_modes)
+    ends = {"actuators": structure.input_dofs, "sensors": structure.sensors, "points": structure.points}
+    reduced = reduce_model(structure.nominal_model, ReduceOptions(), band_hz=band, **ends)
+    fit = simulate_fit(truth, labels, band, noise=1e-4, rng=np.random.default_rng(0))
+    case = replace(make_update_case(21), reduced_model=reduced, fit=fit, pairs=pair(fit, reduced))
     options = UpdateOptions(method=method, damping=method == "minimal-change", delta=1e-9, max_iterations=60)
-    updated = update_model(bench.reduced, bench.fit, bench.pairs, options, basis=chosen_parameters(bench, elements))
+    updated = update_model(case.reduced_model, case.fit, case.pairs, options, basis=chosen_parameters(case, elements))
     found = updated.history[updated.history.phase != "damping"].iloc[-1]["stiffness of the stretch"]
     factor = found if method == "minimal-change" else np.exp(found)
     assert_allclose(factor, 0.8, rtol=0.01)  # the reduction basis is that of the nominal model

@@ -13,7 +13,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, structural_basis
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.updated_model import UpdateStatus
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.study import make_update_case
 
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
@@ -25,18 +25,18 @@ SEEDS = (20, 12, 11)  # a plate and a frame with zeros off the axis, and a beam
 
 
 @pytest.fixture(params=SEEDS, scope="module")
-def bench(request):
-    return set_up(request.param)
+def case(request):
+    return make_update_case(request.param)
 
 
 @pytest.fixture(params=["parts", "parts and masses", "any stiffness"])
-def problem(request, bench):
+def problem(request, case):
     basis = {
-        "parts": lambda: structural_basis(bench.case.nominal, bench.reduced),
-        "parts and masses": lambda: structural_basis(bench.case.nominal, bench.reduced, mass=True),
-        "any stiffness": lambda: generic_basis(bench.reduced),
+        "parts": lambda: structural_basis(case.structure.nominal_model, case.reduced_model),
+        "parts and masses": lambda: structural_basis(case.structure.nominal_model, case.reduced_model, mass=True),
+        "any stiffness": lambda: generic_basis(case.reduced_model),
     }[request.param]()
-    return make_problem(bench.reduced, bench.fit, bench.pairs, basis)
+    return make_problem(case.reduced_model, case.fit, case.pairs, basis)
 
 
 def stiffness_phase(problem):
@@ -63,9 +63,9 @@ def test_stiffness_slopes_against_differences(problem):
 
 
 @pytest.mark.parametrize("has_damper", [False, True])
-def test_damping_slopes_against_differences(bench, has_damper):
-    basis = structural_basis(bench.case.nominal, bench.reduced)
-    problem = make_problem(bench.reduced, bench.fit, bench.pairs, basis)
+def test_damping_slopes_against_differences(case, has_damper):
+    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, basis)
     if has_damper:
         damper = damper_at(problem, STRONG / 10)
         damped = replace(problem.model, damping=problem.model.damping + damper, dashpots=damper)
@@ -112,8 +112,8 @@ def damper_at(problem, part):
 @pytest.mark.parametrize("seed", [3, 7])
 def test_a_known_damper_stays_while_the_modes_are_damped_anew(seed):
     """Scaled with the modes that it couples, it would keep them from losing damping of their own."""
-    bench = set_up(seed)
-    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    case = make_update_case(seed)
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     modal, damper = problem.model.damping, damper_at(problem, STRONG / 10)
     there = problem.roots_near(replace(problem.model, damping=LESS * modal + damper), problem.computed)
     nominal = replace(problem.model, damping=modal + damper, dashpots=damper)
@@ -124,9 +124,9 @@ def test_a_known_damper_stays_while_the_modes_are_damped_anew(seed):
     assert np.median(off[problem.frf >= 0]) < AS_MEASURED
 
 
-def test_a_model_that_is_right_stays_as_it_is_however_it_is_damped(bench):
+def test_a_model_that_is_right_stays_as_it_is_however_it_is_damped(case):
     """A damper bends shapes and moves moduli: that is no error of the stiffness."""
-    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     damped = replace(problem.model, damping=problem.model.damping + damper_at(problem, STRONG))
     there = problem.roots_near(damped, problem.computed)
     kept = problem.frf < 0

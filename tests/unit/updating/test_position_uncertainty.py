@@ -9,7 +9,7 @@ from frf_ipz.diagnosis.misplacements import misplacements
 from frf_ipz.updating.position_uncertainty import PositionUncertainty, with_position_uncertainty
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model
-from frf_testbench.updating.study import set_up
+from frf_testbench.updating.study import make_update_case
 
 SEEDS = (20, 12)  # a plate and a frame
 SMALL = 1e-5  # of a row: what is left of second order is as small
@@ -18,12 +18,12 @@ TOLERANCE = 1e-3  # m/m, as stated by default
 
 
 @pytest.fixture(params=SEEDS, scope="module")
-def bench(request):
-    return set_up(request.param)
+def case(request):
+    return make_update_case(request.param)
 
 
-def test_zeros_move_as_those_of_a_model_with_other_rows(bench):
-    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+def test_zeros_move_as_those_of_a_model_with_other_rows(case):
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     label = problem.labels[problem.frfs[0]]
     row = SMALL * np.random.default_rng(0).standard_normal(len(problem.model.dofs))
     for dof, is_output in ((label.output_dof, True), (label.input_dof, False)):
@@ -62,11 +62,11 @@ def _newton(model, output, force, zero):
 
 
 def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are():
-    bench = set_up(SEEDS[0])
-    off = misplacements(bench.case.nominal, bench.reduced, bench.fit.labels, TOLERANCE)
-    ends = {(label.output_dof, True) for label in bench.fit.labels} | {(x.input_dof, False) for x in bench.fit.labels}
+    case = make_update_case(SEEDS[0])
+    off = misplacements(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
+    ends = {(label.output_dof, True) for label in case.fit.labels} | {(x.input_dof, False) for x in case.fit.labels}
     assert {(one.dof, one.is_output) for one in off} == ends
-    problem = make_problem(bench.reduced, bench.fit, bench.pairs, None)
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     wider = with_position_uncertainty(problem, off) - problem.covariance
     zeros = np.repeat(problem.frf >= 0, 2)
     assert np.all(np.diagonal(wider)[zeros] >= 0)
@@ -76,10 +76,10 @@ def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are()
 
 def test_a_misplaced_sensor_is_not_taken_for_another_stiffness():
     """A zero that lies elsewhere because of its sensor changes the model less where that is allowed for."""
-    bench = set_up(SEEDS[0])
-    off = misplacements(bench.case.nominal, bench.reduced, bench.fit.labels, TOLERANCE)
+    case = make_update_case(SEEDS[0])
+    off = misplacements(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
     changes = [
-        np.abs(np.diagonal(found.model.stiffness) / np.diagonal(bench.reduced.stiffness) - 1).max()
-        for found in (update_model(bench.reduced, bench.fit, bench.pairs, misplacements=some) for some in ((), off))
+        np.abs(np.diagonal(found.model.stiffness) / np.diagonal(case.reduced_model.stiffness) - 1).max()
+        for found in (update_model(case.reduced_model, case.fit, case.pairs, misplacements=some) for some in ((), off))
     ]
     assert changes[1] < changes[0]
