@@ -33,7 +33,7 @@ from frf_ipz.diagnosis.comparing.compare import judge
 from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn
 from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
 from frf_ipz.diagnosis.judging.findings import describe
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.search import fit_nothing
@@ -158,7 +158,7 @@ def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
         averages=np.zeros(1, int), unknown_scale="common",
     )  # fmt: skip
     return frf_ipz.State(
-        model=model, observed=Observations(kind="frf", blows=(), band_hz=BAND_HZ, frfs=frfs, exclude_hz=SUPPORT_HZ)
+        model=model, observed=Observations(kind="frf", records=(), band_hz=BAND_HZ, frfs=frfs, exclude_hz=SUPPORT_HZ)
     )
 
 
@@ -201,7 +201,7 @@ def compare_all(folder: Path, step: int) -> tuple[pd.DataFrame, pd.DataFrame, Co
 
 def weigh(found: frf_ipz.Comparison, pieces: list[int]) -> list[dict]:
     """Weigh the same hypotheses in every layout: a piece that lost mass, a softer clamp, a softer or damped beam."""
-    bench = bench_of(found.expected, divide(found.expected.observed), found.scatter)
+    bench = bench_of(found.expected, split_data(found.expected.observed), found.scatter)
     null, known, rows = fit_nothing(bench), shipped_effects(), []
     causes = {
         f"piece {number} lost mass": Cause(

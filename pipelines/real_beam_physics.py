@@ -41,7 +41,7 @@ import real_beams
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.judging.findings import describe
 from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, goodness
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.fit import Fit
@@ -117,7 +117,7 @@ def with_drift(frfs: frf_ipz.FrfSet, drift: float) -> frf_ipz.FrfSet:
 def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit], InferenceProblem]:
     """Add the cause with the largest evidence until the next one brings too little, and print what each leaves."""
     effects = {name: one for name, one in shipped_effects().items() if case.scale == "none" or name != "sensor_gain"}
-    source = divide(Observations(kind="frf", blows=(), band_hz=case.band_hz, frfs=frfs))
+    source = split_data(Observations(kind="frf", records=(), band_hz=case.band_hz, frfs=frfs))
     bench = set_up(model, source, case.band_hz, case.tolerances, effects, free_gains=case.scale)
     fits = add_causes(bench)
     for before, fit in zip([fits[0], *fits], fits, strict=False):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.set_up import set_up
@@ -116,4 +116,4 @@ def observed(frfs, band_hz=BAND_HZ):
 def bench_of(model, frfs, names):
     """Everything a search for some effects works with."""
     effects = {name: effect for name, effect in shipped_effects().items() if name in names}
-    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
+    return set_up(model, split_data(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)

@@ -35,14 +35,14 @@ from frf_ipz.diagnosis.judging.mismatch_location import trace
 from frf_ipz.diagnosis.judging.next_sensor import best_sensor
 from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
 from frf_ipz.diagnosis.judging.unnamed_force import describe_unnamed_force, find_unnamed_force
-from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_dc_offset
-from frf_ipz.diagnosis.measured.cleaned.residual_motion import without_residual_motion
-from frf_ipz.diagnosis.measured.lines import same_places
-from frf_ipz.diagnosis.measured.source import divide
-from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
-from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.measured.group_spectra import group_records
+from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
+from frf_ipz.diagnosis.measured.preprocessing.residual_motion import remove_residual_motion
+from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
+from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
-from frf_ipz.diagnosis.nonlinear.search import FOUND_NATS as LAW_NATS
+from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
 from frf_ipz.progress import silent
@@ -115,12 +115,12 @@ def _diagnose(
     observations, linearity = _without_constants(observations)
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.05, "measuring transfer functions")
-    source = divide(observations)
+    source = split_data(observations)
     kept = _identifiable(chosen_effects(options, folder), scale)
     at_bench = partial(set_up, model, source, observations.band_hz, effects=kept, free_gains=scale)
     bench = at_bench(options)
     gates = check(source, linearity)
-    excess = linearity.score / linearity.limit if linearity and chosen_laws(options, folder) else 0.0
+    excess = linearity.score / linearity.limit if linearity and select_laws(options, folder) else 0.0
     certain = excess > CERTAIN
     bench, found, complaint = _decide(bench, at_bench, options, progress, is_certain=certain)
     progress(0.9, "proving on what was not fitted")
@@ -207,17 +207,17 @@ def _without_constants(observations: Observations) -> tuple[Observations, Linear
 
     Constants are read from what blows of one linear system do not share, or, where they are of none, at rest.
     """
-    linear = without_residual_motion(observations)
+    linear = remove_residual_motion(observations)
     linearity = _linearity(linear)
     if linearity is None or not linearity.is_nonlinear:
         return linear, linearity
-    quiet = without_dc_offset(observations)
+    quiet = remove_dc_offset(observations)
     return quiet, _linearity(quiet)
 
 
 def _linearity(observations: Observations) -> Linearity | None:
     """Compare blows of several levels; None where no place has two."""
-    counts = [len(records) for records in same_places(observations)]
+    counts = [len(records) for records in group_records(observations)]
     return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
 
 
@@ -234,7 +234,7 @@ def _set_up_again(
     observations: Observations,
 ) -> InferenceProblem:
     """Bring the model and changed recordings together."""
-    return set_up(model, divide(observations), observations.band_hz, options, effects, free_gains=free_gains)
+    return set_up(model, split_data(observations), observations.band_hz, options, effects, free_gains=free_gains)
 
 
 def _nonlinear(
@@ -266,7 +266,7 @@ def _nonlinear(
 
 def _unless_a_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Keep a linear explanation that leaves nothing, unless a law says how blows disagree, which nothing linear can."""
-    is_proven = laws.verdict == EXPLAINED and laws.beyond_linear > LAW_NATS
+    is_proven = laws.verdict == EXPLAINED and laws.nonlinear_evidence > LAW_NATS
     return _with_law(linear, laws) if is_proven else linear
 
 
@@ -274,10 +274,10 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
     found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
     before, updated, after = laws.before or linear.before, laws.updated or linear.updated, laws.after or linear.updated
-    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.beyond_linear)) > LAW_NATS
+    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.nonlinear_evidence)) > LAW_NATS
     is_worse = laws.verdict == UNEXPLAINED and after.held_out > updated.held_out
     n_findings = 1 if is_needed and not is_worse else 0
-    linearised = linearise(laws.fit, laws.plant) if n_findings and laws.fit and laws.plant else None
+    linearised = linearise(laws.fit, laws.modal_model) if n_findings and laws.fit and laws.modal_model else None
     return replace(
         linear,
         verdict=laws.verdict,
@@ -286,11 +286,11 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         before=before,
         updated=updated,
         after=after if n_findings else updated,
-        mismatch_location=laws.place or (found[0].location if n_findings else {}),
+        mismatch_location=laws.location or (found[0].location if n_findings else {}),
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised=linearised,
-        at_work=None if linearised is None else laws.at_work,
+        at_work=None if linearised is None else laws.law_in_time,
         remains="",
     )
 

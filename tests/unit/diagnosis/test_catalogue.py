@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from frf_ipz.diagnosis.catalogue.finder import chosen_effects, shipped_effects
-from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
+from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.errors import InputError
 
@@ -46,11 +46,11 @@ def test_only_chosen_effects_are_looked_for():
 def test_a_force_law_can_be_chosen_alone(name):
     options = DiagnoseOptions(effects=(name,))
     assert chosen_effects(options, Path()) == {}
-    assert [law.name for law in chosen_laws(options)] == [name]
+    assert [law.name for law in select_laws(options)] == [name]
 
 
 def test_force_laws_can_be_left_out():
-    assert chosen_laws(DiagnoseOptions(effects=("added_mass",))) == ()
+    assert select_laws(DiagnoseOptions(effects=("added_mass",))) == ()
 
 
 def test_an_unknown_effect_is_refused_with_the_nearest_one():
@@ -62,7 +62,7 @@ def test_a_users_force_law_is_looked_for(tmp_path):
     (tmp_path / "mine.py").write_text(USERS_LAW, encoding="utf-8")
     options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:SquareDrag",))
     assert set(chosen_effects(options, tmp_path)) == {"added_mass"}
-    assert [law.name for law in chosen_laws(options, tmp_path)] == ["square_drag"]
+    assert [law.name for law in select_laws(options, tmp_path)] == ["square_drag"]
 
 
 @pytest.mark.parametrize(

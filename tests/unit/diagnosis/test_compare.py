@@ -10,7 +10,7 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn, nominal_after
 from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
 from frf_ipz.diagnosis.comparing.nominal import LEAST_SQUARE, as_fitted
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses, with_scaled_parts
 from frf_ipz.fe.eigen import solve_modes
@@ -103,7 +103,7 @@ def test_repeats_teach_what_differs_from_test_to_test(nominal, real):
 
 def test_the_corrected_model_has_the_measured_frfs(nominal, real):
     one = state(nominal, real, 1, noise=1e-6)
-    source = divide(one.observed)
+    source = split_data(one.observed)
     options = replace(FEW, model=replace(FEW.model, gain_tolerance=1e-5, position_tolerance_m_per_m=1e-6))
     corrected = nominal_after(one, learn([one], options), options, source)
     s = 2j * np.pi * np.linspace(*BAND_HZ, 300)
@@ -114,7 +114,7 @@ def test_the_corrected_model_has_the_measured_frfs(nominal, real):
 def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
     """Modes below the band are pulled wherever lines above them want."""
     one = state(nominal, real, 1)
-    bench = bench_of(one, divide(one.observed), FEW.model)
+    bench = bench_of(one, split_data(one.observed), FEW.model)
     unknown = np.zeros(bench.nuisance.size)
     unknown[bench.nuisance.frequency_places[0]] = -1.1 / bench.nuisance.kappa_std[0, 0]
     found = solve_modes(as_fitted(bench.suppose(()), unknown)).natural_frequency_hz
@@ -125,7 +125,7 @@ def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
 
 def test_a_node_cannot_lose_more_than_it_has(nominal):
     one = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
-    specimen = bench_of(one, divide(one.observed), FEW.model).specimen
+    specimen = bench_of(one, split_data(one.observed), FEW.model).specimen
     effect = MassLoss()
     (place,) = [place for place in effect.places(specimen) if place.location == {"nodes": [14]}]
     (mass,) = effect.parameters(specimen, place)

@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.finding import Finding
 from frf_ipz.diagnosis.judging.figures import prove
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.set_up import set_up
@@ -163,7 +163,7 @@ def test_gains_that_nobody_knows_are_not_diagnosed(nominal):
 
 def test_noise_is_not_taken_for_a_gain(nominal):
     names = labels(("17:+z", "14:+z", "11:+z", "9:-z", "7:+z", "4:+z"), ("6:+z", "15:+z"))
-    source = divide(observed(measured(nominal, names, noise=MUCH_NOISE)))
+    source = split_data(observed(measured(nominal, names, noise=MUCH_NOISE)))
     bench = set_up(nominal, source, BAND_HZ, FEW, shipped_effects())
     effect = bench.effects["sensor_gain"]
     places = effect.places(bench.specimen)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, cut_off, is_sweep, isolate_pulse
+from frf_ipz.diagnosis.measured.forces import RINGING, TAPER, is_sweep, isolate_pulse, missing_ringing
 from frf_ipz.diagnosis.observations import ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -68,7 +68,7 @@ def test_a_record_that_begins_within_the_ringing_of_its_filter_lacks_some(start,
     force = a_force(5, start)
     force[max(start - 4, 0) : start] += PEAK_N / 50 * np.array([-1.0, 1.0, -1.0, 1.0])
     one = record(force)
-    sizes = cut_off(isolate_pulse(one), np.full((1, SAMPLES), 0.25))
+    sizes = missing_ringing(isolate_pulse(one), np.full((1, SAMPLES), 0.25))
     if rings:
         np.testing.assert_allclose(sizes, [PEAK_N / 50, 0.25], rtol=0.2)
     else:

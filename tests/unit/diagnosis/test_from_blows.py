@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from frf_ipz.diagnosis.measured.from_impacts import measure, survey
+from frf_ipz.diagnosis.measured.from_records import estimate_transfer_functions, survey_records
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -41,7 +41,7 @@ def test_a_recorder_has_at_least_the_noise_of_its_steps(shown):
     """A channel on its node shows exact zeros for some blows: that is no measure of its noise."""
     records = [impact(f"a{'x' * n}", "5:+z", level, 0.1) for n, level in enumerate((10.0, 17.0))]
     records += [impact(f"b{'y' * n}", "7:+z", level, shown) for n, level in enumerate((11.0, 23.0, 35.0))]
-    found = survey(Observations(kind="hammer", records=tuple(records), band_hz=(20.0, 200.0)))
+    found = survey_records(Observations(kind="hammer", records=tuple(records), band_hz=(20.0, 200.0)))
     assert found.responses["acc"].white >= STEP**2 / 12 / RATE_HZ * (1 - 1e-9)
 
 
@@ -70,8 +70,8 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
     errors, stated = [], []
     for trial in range(trials):
         records = tuple(record(f"r{k}", (trial, k), noise_n) for k in range(3))
-        found = survey(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
-        measured = measure(found, s)
+        found = survey_records(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
+        measured = estimate_transfer_functions(found, s)
         errors.append(np.abs(measured.values[:, 0] * np.polyval(RESONANCE[::-1], np.exp(-s / RATE_HZ)) - 1) ** 2)
         stated.append(np.sum(np.abs(measured.common[0]) ** 2, 1))
     ratio = np.mean(errors, 0) / np.mean(stated, 0)
@@ -98,7 +98,7 @@ def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of
             shown = lfilter([1.0], two, force)[None]
             shown += 1e-4 * np.abs(shown).max() * rng.standard_normal(shown.shape)
             records.append(replace(one, force=force + noise, responses=shown))
-        survey_ = survey(Observations(kind="random", records=tuple(records), band_hz=(10.0, 390.0)))
+        survey_ = survey_records(Observations(kind="random", records=tuple(records), band_hz=(10.0, 390.0)))
         found.append(survey_.force.density(np.array([19.0, 255.0])))
     ratio = np.median(found, axis=0) / (white + pink / np.array([19.0, 255.0]))
     assert np.all((ratio > 0.5) & (ratio < 2.0))
@@ -115,8 +115,8 @@ def test_records_that_end_in_motion_say_what_they_lack():
             one = record(f"r{k}", (trial, k), 0.0)
             force = np.where(np.arange(SAMPLES) > LEAD, one.force, 0.0)
             records.append(replace(one, force=force, responses=lfilter([1.0], slow, force)[None]))
-        found = survey(Observations(kind="random", records=tuple(records), band_hz=(20.0, 190.0)))
-        measured = measure(found, s)
+        found = survey_records(Observations(kind="random", records=tuple(records), band_hz=(20.0, 190.0)))
+        measured = estimate_transfer_functions(found, s)
         true = 1 / np.polyval(slow[::-1], np.exp(-s / RATE_HZ))
         errors.append(np.abs((measured.values[:, 0] - true) / true) ** 2)
         common = np.sum(np.abs(measured.common[0]) ** 2, 1)
@@ -141,9 +141,9 @@ def test_what_lies_before_a_blow_does_not_blur_its_frfs(lead_s):
         return replace(one, force=force, responses=responses)
 
     records = tuple(late(f"a{'x' * n}", level) for n, level in enumerate((10.0, 17.0, 30.0)))
-    found = survey(Observations(kind="hammer", records=records, band_hz=(20.0, 200.0)))
+    found = survey_records(Observations(kind="hammer", records=records, band_hz=(20.0, 200.0)))
     s = np.array([12.0 + 2j * np.pi * 120.0])
-    measured = measure(found, s)
+    measured = estimate_transfer_functions(found, s)
     pulse = np.where((np.arange(SAMPLES) > 100) & (np.arange(SAMPLES) < 103), 1.0, 0.0)[50:]
     turned = np.exp(-s * np.arange(SAMPLES - 50) / RATE_HZ)
     true = shown * (turned @ _decaying(SAMPLES - 50)) / (turned @ pulse)

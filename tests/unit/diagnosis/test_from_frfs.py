@@ -3,7 +3,7 @@
 import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import COARSE, fine_contour, wide_contour
-from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, search_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_frfs import continue_frfs, continue_frfs_coarsely, survey_frfs
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity, FrfSet
 
@@ -44,7 +44,7 @@ def survey(structure):
 def seen(structure):
     """The same, off their lines."""
     found = survey(structure)
-    return measure_frfs(found, fine_contour(found.resonances, BAND_HZ, found.least_decay_1_s))
+    return continue_frfs(found, fine_contour(found.resonances, BAND_HZ, found.least_decay_1_s))
 
 
 def measured_of(n, mostly_beyond):
@@ -81,7 +81,7 @@ def test_a_search_takes_each_point_for_itself():
     """An error that points share would make a model that is far off look wrong in its details alone."""
     structure = modes(np.random.default_rng(0), 1.0)
     found = survey(structure)
-    measured = search_frfs(found, wide_contour(BAND_HZ, found.least_decay_1_s, COARSE))
+    measured = continue_frfs_coarsely(found, wide_contour(BAND_HZ, found.least_decay_1_s, COARSE))
     covariance = measured.covariance[0]
     variance = np.diag(covariance).real
     assert np.abs(covariance - np.diag(variance)).max() < 1e-6 * variance.max()

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured.from_frfs import measure_frfs, survey_frfs
-from frf_ipz.diagnosis.measured.from_running import FINEST, fineness, finer_frfs
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.measured.from_frfs import continue_frfs, survey_frfs
+from frf_ipz.diagnosis.measured.from_running_records import FINEST, estimate_finer_frfs, refinement_factor
 from frf_ipz.diagnosis.observed import observe
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test
@@ -42,7 +42,7 @@ def seen(tmp_path):
 
 
 def test_lines_between_those_of_the_record_have_the_frf_of_their_frequency(seen):
-    finer = finer_frfs(seen, seen.frfs)
+    finer = estimate_finer_frfs(seen, seen.frfs)
     kept = seen.frfs.in_band(seen.band_hz)
     assert finer.n_lines == FINEST * kept.sum()
     assert np.diff(finer.frequency_hz) == pytest.approx(1 / (3001 * STEP_S) / FINEST)
@@ -51,7 +51,7 @@ def test_lines_between_those_of_the_record_have_the_frf_of_their_frequency(seen)
 
 
 def test_all_finer_lines_together_know_no_more_than_the_record(seen):
-    finer = finer_frfs(seen, seen.frfs)
+    finer = estimate_finer_frfs(seen, seen.frfs)
     own, of_record = ((1 / frfs.variance).sum() for frfs in (finer, seen.frfs))
     assert own <= 1.05 * of_record
     between = [(frfs.frequency_hz > 105.0) & (frfs.frequency_hz < 155.0) for frfs in (finer, seen.frfs)]  # resonances
@@ -62,7 +62,7 @@ def test_all_finer_lines_together_know_no_more_than_the_record(seen):
 
 @pytest.mark.parametrize(("n_lines", "expected"), [(100, FINEST), (7000, FINEST), (20_000, 3), (100_000, 1)])
 def test_a_band_of_many_lines_is_looked_at_as_finely_as_can_be_paid(n_lines, expected):
-    assert fineness(n_lines) == expected
+    assert refinement_factor(n_lines) == expected
 
 
 @pytest.mark.parametrize(("finer", "most"), [(FINEST, 0.01), (5, 0.04)])
@@ -74,13 +74,13 @@ def test_a_resonance_a_quarter_of_a_line_wide_is_seen_off_the_axis(seen, finer, 
     even = np.full(values.shape, 1e-12)
     lines = replace(seen.frfs, frequency_hz=frequency_hz, values=values, variance=even, coherence=even)
     found = survey_frfs(lines, (30.0, 80.0))
-    off = measure_frfs(found, found.least_decay_1_s + 2j * np.pi * np.linspace(49.5, 50.5, 60))
+    off = continue_frfs(found, found.least_decay_1_s + 2j * np.pi * np.linspace(49.5, 50.5, 60))
     missed = np.abs(off.values[:, 0] * (off.s - pole) - 1).max()
     assert most / 4 < missed < most
 
 
 def test_lines_on_which_the_force_happens_to_be_weak_are_known_to_err(seen):
-    finer = finer_frfs(seen, seen.frfs)
+    finer = estimate_finer_frfs(seen, seen.frfs)
     error = np.abs(finer.values - LIGHT.accelerance(finer.s)) ** 2 * FINEST / finer.variance
     beyond = finer.frequency_hz > 120.0  # where noise is more than what the local models leave
     assert np.mean(error[beyond]) == pytest.approx(1.0, abs=0.2)
@@ -93,14 +93,14 @@ def test_what_is_left_of_transients_at_narrow_resonances_counts_as_error(tmp_pat
     errors = []
     for seed in range(6):
         seen = running(tmp_path / str(seed), 614, narrow, noise=1e-2, seed=seed)
-        finer = finer_frfs(seen, seen.frfs)
+        finer = estimate_finer_frfs(seen, seen.frfs)
         near = np.abs(finer.frequency_hz - 31.0) < 4.0
         errors.append(np.abs(finer.values - narrow.accelerance(finer.s))[near] ** 2 * FINEST / finer.variance[near])
     assert np.mean(errors) == pytest.approx(1.5, abs=1.0)  # the records' own noise is a tenth of that
 
 
 def test_a_diagnosis_sees_running_records_off_the_axis_as_they_are(seen):
-    found = divide(seen)
+    found = split_data(seen)
     for measured in (found.coarse, found.middle, found.training):
         truth = LIGHT.accelerance(measured.s)
         inner = (measured.s.imag > 2 * np.pi * 30) & (measured.s.imag < 2 * np.pi * 200)
@@ -109,8 +109,8 @@ def test_a_diagnosis_sees_running_records_off_the_axis_as_they_are(seen):
 
 
 def test_a_running_test_is_judged_as_one(seen):
-    assert divide(seen).kind == "running"
-    assert divide(replace(seen, kind="frf")).kind == "frf"
+    assert split_data(seen).kind == "running"
+    assert split_data(replace(seen, kind="frf")).kind == "frf"
 
 
 def test_sweeps_from_rest_are_read_as_running_records_and_random_ones_are_not(seen):
@@ -123,4 +123,4 @@ def test_sweeps_from_rest_are_read_as_running_records_and_random_ones_are_not(se
             replace(record, force=size * force, responses=respond(LIGHT, size * force, STEP_S), rested=True)
             for size, record in zip((1.0, 0.5, 0.3), seen.records, strict=True)
         )
-        assert divide(replace(seen, records=records)).kind == kind
+        assert split_data(replace(seen, records=records)).kind == kind

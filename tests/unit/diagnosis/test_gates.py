@@ -7,12 +7,12 @@ import pytest
 
 from diagnosed import beam, measured, observed
 from frf_ipz.diagnosis.judging.data_checks import check, warn
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
-    return divide(observed(measured(beam(tmp_path_factory.mktemp("beam")))))
+    return split_data(observed(measured(beam(tmp_path_factory.mktemp("beam")))))
 
 
 def test_nothing_is_said_of_a_good_measurement(source):
@@ -39,7 +39,7 @@ def test_records_that_begin_within_the_ringing_of_a_blow_are_named(strike, dropp
         force = record.force.copy()
         force[70:80] += 1e-3 * record.level * (-1.0) ** np.arange(10)
         records.append(replace(record, force=force[dropped:], responses=record.responses[:, dropped:]))
-    source = divide(replace(strike(), records=tuple(records)))
+    source = split_data(replace(strike(), records=tuple(records)))
     said = [text for text in warn(source, check(source, None)) if "ringing" in text]
     assert len(said) == is_late
     assert all(text.startswith("blow 100 N, ") for text in said)

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import hypothesis as hypotheses
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
@@ -28,7 +28,7 @@ DIGITS = 1e-12
 def bench(tmp_path_factory):
     nominal = beam(tmp_path_factory.mktemp("beam"))
     effects = {"added_mass": shipped_effects()["added_mass"]}
-    source = divide(observed(measured(with_point_masses(nominal, {12: MASS_KG}))))
+    source = split_data(observed(measured(with_point_masses(nominal, {12: MASS_KG}))))
     return set_up(nominal, source, BAND_HZ, DiagnoseOptions(), effects)
 
 

@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.judging import law_and_linear as law_beside
 from frf_ipz.diagnosis.judging.decision import only_null
 from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.measured.cleaned.restored import restore
+from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.change import Change
@@ -35,15 +35,15 @@ def nominal(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("beam"))
 
 
-def a_law(verdict, strain=0.0):
-    return SimpleNamespace(verdict=verdict, strain=strain, fit=object())
+def a_law(verdict, nuisance_chi2=0.0):
+    return SimpleNamespace(verdict=verdict, nuisance_chi2=nuisance_chi2, fit=object())
 
 
 class Laws:
     """Stands for the search for a law, and remembers what it was given."""
 
-    def __init__(self, verdict, strain=0.0):
-        self.law, self.given = a_law(verdict, strain), []
+    def __init__(self, verdict, nuisance_chi2=0.0):
+        self.law, self.given = a_law(verdict, nuisance_chi2), []
 
     def __call__(self, model, observations):
         self.given.append((model, observations))
@@ -203,9 +203,13 @@ def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkey
     )
     observations = Observations(kind="hammer", records=(record,), band_hz=(10.0, 500.0))
     gone = replace(observations, records=(replace(record, responses=np.full((1, SAMPLES), left)),))
-    monkeypatch.setattr(law_beside, "without_law", lambda *_: gone)
+    monkeypatch.setattr(law_beside, "subtract_law", lambda *_: gone)
     law = SimpleNamespace(
-        verdict="explained", strain=99.0, fit=object(), freedom=SimpleNamespace(moving=()), dispersion_rad=0.0
+        verdict="explained",
+        nuisance_chi2=99.0,
+        fit=object(),
+        nuisance_prior=SimpleNamespace(moving=()),
+        dispersion_rad=0.0,
     )
     assert search_beside_law(pytest.fail, law, nominal, observations, pytest.fail) is None
 
@@ -231,7 +235,7 @@ def test_recordings_are_restored():
         },
         moved={"acc_2": 6},
     )
-    (found,) = restore(Observations(kind="hammer", records=(record,), band_hz=(10.0, 200.0)), change).records
+    (found,) = undo_chain_effects(Observations(kind="hammer", records=(record,), band_hz=(10.0, 200.0)), change).records
     assert_allclose(found.force, pulse(0.0), rtol=0, atol=WRAPPED)
     assert_allclose(found.responses[0], pulse(0.0), rtol=0, atol=WRAPPED)
     assert np.array_equal(found.responses[1], record.responses[1])
@@ -241,4 +245,4 @@ def test_recordings_are_restored():
 
 def test_a_faultless_chain_is_left_alone():
     seen = Observations(kind="hammer", records=(), band_hz=(10.0, 200.0))
-    assert restore(seen, Change()) is seen
+    assert undo_chain_effects(seen, Change()) is seen

@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.cleaned.dc_offset import without_dc_offset
-from frf_ipz.diagnosis.measured.cleaned.residual_motion import DECAYS, LARGEST, _group, _whole, without_residual_motion
 from frf_ipz.diagnosis.measured.forces import RINGING
-from frf_ipz.diagnosis.measured.from_impacts import measure, survey
-from frf_ipz.diagnosis.measured.lines import same_places
+from frf_ipz.diagnosis.measured.from_records import estimate_transfer_functions, survey_records
+from frf_ipz.diagnosis.measured.group_spectra import group_records
+from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
+from frf_ipz.diagnosis.measured.preprocessing.residual_motion import (
+    DECAYS,
+    LARGEST,
+    _group,
+    _whole,
+    remove_residual_motion,
+)
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -54,7 +60,7 @@ def test_constants_of_a_linear_system_are_told_by_blows_of_several_levels(strike
     constants = PARTS[:, None] * largest(strike())
     spoilt = shifted(strike(), constants)
     assert assess_linearity(spoilt).is_nonlinear
-    restored = without_residual_motion(spoilt)
+    restored = remove_residual_motion(spoilt)
     assert not assess_linearity(restored).is_nonlinear
     off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
     stds = np.array([record.constant_std for record in restored.records])
@@ -63,7 +69,7 @@ def test_constants_of_a_linear_system_are_told_by_blows_of_several_levels(strike
 
 
 def test_where_there_are_no_constants_little_changes(strike):
-    off = taken_off(strike(), without_residual_motion(strike()))
+    off = taken_off(strike(), remove_residual_motion(strike()))
     assert np.all(np.abs(off) < 2e-4 * largest(strike()))
 
 
@@ -83,12 +89,12 @@ def test_blows_of_one_level_tell_no_constant(strike):
     ]
     alike = replace(strike(), records=tuple(records))
     constants = PARTS[:, None] * largest(alike)
-    restored = without_residual_motion(shifted(alike, constants))
+    restored = remove_residual_motion(shifted(alike, constants))
     stds = np.array([record.constant_std for record in restored.records])
     assert np.all(stds > 0.05 * LARGEST * largest(alike)[:, 0])
     s = np.array([2.0 + 2j * np.pi * 4.5, 2.0 + 2j * np.pi * 70.0])
-    plain = measure(survey(alike), s)
-    with_stds = measure(survey(replace(alike, records=restored.records)), s)
+    plain = estimate_transfer_functions(survey_records(alike), s)
+    with_stds = estimate_transfer_functions(survey_records(replace(alike, records=restored.records)), s)
     grown = np.array(
         [
             np.abs(np.diag(one)) / np.abs(np.diag(other))
@@ -114,7 +120,7 @@ def test_motion_left_by_the_blow_before_is_taken_off(strike, chain):
         added.append(moving)
     spoilt = replace(strike(), records=tuple(records))
     assert assess_linearity(spoilt).is_nonlinear
-    restored = without_residual_motion(spoilt)
+    restored = remove_residual_motion(spoilt)
     assert not assess_linearity(restored).is_nonlinear
     off = taken_off(spoilt, restored)
     for found, moving in zip(off[1:], added[1:], strict=True):
@@ -132,7 +138,7 @@ def test_ringing_that_recordings_lack_before_a_blow_is_no_constant(strike):
         responses[:, :2] += lacks
         records.append(replace(record, force=record.force[start:], responses=responses))
     spoilt = replace(strike(), records=tuple(records))
-    for before, after in zip(records, without_residual_motion(spoilt).records, strict=True):
+    for before, after in zip(records, remove_residual_motion(spoilt).records, strict=True):
         assert np.all(np.abs((before.responses - after.responses)[:, -1:]) < 3e-3 * largest(strike()))
 
 
@@ -164,14 +170,14 @@ def test_motion_left_by_blows_before_is_taken_off_where_one_of_them_was_left_out
     spoilt, alone = struck_on(600, lambda number: number + 1 + lacking * (number > 0))
     left = np.array([record.responses for record in spoilt.records]) - alone
     assert np.abs(left).max() > 0.05 * np.abs(alone).max()
-    restored = np.array([record.responses for record in without_residual_motion(spoilt).records])
+    restored = np.array([record.responses for record in remove_residual_motion(spoilt).records])
     assert np.linalg.norm(restored - alone) < 0.02 * np.linalg.norm(left)
 
 
 def test_what_forces_before_have_left_of_each_mode_is_known_from_all_of_them(struck_on):
     observations, _ = struck_on(600, lambda number: number + 1)
     ordered = observations.records
-    group = _group(same_places(observations)[0], observations, DECAYS / ordered[0].duration_s)
+    group = _group(group_records(observations)[0], observations, DECAYS / ordered[0].duration_s)
     step, force = ordered[0].step_s, np.concatenate([record.force for record in ordered])
     assert group.kicks(ordered[0]) is None
     for number, record in enumerate(ordered[1:], start=1):
@@ -181,14 +187,14 @@ def test_what_forces_before_have_left_of_each_mode_is_known_from_all_of_them(str
         np.testing.assert_allclose(left, whole, rtol=1e-2)  # forces are cut where nothing touches
         assert np.all(error > 0.009 * np.abs(left))
     without_one = replace(observations, records=(ordered[0], *ordered[2:]))
-    group = _group(same_places(without_one)[0], without_one, DECAYS / ordered[0].duration_s)
+    group = _group(group_records(without_one)[0], without_one, DECAYS / ordered[0].duration_s)
     assert group.kicks(ordered[2]) is None
 
 
 def test_constants_of_a_nonlinear_structure_are_read_where_it_has_come_to_rest(strike):
     constants = PARTS[:, None] * largest(strike(cubic))
     spoilt = shifted(strike(cubic), constants)
-    off = taken_off(spoilt, without_dc_offset(spoilt))[:, :, 0]
+    off = taken_off(spoilt, remove_dc_offset(spoilt))[:, :, 0]
     np.testing.assert_allclose(off, np.tile(constants[:, 0], (len(off), 1)), rtol=0.02)
 
 
@@ -196,7 +202,7 @@ def test_a_displacement_may_have_a_mean(strike):
     record = strike().records[0]
     sensors = tuple(replace(sensor, quantity=FrfQuantity.RECEPTANCE) for sensor in record.sensors)
     shown = replace(strike(), records=(replace(record, sensors=sensors, responses=record.responses + 1.0),))
-    assert not taken_off(shown, without_dc_offset(shown)).any()
+    assert not taken_off(shown, remove_dc_offset(shown)).any()
 
 
 @pytest.fixture
@@ -226,7 +232,7 @@ def test_records_of_a_shaker_tell_constants_though_the_structure_moves_all_the_t
     assert all(_whole(record).start == pytest.approx(max(lead - RINGING, 0), abs=5) for record in shaken.records)
     constants = PARTS[:, None] * largest(shaken)
     spoilt = shifted(shaken, constants)
-    restored = without_residual_motion(spoilt)
+    restored = remove_residual_motion(spoilt)
     off = taken_off(spoilt, restored)[:, :, 0] - constants[:, 0]
     stds = np.array([record.constant_std for record in restored.records])
     assert np.all(np.abs(off) < 4 * stds)
@@ -235,15 +241,15 @@ def test_records_of_a_shaker_tell_constants_though_the_structure_moves_all_the_t
 
 def test_one_record_of_a_shaker_tells_no_constant(shaken):
     alone = replace(shaken, records=shaken.records[:1])
-    assert without_residual_motion(alone) is alone
+    assert remove_residual_motion(alone) is alone
 
 
 @pytest.mark.parametrize("is_rested", [True, False])
 def test_what_does_not_start_at_rest_is_left_alone(strike, is_rested):
     observations = shifted(strike(), largest(strike()) * PARTS[:, None])
     other = replace(observations, records=tuple(replace(record, rested=is_rested) for record in observations.records))
-    assert (without_residual_motion(other) is other) == (not is_rested)
-    assert (without_dc_offset(other) is other) == (not is_rested)
+    assert (remove_residual_motion(other) is other) == (not is_rested)
+    assert (remove_dc_offset(other) is other) == (not is_rested)
 
 
 @pytest.mark.filterwarnings("error")
@@ -255,7 +261,7 @@ def test_a_channel_that_shows_nothing_does_no_harm(strike, everywhere):
     elsewhere = parse_dof("3:+x")
     there = tuple(replace(record, name=f"{record.name} there", input_dof=elsewhere) for record in seen.records)
     together = replace(seen, records=here if everywhere else here + there)
-    off = taken_off(together, without_residual_motion(together))
+    off = taken_off(together, remove_residual_motion(together))
     assert np.all(np.abs(off[: len(here), 1]) < 1e-6 * largest(seen)[1])
-    plain = taken_off(seen, without_residual_motion(seen))
+    plain = taken_off(seen, remove_residual_motion(seen))
     assert off[: len(here), 0] == pytest.approx(plain[:, 0], abs=1e-3 * float(np.abs(seen.records[0].responses).max()))

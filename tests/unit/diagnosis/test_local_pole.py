@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from frf_ipz.diagnosis.measured.local_pole import pole_near
+from frf_ipz.diagnosis.measured.local_pole import fit_local_pole
 
 POLE = 2 * np.pi * 50 * (-0.01 + 1j)
 S = 6.0 + 2j * np.pi * np.linspace(48.0, 52.0, 30)
@@ -14,7 +14,7 @@ def resonance(noise):
 
 def test_deviations_do_not_depend_on_the_unit():
     """Of one resonance with noise, as accelerance and as faint as compliances in m/N are."""
-    found, faint = (pole_near(S, unit * resonance(1e-3), 1.001 * POLE) for unit in (1.0, 1e-9))
+    found, faint = (fit_local_pole(S, unit * resonance(1e-3), 1.001 * POLE) for unit in (1.0, 1e-9))
     np.testing.assert_allclose([faint.pole, faint.std_rad_s], [found.pole, found.std_rad_s], rtol=1e-6)
     assert found.std_rad_s > 1e-5 * abs(found.pole)
     assert abs(found.pole - POLE) < 4 * found.std_rad_s
@@ -22,4 +22,4 @@ def test_deviations_do_not_depend_on_the_unit():
 
 def test_noise_alone_has_no_pole():
     rng = np.random.default_rng(1)
-    assert pole_near(S, rng.standard_normal(len(S)) + 1j * rng.standard_normal(len(S)), POLE) is None
+    assert fit_local_pole(S, rng.standard_normal(len(S)) + 1j * rng.standard_normal(len(S)), POLE) is None

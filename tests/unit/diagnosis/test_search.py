@@ -13,8 +13,8 @@ from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
 from frf_ipz.diagnosis.judging.mismatch_location import trace
 from frf_ipz.diagnosis.judging.verdict import goodness
-from frf_ipz.diagnosis.measured.source import divide
-from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs, without_faint
+from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.measured.transfer_functions import FAINT, find_faint_frfs, raise_faint_sizes
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.physics.basis import solved
@@ -44,7 +44,7 @@ def nominal(tmp_path_factory):
 
 def bench_of(model, frfs, names=FEW):
     effects = {name: effect for name, effect in shipped_effects().items() if name in names}
-    return set_up(model, divide(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
+    return set_up(model, split_data(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
 
 
 @pytest.fixture(scope="module")
@@ -178,18 +178,18 @@ def test_where_nothing_far_off_fits_places_around_are_tried(nominal, monkeypatch
 
 
 def test_faint_frfs_are_known_no_better_than_the_large_ones(nominal):
-    data = divide(observed(measured(nominal))).training
-    faint = without_faint(replace(data, size=data.size * np.array([1.0, 1e-9])))
+    data = split_data(observed(measured(nominal))).training
+    faint = raise_faint_sizes(replace(data, size=data.size * np.array([1.0, 1e-9])))
     assert_allclose(faint.size[:, 0], data.size[:, 0], rtol=0)
     assert_allclose(faint.size[:, 1], FAINT * data.size[:, 0], rtol=SAME)
-    assert_allclose(without_faint(data).size, data.size, rtol=0)
+    assert_allclose(raise_faint_sizes(data).size, data.size, rtol=0)
 
 
 def test_faint_frfs_are_named(nominal):
-    data = divide(observed(measured(nominal))).training
-    assert not faint_frfs(data)
+    data = split_data(observed(measured(nominal))).training
+    assert not find_faint_frfs(data)
     faint = replace(data, values=data.values * np.array([1.0, 1e-3]))
-    assert faint_frfs(faint) == data.labels[1:2] == faint_frfs(without_faint(faint))
+    assert find_faint_frfs(faint) == data.labels[1:2] == find_faint_frfs(raise_faint_sizes(faint))
 
 
 def fit_of(name, evidence, value, std, place):

@@ -7,7 +7,7 @@ import pytest
 from scipy import linalg
 
 from diagnosed import beam, bench_of, measured
-from frf_ipz.diagnosis.measured.transfer import points_of
+from frf_ipz.diagnosis.measured.transfer_functions import select_points
 from frf_ipz.diagnosis.search.ambiguity_set import rescoring as ties
 from frf_ipz.diagnosis.search.ambiguity_set.rescoring import settle_ties
 from frf_ipz.diagnosis.search.search import fit_nothing, search
@@ -76,7 +76,7 @@ def test_errors_of_frfs_that_no_parameter_stands_for_are_as_large_as_the_best_ex
 def test_the_log_density_of_whitening_is_that_of_a_normal_distribution(nominal, shared):
     """Blows at one place share the noise of their force."""
     bench = bench_of(nominal, measured(nominal), ())
-    few = points_of(bench.data.measured, np.arange(0, len(bench.data.measured.s), 40))
+    few = select_points(bench.data.measured, np.arange(0, len(bench.data.measured.s), 40))
     few = replace(few, common=(np.full((len(few.s), 1), shared),))
     errors = few.size * 1e-3 * np.exp(1j * np.arange(few.values.size)).reshape(few.values.shape)
     nats, exact = [], []

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.search import fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up
@@ -31,7 +31,7 @@ def of_unknown_scale(machine, kind="per_channel"):
 def fit_of(nominal, kind):
     """The fit of the model without a mass to FRFs with one."""
     seen = of_unknown_scale(with_point_masses(nominal, {12: MASS_KG}), kind)
-    bench = set_up(nominal, divide(seen), BAND_HZ, FEW, {}, free_gains=kind)
+    bench = set_up(nominal, split_data(seen), BAND_HZ, FEW, {}, free_gains=kind)
     return bench, fit_nothing(bench)
 
 

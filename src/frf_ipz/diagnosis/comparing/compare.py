@@ -16,7 +16,7 @@ from frf_ipz.diagnosis.comparing.unexplained_change import trusted
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.diagnosis import Diagnosis
 from frf_ipz.diagnosis.judging.decision import CONSISTENT
-from frf_ipz.diagnosis.measured.source import divide
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.progress import silent
 
@@ -123,7 +123,7 @@ def judge(learned: Learned, after: State, options: CompareOptions, *, progress: 
         What changed.
     """
     observed = trusted(after.observed, learned.gains, learned.missed)
-    source = divide(observed)
+    source = split_data(observed)
     nominal = replace(after, observed=observed)
     expected = nominal_after(nominal, learned, options, source)
     error = error_of_change(replace(nominal, model=expected), source, learned, options)

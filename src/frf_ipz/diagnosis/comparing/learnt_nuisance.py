@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.comparing.nominal import as_fitted
 from frf_ipz.diagnosis.comparing.states import State
 from frf_ipz.diagnosis.comparing.unexplained_change import Missed, missed_by, trusted
 from frf_ipz.diagnosis.judging.verdict import goodness
-from frf_ipz.diagnosis.measured.source import Source, divide
+from frf_ipz.diagnosis.measured.data_split import DataSplit, split_data
 from frf_ipz.diagnosis.search.map_fit import polish
 from frf_ipz.diagnosis.search.search import fit_nothing
 from frf_ipz.diagnosis.search.set_up import set_up, with_errors
@@ -86,7 +86,7 @@ def learn(before: Sequence[State], options: CompareOptions) -> Learned:
     """
     if not before:
         raise InputError("there is no state before to compare with; give at least one")
-    sources = [divide(state.observed) for state in before]
+    sources = [split_data(state.observed) for state in before]
     fits, errors = _fits(list(zip(before, sources, strict=True)), options)
     if len({fit.hypothesis.specimen.layout.channels for fit in fits}) > 1:
         raise InputError("the states to compare were measured with different channels; give FRFs of the same labels")
@@ -104,7 +104,7 @@ def learn(before: Sequence[State], options: CompareOptions) -> Learned:
     return _widened(before, sources, learned, options)
 
 
-def _fits(before: Sequence[tuple[State, Source]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
+def _fits(before: Sequence[tuple[State, DataSplit]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
     """Fit the models, as closely as nearly all of them can follow what was measured."""
     errors = options.scatter
     while True:
@@ -116,14 +116,14 @@ def _fits(before: Sequence[tuple[State, Source]], options: CompareOptions) -> tu
         errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
 
 
-def fit_from_peaks(bench: InferenceProblem, source: Source) -> Fit:
+def fit_from_peaks(bench: InferenceProblem, source: DataSplit) -> Fit:
     """Fit the model from the frequencies and damping that peaks of the measurement show: a model may be far off.
 
     Parameters
     ----------
     bench : InferenceProblem
         To fit the model.
-    source : Source
+    source : DataSplit
         What was measured.
 
     Returns
@@ -149,7 +149,7 @@ def fit_from_peaks(bench: InferenceProblem, source: Source) -> Fit:
 
 
 def bench_of(
-    state: State, source: Source, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
+    state: State, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
 ) -> InferenceProblem:
     """Bring a state's model and measurement together, with no effects to look for.
 
@@ -157,7 +157,7 @@ def bench_of(
     ----------
     state : State
         The state.
-    source : Source
+    source : DataSplit
         What was measured in it.
     options : DiagnoseOptions
         Tolerances.
@@ -177,7 +177,7 @@ def bench_of(
     return replace(bench, data=with_errors(source.training, errors, free_gains=scale))
 
 
-def nominal_after(state: State, learned: Learned, options: CompareOptions, source: Source) -> StructuralModel:
+def nominal_after(state: State, learned: Learned, options: CompareOptions, source: DataSplit) -> StructuralModel:
     """Give the model that a state would show if nothing had changed.
 
     Parameters
@@ -188,7 +188,7 @@ def nominal_after(state: State, learned: Learned, options: CompareOptions, sourc
         From them.
     options : CompareOptions
         As for `learn`.
-    source : Source
+    source : DataSplit
         What was measured in the state.
 
     Returns
@@ -205,14 +205,14 @@ def nominal_after(state: State, learned: Learned, options: CompareOptions, sourc
     return as_fitted(nothing, learned.correction * signs)
 
 
-def error_of_change(corrected: State, source: Source, learned: Learned, options: CompareOptions) -> float:
+def error_of_change(corrected: State, source: DataSplit, learned: Learned, options: CompareOptions) -> float:
     """Estimate how wrong the model's answer to a change may be: its corrections are those of the states before.
 
     Parameters
     ----------
     corrected : State
         The state after, with its corrected model.
-    source : Source
+    source : DataSplit
         What was measured in it.
     learned : Learned
         From the states before.
@@ -303,7 +303,9 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(apart, 0)) ** 2)))
 
 
-def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learned, options: CompareOptions) -> Learned:
+def _widened(
+    before: Sequence[State], sources: Sequence[DataSplit], learned: Learned, options: CompareOptions
+) -> Learned:
     """Widen the tolerance of the model until nothing has changed in the states before, by the rules for those after."""
     nominals = [
         State(
@@ -312,7 +314,7 @@ def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learne
         )
         for state, source in zip(before, sources, strict=True)
     ]
-    sources = [divide(state.observed) for state in nominals]
+    sources = [split_data(state.observed) for state in nominals]
     scatter = learned.scatter
     while scatter.stiffness_tolerance < MOST_TOLERANCE:
         good = [_is_explained(state, source, scatter) for state, source in zip(nominals, sources, strict=True)]
@@ -322,6 +324,6 @@ def _widened(before: Sequence[State], sources: Sequence[Source], learned: Learne
     return replace(learned, scatter=scatter)
 
 
-def _is_explained(state: State, source: Source, scatter: DiagnoseOptions) -> bool:
+def _is_explained(state: State, source: DataSplit, scatter: DiagnoseOptions) -> bool:
     bench = bench_of(state, source, scatter)
     return goodness(bench, fit_from_peaks(bench, source)).is_good

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.diagnosis import DataCheck
-from frf_ipz.diagnosis.measured.forces import cut_off
-from frf_ipz.diagnosis.measured.from_impacts import Survey
-from frf_ipz.diagnosis.measured.transfer import FAINT, faint_frfs
+from frf_ipz.diagnosis.measured.forces import missing_ringing
+from frf_ipz.diagnosis.measured.from_records import RecordSurvey
+from frf_ipz.diagnosis.measured.transfer_functions import FAINT, find_faint_frfs
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.measured.source import Source
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.data_split import DataSplit
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.nonlinear.linearity import Linearity
 
 RECIPROCAL = 4.0  # the same of FRFs the other way round, over noise and tolerances
@@ -24,12 +24,12 @@ BEFORE = 100  # samples before a blow that hold all ringing
 EXCHANGED = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
 
 
-def check(source: Source, linearity: Linearity | None) -> tuple[DataCheck, ...]:
+def check(source: DataSplit, linearity: Linearity | None) -> tuple[DataCheck, ...]:
     """Check a measurement.
 
     Parameters
     ----------
-    source : Source
+    source : DataSplit
         What was measured.
     linearity : Linearity, optional
         How far blows of different levels disagree; None where no place has two blows.
@@ -42,12 +42,12 @@ def check(source: Source, linearity: Linearity | None) -> tuple[DataCheck, ...]:
     return homogeneity(linearity), reciprocity(source.training), coherence(source.training)
 
 
-def warn(source: Source, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
+def warn(source: DataSplit, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     """Say what a user has to know before they believe a diagnosis.
 
     Parameters
     ----------
-    source : Source
+    source : DataSplit
         What was measured.
     gates : tuple of DataCheck
         As `check` gives them.
@@ -58,7 +58,7 @@ def warn(source: Source, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
         What failed, which records began too late, and which FRFs were too faint to tell anything.
     """
     failed = (*(gate.statement for gate in gates if not gate.passed), *_late(source))
-    faint = faint_frfs(source.training)
+    faint = find_faint_frfs(source.training)
     if not faint:
         return failed
     subject, verb, they = ("FRF", "stays", "it tells") if len(faint) == 1 else ("FRFs", "stay", "they tell")
@@ -70,16 +70,16 @@ def warn(source: Source, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     )
 
 
-def _late(source: Source) -> tuple[str, ...]:
+def _late(source: DataSplit) -> tuple[str, ...]:
     """Say which records begin within the ringing that the converter's filter makes before a blow."""
-    if source.kind != "hammer" or not isinstance(source.survey, Survey):
+    if source.kind != "hammer" or not isinstance(source.survey, RecordSurvey):
         return ()
     records = [record for group in source.survey.groups for record in group]
     pulses = [pulse for group in source.survey.pulses for pulse in group]
     late = [
         record.name
         for record, pulse in zip(records, pulses, strict=True)
-        if cut_off(pulse, record.responses)[0] > RINGS * record.level
+        if missing_ringing(pulse, record.responses)[0] > RINGS * record.level
     ]
     if not late:
         return ()
@@ -114,12 +114,12 @@ def homogeneity(linearity: Linearity | None) -> DataCheck:
     return DataCheck(name="homogeneity", value=linearity.score, limit=linearity.limit, statement=statement)
 
 
-def reciprocity(measured: Measured) -> DataCheck:
+def reciprocity(measured: TransferFunctions) -> DataCheck:
     """Compare FRFs whose sensor and blow change places.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
 
     Returns
@@ -152,7 +152,7 @@ def reciprocity(measured: Measured) -> DataCheck:
     return DataCheck(name="reciprocity", value=value, limit=RECIPROCAL, statement=statement)
 
 
-def _exchanged(measured: Measured, first: int, second: int) -> float:
+def _exchanged(measured: TransferFunctions, first: int, second: int) -> float:
     signs = measured.labels[first].sign * measured.labels[second].sign
     difference = measured.values[:, first] - signs * measured.values[:, second]
     size = np.maximum(measured.size[:, first], measured.size[:, second])
@@ -160,12 +160,12 @@ def _exchanged(measured: Measured, first: int, second: int) -> float:
     return float(np.mean(np.abs(difference) ** 2 / noise))
 
 
-def coherence(measured: Measured) -> DataCheck:
+def coherence(measured: TransferFunctions) -> DataCheck:
     """Compare noise with signal.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
 
     Returns
@@ -185,5 +185,5 @@ def coherence(measured: Measured) -> DataCheck:
     return DataCheck(name="coherence", value=value, limit=COHERENT, statement=statement)
 
 
-def _noise(measured: Measured) -> FloatArray:
+def _noise(measured: TransferFunctions) -> FloatArray:
     return np.array([np.diag(covariance).real for covariance in measured.covariance]).T

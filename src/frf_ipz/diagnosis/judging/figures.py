@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.diagnosis.diagnosis import Curves, Misfit
-from frf_ipz.diagnosis.measured.transfer import ROUGH_PART, SMOOTH_PART
+from frf_ipz.diagnosis.measured.transfer_functions import ROUGH_PART, SMOOTH_PART
 from frf_ipz.diagnosis.physics.response import nuisance_jacobian
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ import numpy as np
 from frf_ipz.diagnosis.judging.decision import EXPLAINED, gain_over
 from frf_ipz.diagnosis.judging.findings import finding_of, is_significant, weigh
 from frf_ipz.diagnosis.judging.verdict import LIMITS
-from frf_ipz.diagnosis.measured.cleaned.restored import restore
-from frf_ipz.diagnosis.nonlinear.recorded.dispersion import without_dispersion
-from frf_ipz.diagnosis.nonlinear.simulate import without_law
+from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
+from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
+from frf_ipz.diagnosis.nonlinear.simulate import subtract_law
 from frf_ipz.diagnosis.physics.attach import with_change
 from frf_ipz.diagnosis.search.search import fit_nothing, search
 
@@ -71,13 +71,13 @@ def search_beside_linear(
     ranking = linear.ranking if linear.ranking.fits else search(bench, null)
     best = ranking.best
     is_most = best.cost <= MOST_LEFT * null.cost
-    if best is null or not (is_most or alone.strain >= STRAINED) or not is_significant(best, -1):
+    if best is null or not (is_most or alone.nuisance_chi2 >= STRAINED) or not is_significant(best, -1):
         return None
     if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
-    laws = search_laws(with_change(model, change), restore(observations, change))
-    is_relieved = laws.fit is not None and laws.strain < STRAINED and _relieves(laws, alone)
+    laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
+    is_relieved = laws.fit is not None and laws.nuisance_chi2 < STRAINED and _relieves(laws, alone)
     if sum((is_most, laws.verdict == EXPLAINED, is_relieved)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
@@ -126,8 +126,8 @@ def search_beside_law(
     if any(best.hypothesis.doubts(best.values)) or (follows_traces and not explains):
         return None
     change = best.hypothesis.change(best.values)
-    again = search_laws(with_change(model, change), restore(observations, change))
-    if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.strain < STRAINED):
+    again = search_laws(with_change(model, change), undo_chain_effects(observations, change))
+    if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.nuisance_chi2 < STRAINED):
         return None
     if laws.is_early and again.is_early:  # what the law misses later is no better explained
         return None
@@ -137,12 +137,17 @@ def search_beside_law(
 
 def _without(observations: Observations, laws: LawSearch) -> Observations | None:
     """Take a law out that strained the model; None where it did not, or where what it leaves is no linear system."""
-    if laws.strain < STRAINED or laws.fit is None or laws.freedom is None or len(laws.freedom.moving):
+    if (
+        laws.nuisance_chi2 < STRAINED
+        or laws.fit is None
+        or laws.nuisance_prior is None
+        or len(laws.nuisance_prior.moving)
+    ):
         return None
     if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
-        without = without_law(without_dispersion(observations, laws.dispersion_rad), laws.freedom, laws.fit)
+        without = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)
     sizes = [
         [np.abs(record.responses).max(initial=0.0) for record in both]
         for both in zip(without.records, observations.records, strict=True)
@@ -153,4 +158,4 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
 
 def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
     """Say whether a law strains the nominal model, and much less so beside a linear cause."""
-    return alone.strain >= STRAINED and beside.strain <= EASED * alone.strain
+    return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= EASED * alone.nuisance_chi2

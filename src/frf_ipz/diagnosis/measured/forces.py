@@ -20,7 +20,9 @@ STRETCHES = 16  # of what is quiet: a second touch, which falls into few of them
 RINGING, LEAST_RINGING = 25, 5  # samples before and after the pulse that are kept whole: a converter's filter rings
 TAPER = 20  # samples over which the rest of the ringing, above the band, is faded out; fewer where less is kept
 HEARD, ALIKE = 2.0, 4  # standard deviations of noise: what rings less is lost in it; samples that show how far it rings
-CUT_OFF = 8  # samples of ringing that a record may lack before its first one, each as large as those that it has
+MISSING_SAMPLES = (
+    8  # samples of ringing that a record may lack before its first one, each as large as those that it has
+)
 FIRST = 3  # samples of a record that show how large
 LATE = 0.05  # of the weight of a force that is alike all the time: a sweep comes to a part of the band too late
 AROUND = 32  # lines over which a force's energy is averaged
@@ -99,7 +101,7 @@ def _rings(beside: FloatArray, noise: float) -> int:
     return int(np.clip(lost[0] * ALIKE, LEAST_RINGING, RINGING)) if len(lost) else RINGING
 
 
-def cut_off(pulse: Pulse, responses: FloatArray) -> FloatArray:
+def missing_ringing(pulse: Pulse, responses: FloatArray) -> FloatArray:
     """Tell how much ringing of the converter's filter a record lacks because it begins too shortly before the blow.
 
     Parameters
@@ -156,7 +158,7 @@ def _noise_of(quiet: FloatArray) -> float:
     return float(np.sqrt(np.median([stretch.mean() for stretch in squares])))
 
 
-def force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> Noise:
+def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> Noise:
     """Read the noise of the force channel where nothing touches.
 
     Parameters
@@ -187,7 +189,7 @@ def force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) 
     return fit_noise(frequency, energy, np.ones_like(energy), np.zeros_like(energy))
 
 
-def window_energy(s: ComplexArray, pulse: Pulse) -> ComplexArray:
+def gate_covariance(s: ComplexArray, pulse: Pulse) -> ComplexArray:
     """Give the covariance that noise of density 1 within the pulse's stretch has on lines.
 
     Parameters
@@ -207,13 +209,13 @@ def window_energy(s: ComplexArray, pulse: Pulse) -> ComplexArray:
     return np.asarray((np.exp(-rate * first) - np.exp(-rate * last)) / rate)
 
 
-def window_energies(s: ComplexArray, pulse: Pulse) -> FloatArray:
+def gate_variance(s: ComplexArray, pulse: Pulse) -> FloatArray:
     """Give the variance that noise of density 1 within the pulse's stretch has on lines.
 
     Parameters
     ----------
     s, pulse
-        As for `window_energy`.
+        As for `gate_covariance`.
 
     Returns
     -------

@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
-from frf_ipz.diagnosis.measured.transfer import Measured
+from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 
@@ -68,7 +68,7 @@ def survey_frfs(frfs: FrfSet, band_hz: tuple[float, float]) -> FrfSurvey:
     Returns
     -------
     FrfSurvey
-        What `measure_frfs` needs.
+        What `continue_frfs` needs.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def _variance(frfs: FrfSet) -> FloatArray:
     return np.where(np.isfinite(frfs.variance) & (frfs.variance > 0), frfs.variance, guessed)
 
 
-def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
+def continue_frfs(found: FrfSurvey, s: ComplexArray) -> TransferFunctions:
     """Evaluate transfer functions on a contour.
 
     Parameters
@@ -115,7 +115,7 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
 
     Returns
     -------
-    Measured
+    TransferFunctions
         With the covariance of their errors.
     """
     placed = _within_reach(found, s)
@@ -127,7 +127,7 @@ def measure_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     return _measured(found, placed, weights @ found.frfs.values, level, covariance)
 
 
-def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
+def continue_frfs_coarsely(found: FrfSurvey, s: ComplexArray) -> TransferFunctions:
     """Evaluate transfer functions far from the axis, where a search weighs every point by itself.
 
     Parameters
@@ -139,7 +139,7 @@ def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
 
     Returns
     -------
-    Measured
+    TransferFunctions
         As if FRFs were beyond the band what they are in it; what that misses is taken for an error of each point.
     """
     placed = _within_reach(found, s)
@@ -150,7 +150,7 @@ def search_frfs(found: FrfSurvey, s: ComplexArray) -> Measured:
     return _measured(found, placed, values, level, covariance)
 
 
-def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
+def select_nearest_lines(found: FrfSurvey, s: ComplexArray) -> TransferFunctions:
     """Take the lines themselves that are nearest to a contour: exact, however narrow a resonance is.
 
     Parameters
@@ -162,7 +162,7 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
 
     Returns
     -------
-    Measured
+    TransferFunctions
         On lines, with independent errors.
     """
     frfs = found.frfs
@@ -174,9 +174,9 @@ def lines_along(found: FrfSurvey, s: ComplexArray) -> Measured:
 
 def _measured(
     found: FrfSurvey, s: ComplexArray, values: ComplexArray, level: FloatArray, covariance: ComplexArray
-) -> Measured:
+) -> TransferFunctions:
     frfs, inputs = found.frfs, list(found.frfs.input_dofs)
-    return Measured(
+    return TransferFunctions(
         s=s,
         labels=frfs.labels,
         values=values,

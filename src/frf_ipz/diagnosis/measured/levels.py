@@ -1,7 +1,7 @@
 """FRFs and modes of weak and of strong blows: what a structure that is not linear changes with the level.
 
 Each FRF is estimated anew from the weaker and from the stronger half of the blows at a place. Around each mode, the FRF
-of every single blow gives a frequency and a damping ratio (`pole_near`).
+of every single blow gives a frequency and a damping ratio (`fit_local_pole`).
 Records of a shaker are cut into pieces as long as those of the FRFs.
 """
 
@@ -16,7 +16,7 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
-from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
+from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import transform_subrecords
 
@@ -185,11 +185,11 @@ def _modes(
     rows: list[tuple[object, ...]] = []
     for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
         sensor = _clearest(labels, fit, mode)
-        near = lines_near(s, complex(pole))
+        near = lines_around_pole(s, complex(pole))
         if sensor is None or len(near) < LEAST_LINES:
             continue
         for record, lines in zip(group, spectra, strict=True):
-            found = pole_near(s[near], _h1(lines)[near, sensor], complex(pole))
+            found = fit_local_pole(s[near], _h1(lines)[near, sensor], complex(pole))
             if found is not None:
                 rows.append((mode, str(labels[sensor]), record.name, record.level, *_as_numbers(found)))
     return rows

@@ -33,7 +33,7 @@ class LocalPole:
     std_rad_s: float
 
 
-def lines_near(s: ComplexArray, pole: complex) -> IntArray:
+def lines_around_pole(s: ComplexArray, pole: complex) -> IntArray:
     """Choose the lines that tell a pole.
 
     Parameters
@@ -51,7 +51,7 @@ def lines_near(s: ComplexArray, pole: complex) -> IntArray:
     return np.flatnonzero(np.abs(s.imag - pole.imag) <= WIDTH * (s[0].real - pole.real))
 
 
-def pole_near(s: ComplexArray, values: ComplexArray, start: complex) -> LocalPole | None:
+def fit_local_pole(s: ComplexArray, values: ComplexArray, start: complex) -> LocalPole | None:
     """Fit a local quotient to an FRF.
 
     Parameters

@@ -48,13 +48,13 @@ def gain_of(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
 
 
 def findings_of(
-    plant: ModalModel, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
+    modal_model: ModalModel, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
 ) -> tuple[Finding, ...]:
     """Make one finding of each law, at its best place.
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     fits : list of LawFit
         Laws at places.
@@ -71,14 +71,14 @@ def findings_of(
     order = np.argsort(-gains)
     found: dict[str, Finding] = {}
     for index in order:
-        fit, place = fits[index], plant.places[fits[index].place]
+        fit, place = fits[index], modal_model.places[fits[index].place]
         if fit.law.name in found:
             continue
         mine = [i for i in order if fits[i].law is fit.law]
         share = np.cumsum(probability[mine]) / max(probability[mine].sum(), 1e-300)
         listed = mine[: min(int(np.searchsorted(share, LISTED)) + 1, MOST_PLACES)]
         numbers = _numbers(fit, scale)
-        places = tuple(dict(plant.places[fits[i].place].location) for i in listed)
+        places = tuple(dict(modal_model.places[fits[i].place].location) for i in listed)
         what = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
         says = f"At {place.words} sits {what} that the model lacks."
         found[fit.law.name] = Finding(

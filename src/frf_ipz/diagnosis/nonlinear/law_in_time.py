@@ -61,12 +61,12 @@ def _with_response(
     *,
     is_held_out: bool,
 ) -> LawInTime:
-    freedom, unknowns = track.linear.freedom.without_starts(fit.unknowns)
+    nuisance_prior, unknowns = track.linear.nuisance_prior.without_starts(fit.unknowns)
     alone = replace(recordings.training, records=(record,))
-    shown = simulate(alone, freedom, replace(fit, unknowns=unknowns), duration_s=track.duration_s)
+    shown = simulate(alone, nuisance_prior, replace(fit, unknowns=unknowns), duration_s=track.duration_s)
     sizes = np.maximum(np.linalg.norm(shown.measured[0], axis=1), np.finfo(float).tiny)
     row = int(np.argmax(np.linalg.norm(shown.simulated[0] - shown.without[0], axis=1) / sizes))
-    sensor = freedom.plant.sensors[row]
+    sensor = nuisance_prior.modal_model.sensors[row]
     return replace(
         law,
         record=record.name,

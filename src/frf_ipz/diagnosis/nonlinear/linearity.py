@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.measured.forces import CUT_OFF, cut_off, isolate_pulse
-from frf_ipz.diagnosis.measured.lines import same_places
+from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, isolate_pulse, missing_ringing
+from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
@@ -80,7 +80,7 @@ def assess_linearity(observations: Observations) -> Linearity:
         The verdict and where in the band it comes from.
     """
     noise = read_noise(observations)
-    parts = [_at_place(observations, records, noise) for records in same_places(observations)]
+    parts = [_at_place(observations, records, noise) for records in group_records(observations)]
     frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
     return Linearity(
         score=float(misfit.max(initial=0.0)),
@@ -124,7 +124,7 @@ def _at_place(
 
 def _lacking(record: ObservedRecord) -> FloatArray:
     """Energy, of the force and of each response, of the ringing that a record lacks at its beginning."""
-    return CUT_OFF * (record.step_s * cut_off(isolate_pulse(record), record.responses)) ** 2
+    return MISSING_SAMPLES * (record.step_s * missing_ringing(isolate_pulse(record), record.responses)) ** 2
 
 
 def _left_over(records: tuple[ObservedRecord, ...], row: int, frequency_hz: FloatArray, sigma: float) -> FloatArray:

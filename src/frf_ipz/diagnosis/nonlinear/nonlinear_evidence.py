@@ -39,14 +39,14 @@ class Agreement:
     left: float
 
 
-def agreement_with(stretches: SegmentSet, freedom: NuisancePrior, fit: LawFit) -> Agreement:
+def agreement_with(stretches: SegmentSet, nuisance_prior: NuisancePrior, fit: LawFit) -> Agreement:
     """Compare how blows agree with one linear system, before and after the law's force is taken out.
 
     Parameters
     ----------
     stretches : SegmentSet
         From rest.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -60,7 +60,9 @@ def agreement_with(stretches: SegmentSet, freedom: NuisancePrior, fit: LawFit) -
     if stretches.moving.any() or counts.max() < ENOUGH:
         return Agreement(np.nan, np.nan)
     used = stretches.used
-    response = respond(freedom.plant, stretches.s[used], freedom.deviations(fit.unknowns, fit.place))
+    response = respond(
+        nuisance_prior.modal_model, stretches.s[used], nuisance_prior.deviations(fit.unknowns, fit.place)
+    )
     motion = stretches.motion[:, :, used]
     without = motion + response.to_sensors(fit.place) * fit.force[:, None, used]
     present = np.isfinite(stretches.variance[:, :, used])

@@ -37,15 +37,15 @@ def prove(track: LawFitProgress, held_out: SegmentSet | None, fit: LawFit) -> tu
     before, updated, after : Misfit
         Not a number where nothing was held out, or where it starts in motion.
     """
-    freedom, stretches = track.linear.freedom, track.stretches
+    nuisance_prior, stretches = track.linear.nuisance_prior, track.stretches
     models = track.linear.as_stated, track.linear.unknowns
-    training = [_figures(stretches, _linear(stretches, freedom, unknowns)) for unknowns in models]
+    training = [_figures(stretches, _linear(stretches, nuisance_prior, unknowns)) for unknowns in models]
     training.append(_figures(stretches, fit.misfit))
     other = [(np.nan, np.nan)] * len(training)
     if held_out is not None and not held_out.moving.any():
-        resting, unknowns = freedom.without_starts(fit.unknowns)
+        resting, unknowns = nuisance_prior.without_starts(fit.unknowns)
         simulated = fit_output_error(held_out, resting, fit.start(unknowns), iterations=0).misfit
-        plain = [_linear(held_out, resting, freedom.without_starts(model)[1]) for model in models]
+        plain = [_linear(held_out, resting, nuisance_prior.without_starts(model)[1]) for model in models]
         other = [_figures(held_out, misfit) for misfit in (*plain, simulated)]
     before, updated, after = (
         Misfit(training=mine[0], held_out=its[0], training_noise=mine[1], held_out_noise=its[1])
@@ -54,11 +54,11 @@ def prove(track: LawFitProgress, held_out: SegmentSet | None, fit: LawFit) -> tu
     return before, updated, after
 
 
-def _linear(stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray) -> FloatArray:
+def _linear(stretches: SegmentSet, nuisance_prior: NuisancePrior, unknowns: FloatArray) -> FloatArray:
     """Weighted misfit of the linear model."""
-    response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
-    shown = linear_motion(stretches, freedom, response)
-    shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(unknowns))
+    shown = linear_motion(stretches, nuisance_prior, response)
+    shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(unknowns, response)
     used = stretches.used
     return as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
 
@@ -93,14 +93,14 @@ def relative_misfit(stretches: SegmentSet, misfit: FloatArray) -> float:
     return _figures(stretches, misfit)[0]
 
 
-def working_range(fit: LawFit, plant: ModalModel) -> str:
+def working_range(fit: LawFit, modal_model: ModalModel) -> str:
     """Say for which motions of its place a law was seen.
 
     Parameters
     ----------
     fit : LawFit
         The law.
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
 
     Returns
@@ -110,6 +110,6 @@ def working_range(fit: LawFit, plant: ModalModel) -> str:
     """
     largest = np.abs(fit.motion).max(1)
     return (
-        f"It was seen for motions of {plant.places[fit.place].words} of up to {largest.max():.3g} m; the weakest blow "
-        f"reached {largest.min():.3g} m."
+        f"It was seen for motions of {modal_model.places[fit.place].words} of up to {largest.max():.3g} m; the weakest "
+        f"blow reached {largest.min():.3g} m."
     )

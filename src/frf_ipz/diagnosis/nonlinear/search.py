@@ -3,9 +3,9 @@
 The recordings of all levels are asked first (`assess_linearity`). If no linear system explains them, every law is tried
 at every place on the first part of each blow, or on stretches of records. What is held out takes no part in that.
 
-Evidence is in nats: half the drop of the weighted sum of squares against the linear model with its tolerances, less
-what the freedom of the law costs. A law is needed if it explains how blows of different levels disagree, which nothing
-linear can (`beyond_linear`). If none explains it, the place is looked for at which some force, of whatever law, would.
+Log evidence is half the drop of the weighted sum of squares against the linear model with its tolerances, less the
+Occam factor of the law. A law is needed if it explains how records of different levels disagree, which nothing linear
+can (`nonlinear_evidence`). If none explains it, the location is looked for at which some force, of whatever law, would.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.finding import doubt_of_place
+from frf_ipz.diagnosis.measured.preprocessing.dispersion import excess_delay_s
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
 from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FINE, ROUGH, WEAK, FittedSegments
@@ -34,12 +35,11 @@ from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import (
     simple_forces,
 )
 from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
-from frf_ipz.diagnosis.nonlinear.laws.finder import chosen_laws
+from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import make_modal_model
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import agreement_with
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
-from frf_ipz.diagnosis.nonlinear.recorded.dispersion import latest_s
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
 from frf_ipz.progress import silent
 
@@ -74,7 +74,7 @@ SMALL = 0.5  # of the cost: what forces besides a law promise more than that is 
 PROMISED = 0.7  # times the cost of any force alone: what a small force besides a law may promise less surely
 NEARLY = 0.02  # or so much of the response is left
 MOST_LEFT = 0.1  # of the response: with more, noise hides much of how another law bends, and any bend is too much
-FOUND_NATS = 65.0  # evidence that a law needs, and needs beyond anything linear
+MIN_LOG_BAYES_FACTOR = 65.0  # evidence that a law needs, and needs beyond anything linear
 WEAK_NATS = 2000.0  # evidence below which the model's errors may hide where a law sits
 EXPLAINED_FIRST = 1.0  # misfit of the first moments that leaves nothing to explain, where later ones are not reached
 PLACED, HALVED = 4.0, 0.5  # most misfit, and most of the linear model's, that an unknown law at its place leaves
@@ -97,43 +97,43 @@ class LawSearch:
         What the recordings say without a model.
     findings : tuple of Finding
         The best place of each law, the most probable first; empty for a linear system.
-    beyond_linear : float
+    nonlinear_evidence : float
         Evidence of the first finding beyond anything linear, nats; NaN where stretches start in motion.
     before, updated, after : Misfit
         Of the nominal model, of the same with its tolerances, and with the first finding.
     statement : str
         The verdict in a sentence or two.
-    plant : ModalModel, optional
+    modal_model : ModalModel, optional
         The structure that the law sits on; None for a linear system, as what follows.
     fit : LawFit, optional
         The best law at its place.
-    freedom : NuisancePrior, optional
+    nuisance_prior : NuisancePrior, optional
         Unknowns of the linear model that it was fitted with; `simulate` needs them.
-    place : mapping
+    location : mapping
         Where a force sits whose law is not known, as in `diagnosis.json`; empty where that was not asked or not found.
     dispersion_rad : float
-        What was taken back of the converters' dispersion before the law was fitted, see `without_dispersion`; rad.
+        What was taken back of the converters' dispersion before the law was fitted, see `remove_dispersion`; rad.
     is_early : bool
         The law explains first moments only: what it misses later grows from small errors of the model.
-    at_work : LawInTime, optional
+    law_in_time : LawInTime, optional
         The best law in time, to be drawn.
     """
 
     verdict: str
     linearity: Linearity
     findings: tuple[Finding, ...] = ()
-    beyond_linear: float = np.nan
+    nonlinear_evidence: float = np.nan
     before: Misfit | None = None
     updated: Misfit | None = None
     after: Misfit | None = None
     statement: str = ""
-    plant: ModalModel | None = None
+    modal_model: ModalModel | None = None
     fit: LawFit | None = None
-    freedom: NuisancePrior | None = None
-    place: Mapping[str, object] = field(default_factory=dict)
+    nuisance_prior: NuisancePrior | None = None
+    location: Mapping[str, object] = field(default_factory=dict)
     dispersion_rad: float = 0.0
     is_early: bool = False
-    at_work: LawInTime | None = None
+    law_in_time: LawInTime | None = None
 
     @property
     def is_nonlinear(self) -> bool:
@@ -141,11 +141,11 @@ class LawSearch:
         return self.verdict != LINEAR
 
     @property
-    def strain(self) -> float:
+    def nuisance_chi2(self) -> float:
         """Mean square of the lasting unknowns that the law was fitted with, in tolerances; 0 without a law."""
-        if self.fit is None or self.freedom is None:
+        if self.fit is None or self.nuisance_prior is None:
             return 0.0
-        return float(np.mean(self.fit.unknowns[: self.freedom.n_lasting] ** 2))
+        return float(np.mean(self.fit.unknowns[: self.nuisance_prior.n_lasting] ** 2))
 
 
 def search_laws(
@@ -190,13 +190,15 @@ def search_laws(
         return LawSearch(
             verdict=LINEAR, linearity=linearity, statement="Blows of all levels agree with one linear system."
         )
-    laws = chosen_laws(options, folder)
+    laws = select_laws(options, folder)
     if not laws:
         return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was looked for.")
     progress(0.1, "looking for a nonlinear law")
     training, held_out = _divide(observations)
-    plant, noise = make_modal_model(model, observations), read_noise(observations)
-    recordings = FittedSegments(training=training, held_out=held_out, plant=plant, noise=noise, options=options)
+    modal_model, noise = make_modal_model(model, observations), read_noise(observations)
+    recordings = FittedSegments(
+        training=training, held_out=held_out, modal_model=modal_model, noise=noise, options=options
+    )
     look = _look(recordings, linearity, laws)
     if look.found.fit is not None and (look.found.verdict == UNEXPLAINED or not is_explained(look.found.fit)):
         progress(0.4, "looking whether converters turned the phase")
@@ -205,14 +207,16 @@ def search_laws(
     if found.verdict == UNEXPLAINED:
         progress(0.6, "looking for the place of an unknown law")
         best = _anywhere(look)
-        found = _with_place(found, plant, best, LARGELY if _can_explain(look.long, best.place) else MOSTLY)
+        found = _with_place(found, modal_model, best, LARGELY if _can_explain(look.long, best.place) else MOSTLY)
     if found.fit is None:
         return found
     progress(0.9, "proving on what was not fitted")
     before, updated, after = prove(look.long, look.recordings.held_out_as(look.long), found.fit)
-    at_work = show_law(look.recordings, look.long, found.fit)
-    freedom = look.long.linear.freedom
-    return replace(found, freedom=freedom, before=before, updated=updated, after=after, at_work=at_work)
+    law_in_time = show_law(look.recordings, look.long, found.fit)
+    nuisance_prior = look.long.linear.nuisance_prior
+    return replace(
+        found, nuisance_prior=nuisance_prior, before=before, updated=updated, after=after, law_in_time=law_in_time
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -236,7 +240,9 @@ def _look(recordings: FittedSegments, linearity: Linearity, laws: Sequence[Law])
 
     first = partial(track_of, FIRST / recordings.training.band_hz[1], ROUGH) if short.missed > WEAK else None
     fits, bend_of = find_candidates(short, long, laws, first=first), cache(partial(_bend, long))
-    found = replace(_judge(long, linearity, recordings.plant, fits, bend_of), dispersion_rad=recordings.dispersion_rad)
+    found = replace(
+        _judge(long, linearity, recordings.modal_model, fits, bend_of), dispersion_rad=recordings.dispersion_rad
+    )
     later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
     firsts = (track_of(duration, FINE) for duration in later)
     if found.fit is not None and found.verdict == UNEXPLAINED and _explains_first(chain([short], firsts), found.fit):
@@ -255,9 +261,9 @@ def _without_dispersion(look: _Look, linearity: Linearity, laws: Sequence[Law]) 
     better = again.found.fit
     if better is None or better.cost > UNDISPERSED * fit.cost:
         return look
-    if 0.5 * (fit.cost - better.cost) / max(1.0, better.cost / better.n_rows) < FOUND_NATS:
+    if 0.5 * (fit.cost - better.cost) / max(1.0, better.cost / better.n_rows) < MIN_LOG_BAYES_FACTOR:
         return look
-    late = latest_s(dispersion, look.recordings.training.band_hz[1], look.long.stretches.step_s)
+    late = excess_delay_s(dispersion, look.recordings.training.band_hz[1], look.long.stretches.step_s)
     said = f"The converters delay the top of the band by {late:.2g} s more than low frequencies, which was taken back."
     return replace(again, found=replace(again.found, statement=f"{again.found.statement} {said}"))
 
@@ -285,20 +291,20 @@ def _can_explain(track: LawFitProgress, place: int) -> bool:
 
 def _bend(track: LawFitProgress, fit: LawFit) -> float:
     """Drop of the cost by forces of other kinds at the place of a law."""
-    return gain_of_further(track.stretches, track.linear.freedom, fit.start(), simple_forces)
+    return gain_of_further(track.stretches, track.linear.nuisance_prior, fit.start(), simple_forces)
 
 
-def _with_place(found: LawSearch, plant: ModalModel, best: AnyForce, part: float) -> LawSearch:
+def _with_place(found: LawSearch, modal_model: ModalModel, best: AnyForce, part: float) -> LawSearch:
     """Say where an unknown law sits, if a force at one place explains most of what a linear system does not."""
     left = best.left
     if left > max(min(PLACED, HALVED * best.missed), part * best.missed):
         return found
-    place = plant.places[best.place]
+    place = modal_model.places[best.place]
     where = (
         f"A force of another kind at {place.words} would: {np.sqrt(left):.2g} times the expected misfit is then left."
     )
-    doubt = doubt_of_place([plant.places[i].location for i in best.alike])
-    return replace(found, place=dict(place.location), statement=f"{found.statement} {where}{doubt}")
+    doubt = doubt_of_place([modal_model.places[i].location for i in best.alike])
+    return replace(found, location=dict(place.location), statement=f"{found.statement} {where}{doubt}")
 
 
 def _divide(observations: Observations) -> tuple[Observations, Observations]:
@@ -314,33 +320,36 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
 def _judge(
     track: LawFitProgress,
     linearity: Linearity,
-    plant: ModalModel,
+    modal_model: ModalModel,
     fits: list[LawFit],
     bend_of: Callable[[LawFit], float],
 ) -> LawSearch:
     if not fits:
         return LawSearch(
-            verdict=UNEXPLAINED, linearity=linearity, plant=plant, statement=f"{DISAGREE}; no law explains it."
+            verdict=UNEXPLAINED,
+            linearity=linearity,
+            modal_model=modal_model,
+            statement=f"{DISAGREE}; no law explains it.",
         )
     fits, drops = _ranked(track, fits)
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
     gains = np.array(
-        [gain_of(fit, drop / scale, len(plant.places), scale) for fit, drop in zip(fits, drops, strict=True)]
+        [gain_of(fit, drop / scale, len(modal_model.places), scale) for fit, drop in zip(fits, drops, strict=True)]
     )
     weights = np.exp(gains - gains.max())
-    findings = findings_of(plant, fits, gains, weights / weights.sum(), scale)
-    agreement = agreement_with(track.stretches, track.linear.freedom, best)
+    findings = findings_of(modal_model, fits, gains, weights / weights.sum(), scale)
+    agreement = agreement_with(track.stretches, track.linear.nuisance_prior, best)
     why = _complaint(track, best, agreement, float(gains[0]), bend_of)
     return LawSearch(
         verdict=UNEXPLAINED if why else EXPLAINED,
         linearity=linearity,
         findings=findings,
-        beyond_linear=agreement.gain,
+        nonlinear_evidence=agreement.gain,
         statement=f"{DISAGREE}, and no law of the catalogue explains how: the best one ({findings[0].effect}) {why}."
         if why
-        else f"{findings[0].statement} {working_range(best, plant)}",
-        plant=plant,
+        else f"{findings[0].statement} {working_range(best, modal_model)}",
+        modal_model=modal_model,
         fit=best,
     )
 
@@ -353,7 +362,7 @@ def _ranked(track: LawFitProgress, fits: list[LawFit]) -> tuple[list[LawFit], Fl
     """
     drops = np.array([0.5 * (track.linear.cost - fit.cost) for fit in fits])
     if drops[0] < WEAK_NATS and not track.stretches.moving.any():
-        drops += [agreement_with(track.stretches, track.linear.freedom, fit).gain for fit in fits]
+        drops += [agreement_with(track.stretches, track.linear.nuisance_prior, fit).gain for fit in fits]
     scale = max(1.0, fits[0].cost / fits[0].n_rows)
     near, behind = tell_apart(track, fits)
     fits = near + fits[len(near) :]
@@ -367,7 +376,7 @@ def _complaint(
     track: LawFitProgress, best: LawFit, agreement: Agreement, gain: float, bend_of: Callable[[LawFit], float]
 ) -> str:
     """Say what is wrong with a law; nothing where it explains the recordings."""
-    if np.fmin(gain, agreement.gain) < FOUND_NATS:
+    if np.fmin(gain, agreement.gain) < MIN_LOG_BAYES_FACTOR:
         return "gains no more than a linear system could"
     left = best.cost / best.n_rows
     if not is_told(best, max(1.0, left)):
@@ -392,7 +401,7 @@ def _explains_most(track: LawFitProgress, fit: LawFit) -> bool:
     again = min(track.fit_output_error(fit, FRESH), track.fit_output_error_afresh(fit, FRESH), key=lambda one: one.cost)
     if again.cost > NEARLY_ALL * track.linear.cost:
         return False
-    agreement = agreement_with(track.stretches, track.linear.freedom, again)
+    agreement = agreement_with(track.stretches, track.linear.nuisance_prior, again)
     gain = 0.5 * (track.linear.cost - again.cost) / max(1.0, again.cost / again.n_rows)
     bent = _bend(track, again)
     return bent < _bend_of_errors(track, again, BENT) and not _complaint(track, again, agreement, gain, lambda _: bent)

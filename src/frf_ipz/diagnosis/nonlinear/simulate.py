@@ -57,16 +57,16 @@ class Simulation:
 
 
 def simulate(
-    observations: Observations, freedom: NuisancePrior, fit: LawFit, *, duration_s: float = np.inf
+    observations: Observations, nuisance_prior: NuisancePrior, fit: LawFit, *, duration_s: float = np.inf
 ) -> Simulation:
     """Simulate records.
 
     Parameters
     ----------
     observations : Observations
-        Blows or records that start at rest, without the dispersion of their converters (`without_dispersion`) if the
+        Blows or records that start at rest, without the dispersion of their converters (`remove_dispersion`) if the
         law was fitted without it.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -83,9 +83,9 @@ def simulate(
     InputError
         If a record starts in motion.
     """
-    place, done = _in_time(observations, freedom, fit, duration_s)
+    place, done = _in_time(observations, nuisance_prior, fit, duration_s)
     stretches, shown = place.stretches, _sensors(place, done.force)
-    measured = _measured(observations, freedom.plant, stretches)
+    measured = _measured(observations, nuisance_prior.modal_model, stretches)
     is_there = np.abs(measured).max(-1, keepdims=True) > 0
     return Simulation(
         step_s=stretches.step_s,
@@ -98,14 +98,14 @@ def simulate(
     )
 
 
-def without_law(observations: Observations, freedom: NuisancePrior, fit: LawFit) -> Observations:
+def subtract_law(observations: Observations, nuisance_prior: NuisancePrior, fit: LawFit) -> Observations:
     """Take out of recordings what a law adds to them.
 
     Parameters
     ----------
     observations : Observations
         As for `simulate`.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model that the law was fitted with.
     fit : LawFit
         The law at its place.
@@ -120,9 +120,9 @@ def without_law(observations: Observations, freedom: NuisancePrior, fit: LawFit)
     InputError
         If a record starts in motion.
     """
-    place, done = _in_time(observations, freedom, fit, np.inf)
+    place, done = _in_time(observations, nuisance_prior, fit, np.inf)
     added = _sensors(place, done.force) - _sensors(place, np.zeros_like(done.force))
-    records, keys = list(observations.records), _channels(freedom.plant)
+    records, keys = list(observations.records), _channels(nuisance_prior.modal_model)
     for row, number in enumerate(place.stretches.record_of):
         record, start = records[number], place.stretches.first_sample[row]
         left = record.responses.copy()
@@ -133,37 +133,37 @@ def without_law(observations: Observations, freedom: NuisancePrior, fit: LawFit)
 
 
 def _in_time(
-    observations: Observations, freedom: NuisancePrior, fit: LawFit, duration_s: float
+    observations: Observations, nuisance_prior: NuisancePrior, fit: LawFit, duration_s: float
 ) -> tuple[PlaceInTime, TimeSteps]:
     """Go through records, or the first part of them."""
     longest = max(record.duration_s for record in observations.records)
     window = Window(duration_s=min(duration_s, longest), loudest=False)
-    stretches = transform(observations, freedom.plant, read_noise(observations), window)
+    stretches = transform(observations, nuisance_prior.modal_model, read_noise(observations), window)
     if stretches.moving.any():
         raise InputError("a record starts in motion, which is not known; only records that start at rest are simulated")
-    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=fit.unknowns, place=fit.place)
+    place = PlaceInTime(stretches=stretches, nuisance_prior=nuisance_prior, unknowns=fit.unknowns, place=fit.place)
     yielding = place.yielding(constant=fit.law.holds)
     return place, step_in_time(fit.law, (fit.strength, fit.shape), yielding, *place.without_law())
 
 
-def _channels(plant: ModalModel) -> list[tuple[str, Dof]]:
-    return [(sensor.channel, sensor.dof) for sensor in plant.sensors]
+def _channels(modal_model: ModalModel) -> list[tuple[str, Dof]]:
+    return [(sensor.channel, sensor.dof) for sensor in modal_model.sensors]
 
 
 def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
     """(n_blows, n_sensors, n_samples) what sensors show."""
-    plant, stretches, modes = place.freedom.plant, place.stretches, place.modes()
+    modal_model, stretches, modes = place.nuisance_prior.modal_model, place.stretches, place.modes()
     push = place.push() - place.shapes[:, None] * law_force[:, None]
     z = modes.drive(push)
     displacement, velocity = modes.displacement(z), modes.velocity(z)
     loss, square = -2 * modes.poles.real[:, None], np.abs(modes.poles[:, None]) ** 2
     modal = (displacement, velocity, push - loss * velocity - square * displacement)
-    shapes = plant.at_sensors.shapes + place.deviations.sensors
-    at_inputs = (plant.at_sensors.weights @ plant.at_inputs.static)[:, stretches.input_of]
-    at_place = plant.at_sensors.weights @ plant.at_places.static[:, place.place]
+    shapes = modal_model.at_sensors.shapes + place.deviations.sensors
+    at_inputs = (modal_model.at_sensors.weights @ modal_model.at_inputs.static)[:, stretches.input_of]
+    at_place = modal_model.at_sensors.weights @ modal_model.at_places.static[:, place.place]
     rest = at_inputs.T[..., None] * stretches.fine_force[:, None] - at_place[:, None] * law_force[:, None]
     shown = np.zeros(rest[..., ::FINER].shape)
-    for row, sensor in enumerate(plant.sensors):
+    for row, sensor in enumerate(modal_model.sensors):
         own = rest[:, row]
         for _ in range(sensor.quantity.power):
             own = np.gradient(own, place.step_s, axis=-1)
@@ -171,9 +171,9 @@ def _sensors(place: PlaceInTime, law_force: FloatArray) -> FloatArray:
     return shown
 
 
-def _measured(observations: Observations, plant: ModalModel, stretches: SegmentSet) -> FloatArray:
+def _measured(observations: Observations, modal_model: ModalModel, stretches: SegmentSet) -> FloatArray:
     found = np.zeros((stretches.n_records, stretches.motion.shape[1], stretches.n_samples))
-    keys = _channels(plant)
+    keys = _channels(modal_model)
     for row, number in enumerate(stretches.record_of):
         record, start = observations.records[number], stretches.first_sample[row]
         for sensor, response in zip(record.sensors, record.responses, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.measured.transfer import Measured, Whitening
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions, Whitening
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
 
@@ -91,7 +91,7 @@ class Data:
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
     whitening : Whitening
         Of their errors.
@@ -102,7 +102,7 @@ class Data:
         Tolerances are bounds; without them far steps are easier.
     """
 
-    measured: Measured
+    measured: TransferFunctions
     whitening: Whitening
     free_gains: str = "none"
     is_bounded: bool = True

@@ -16,7 +16,7 @@ from frf_ipz.diagnosis.search.map_fit import polish, same_modes
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.physics.nuisance import Nuisance
 
 LAST_STEPS = 90  # along a bent valley many are small
@@ -34,7 +34,7 @@ class InferenceProblem:
         What cannot be known.
     effects : mapping of str to Effect
         What is looked for.
-    coarse, middle : Measured
+    coarse, middle : TransferFunctions
         Transfer functions far from the axis, and on the way to it.
     data : Data
         Those near the axis, with their errors.
@@ -49,8 +49,8 @@ class InferenceProblem:
     specimen: ModelContext
     nuisance: Nuisance
     effects: Mapping[str, Effect]
-    coarse: Measured
-    middle: Measured
+    coarse: TransferFunctions
+    middle: TransferFunctions
     data: Data
     early: Data
     thin: Data
@@ -99,12 +99,12 @@ class InferenceProblem:
         return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=LAST_STEPS)
 
 
-def weights_of(measured: Measured, error: float) -> FloatArray:
+def weights_of(measured: TransferFunctions, error: float) -> FloatArray:
     """Weigh squared misfits, line by line.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
     error : float
         Relative error of the model.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-from frf_ipz.diagnosis.measured.transfer import Whitening, points_of, whiten
+from frf_ipz.diagnosis.measured.transfer_functions import Whitening, make_whitening, select_points
 from frf_ipz.diagnosis.physics.basis import make_basis
 from frf_ipz.diagnosis.physics.change import NOTHING
 from frf_ipz.diagnosis.physics.layout import lay_out
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.measured.source import Source
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.data_split import DataSplit
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.physics.basis import Basis
     from frf_ipz.diagnosis.physics.layout import Layout
@@ -37,7 +37,7 @@ EARLY_FLOOR = 8.0  # times the model's errors: first steps see past narrow peaks
 
 def set_up(
     model: StructuralModel,
-    source: Source,
+    source: DataSplit,
     band_hz: tuple[float, float],
     options: DiagnoseOptions,
     effects: Mapping[str, Effect],
@@ -50,7 +50,7 @@ def set_up(
     ----------
     model : StructuralModel
         The nominal model.
-    source : Source
+    source : DataSplit
         What was measured.
     band_hz : pair of float
         Hz.
@@ -79,8 +79,8 @@ def set_up(
     if free_gains != "none":
         coarse, middle = (_scaled(one, basis, layout, nuisance, free_gains) for one in (coarse, middle))
     n_points = len(source.training.s)
-    half = points_of(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
-    few = points_of(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
+    half = select_points(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
+    few = select_points(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
     specimen = ModelContext(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
     early = with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
     return InferenceProblem(
@@ -96,12 +96,14 @@ def set_up(
     )
 
 
-def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str = "none", floor: float = 1.0) -> Data:
+def with_errors(
+    measured: TransferFunctions, options: DiagnoseOptions, *, free_gains: str = "none", floor: float = 1.0
+) -> Data:
     """Put tolerances beside measurements.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
     options : DiagnoseOptions
         Tolerances.
@@ -115,7 +117,7 @@ def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str
     Data
         To fit to.
     """
-    whitening = whiten(
+    whitening = make_whitening(
         measured,
         tolerance=options.stiffness_tolerance,
         floor=floor,
@@ -123,7 +125,9 @@ def with_errors(measured: Measured, options: DiagnoseOptions, *, free_gains: str
     return Data(measured=measured, whitening=whitening, free_gains=free_gains)
 
 
-def _scaled(measured: Measured, basis: Basis, layout: Layout, nuisance: Nuisance, free_gains: str) -> Measured:
+def _scaled(
+    measured: TransferFunctions, basis: Basis, layout: Layout, nuisance: Nuisance, free_gains: str
+) -> TransferFunctions:
     """Bring measured FRFs of unknown scale to the scale of the nominal model."""
     unknowns = nuisance.unpack(np.zeros(nuisance.size))
     modes = scatter(basis, modify(basis, NOTHING), rows_of(basis, layout, NOTHING, nuisance), unknowns)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from frf_ipz.diagnosis.nonlinear.recorded.dispersion import CUT_OFF, latest_s, without_dispersion
+from frf_ipz.diagnosis.measured.preprocessing.dispersion import CUT_OFF, excess_delay_s, remove_dispersion
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
@@ -75,7 +75,7 @@ def test_what_is_taken_back_is_what_such_a_filter_does_beyond_a_delay(struck):
     impulse[600] = 1.0
     shown = np.convolve(impulse, taps(is_fast=True))[: record.n_samples : EVERY]
     test = replace(struck, records=(replace(record, force=shown, responses=np.tile(shown, (2, 1)), step_s=1.0),))
-    back = without_dispersion(test, TYPICAL).records[0].force
+    back = remove_dispersion(test, TYPICAL).records[0].force
     lines = np.fft.rfft(back)
     frequency = np.fft.rfftfreq(len(back))
     inside = (frequency > 0.01) & (frequency < 0.36)
@@ -88,7 +88,7 @@ def test_what_is_taken_back_is_what_such_a_filter_does_beyond_a_delay(struck):
 
 
 def test_all_channels_are_turned_alike(struck):
-    turned = without_dispersion(struck, TYPICAL)
+    turned = remove_dispersion(struck, TYPICAL)
     for new, old in zip(turned.records, struck.records, strict=True):
         lines = [
             np.fft.rfft(np.vstack([record.force, record.responses]), 4 * record.n_samples) for record in (new, old)
@@ -96,11 +96,11 @@ def test_all_channels_are_turned_alike(struck):
         inside = slice(200, 1200)
         ratios = [each[1:, inside] / each[0, inside] for each in lines]
         assert np.median(np.abs(ratios[0] / ratios[1] - 1)) < 0.005  # where a record ends they are not quite the same
-    assert without_dispersion(struck, 0.0) is struck
+    assert remove_dispersion(struck, 0.0) is struck
 
 
 def test_the_delay_said_is_the_slope_of_the_phase():
     part = np.array([0.3, 0.3 + 1e-6]) / CUT_OFF
     phase = 2 * TYPICAL * (np.arctanh(part) - part)
     slope = np.diff(phase)[0] / (2 * np.pi * 1e-6 / 1e-3)
-    assert latest_s(TYPICAL, 300.0, 1e-3) == pytest.approx(slope, rel=1e-3)
+    assert excess_delay_s(TYPICAL, 300.0, 1e-3) == pytest.approx(slope, rel=1e-3)

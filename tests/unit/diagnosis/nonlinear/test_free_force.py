@@ -28,9 +28,11 @@ READ = 0.3  # relative: by the nearest of a few gaps
 
 
 def prepared(model, observations, *, duration_s=2.0, floor=2e-3):
-    plant = make_modal_model(model, observations)
-    stretches = transform(observations, plant, read_noise(observations), Window(duration_s=duration_s, floor=floor))
-    return stretches, fit_linear(stretches, make_nuisance_prior(plant, stretches, 75.0, DiagnoseOptions()))
+    modal_model = make_modal_model(model, observations)
+    stretches = transform(
+        observations, modal_model, read_noise(observations), Window(duration_s=duration_s, floor=floor)
+    )
+    return stretches, fit_linear(stretches, make_nuisance_prior(modal_model, stretches, 75.0, DiagnoseOptions()))
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -38,18 +40,18 @@ def test_a_force_is_placed_whatever_its_law(chain, strike, name):
     law, where, location = LAWS[name]
     stretches, linear = prepared(chain.model, strike(law, where))
     found = whereabouts(stretches, linear)
-    assert dict(linear.freedom.plant.places[found.equal[0]].location) == location
+    assert dict(linear.nuisance_prior.modal_model.places[found.equal[0]].location) == location
     assert found.forces[0].cost < 1e-3 * linear.cost
     assert set(found.equal) <= set(found.possible)
-    assert len(found.possible) < len(linear.freedom.plant.places)
+    assert len(found.possible) < len(linear.nuisance_prior.modal_model.places)
 
 
 def test_a_place_is_fitted_from_what_explains_beside_it(chain, strike, monkeypatch):
     """By themselves all places but one end where much is left."""
     law, where, _ = LAWS["cubic"]
     stretches, linear = prepared(chain.model, strike(law, where))
-    best, plant = whereabouts(stretches, linear).equal[0], linear.freedom.plant
-    beside = next(place for place in range(len(plant.places)) if best in neighbours(plant, place, 1))
+    best, modal_model = whereabouts(stretches, linear).equal[0], linear.nuisance_prior.modal_model
+    beside = next(place for place in range(len(modal_model.places)) if best in neighbours(modal_model, place, 1))
 
     def astray(stretches, linear, place, unknowns=None):
         found = free_force(stretches, linear, place, unknowns)
@@ -64,7 +66,7 @@ def test_any_force_leaves_less_than_a_law_at_its_place_however_far_off_the_model
     model = chain_like(ratio=0.006, stiffness_n_m=0.99 * 4e4)
     stretches, linear = prepared(model, strike(*LAWS["cubic"][:2]), duration_s=3.0, floor=5e-4)
     start = Start(law=CubicStiffness(), place=2, strength=2e10, shape=0.0, unknowns=linear.as_stated)
-    law = fit_output_error(stretches, linear.freedom, start, iterations=20)
+    law = fit_output_error(stretches, linear.nuisance_prior, start, iterations=20)
     assert law.cost < linear.n_rows
     assert free_force(stretches, linear, 2).cost < law.cost
     assert whereabouts(stretches, linear).equal == (2,)
@@ -78,7 +80,7 @@ def test_one_sensor_places_nothing(chain, strike):
     )
     stretches, linear = prepared(chain.model, replace(observations, records=records))
     found = whereabouts(stretches, linear)
-    assert found.equal == found.possible == tuple(range(len(linear.freedom.plant.places)))
+    assert found.equal == found.possible == tuple(range(len(linear.nuisance_prior.modal_model.places)))
     assert found.forces == ()
 
 
@@ -114,7 +116,7 @@ def test_a_law_that_refining_leads_astray_is_simulated_as_it_was_read(chain, str
 def test_a_place_whose_force_reaches_the_sensors_best_is_simulated_whatever_refining_says(chain, strike, monkeypatch):
     stretches, linear = prepared(chain.model, strike(*LAWS["cubic"][:2]))
     where = whereabouts(stretches, linear)
-    everywhere = tuple(range(len(linear.freedom.plant.places)))
+    everywhere = tuple(range(len(linear.nuisance_prior.modal_model.places)))
     track = candidates.LawFitProgress(stretches=stretches, linear=linear, where=replace(where, possible=everywhere))
     refined, read = candidates._refined, candidates._read
     monkeypatch.setattr(candidates, "_refined", lambda *given: [fit for fit in refined(*given) if fit.place != 2])

@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.diagnosis import Diagnosis, Linearised, Misfit
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import Place
-from frf_ipz.diagnosis.nonlinear.linearised import linearise
+from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.dofs import Dof
 from frf_ipz.runs.codec import load_result, save_result
 

@@ -30,28 +30,35 @@ def hardening(w, v):
 def cubic(chain, strike):
     """Blows on the chain with a cubic spring at node 3, and the plant, with 1 % of uneven stiffness allowed."""
     observations = strike(hardening)
-    plant = make_modal_model(chain.model, observations)
-    stretches = transform(observations, plant, read_noise(observations), Window(duration_s=1.0, floor=NOISE_FLOOR))
+    modal_model = make_modal_model(chain.model, observations)
+    stretches = transform(
+        observations, modal_model, read_noise(observations), Window(duration_s=1.0, floor=NOISE_FLOOR)
+    )
     options = DiagnoseOptions(stiffness_tolerance=5e-3)
-    place = next(i for i, p in enumerate(plant.places) if p.location == {"nodes": [3]})
-    return stretches, make_nuisance_prior(plant, stretches, observations.band_hz[1], options), place
+    place = next(i for i, p in enumerate(modal_model.places) if p.location == {"nodes": [3]})
+    return stretches, make_nuisance_prior(modal_model, stretches, observations.band_hz[1], options), place
 
 
-def start_at(freedom, place, **changes):
+def start_at(nuisance_prior, place, **changes):
     law = shipped_laws()["cubic_stiffness"]
     return replace(
-        Start(law=law, place=place, strength=K3, shape=0.0, unknowns=np.zeros(freedom.n_unknowns)), **changes
+        Start(law=law, place=place, strength=K3, shape=0.0, unknowns=np.zeros(nuisance_prior.n_unknowns)), **changes
     )
 
 
 def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
-    stretches, freedom, place = cubic
-    shapes = freedom.plant.at_places.shapes.copy()
-    shapes[place, freedom.modes] -= OFF * freedom.places[place] * (freedom.modes == 0)
-    wrong = replace(freedom.plant, at_places=replace(freedom.plant.at_places, shapes=shapes))
-    fit = fit_output_error(stretches, replace(freedom, plant=wrong), start_at(freedom, place), iterations=12)
+    stretches, nuisance_prior, place = cubic
+    shapes = nuisance_prior.modal_model.at_places.shapes.copy()
+    shapes[place, nuisance_prior.modes] -= OFF * nuisance_prior.places[place] * (nuisance_prior.modes == 0)
+    wrong = replace(nuisance_prior.modal_model, at_places=replace(nuisance_prior.modal_model.at_places, shapes=shapes))
+    fit = fit_output_error(
+        stretches, replace(nuisance_prior, modal_model=wrong), start_at(nuisance_prior, place), iterations=12
+    )
     held = fit_output_error(
-        stretches, replace(freedom, plant=wrong, places=1e-9 * freedom.places), start_at(freedom, place), iterations=12
+        stretches,
+        replace(nuisance_prior, modal_model=wrong, places=1e-9 * nuisance_prior.places),
+        start_at(nuisance_prior, place),
+        iterations=12,
     )
     assert fit.cost < 0.5 * held.cost
     std = np.sqrt(fit.covariance[0, 0])
@@ -62,9 +69,9 @@ def test_the_shape_at_the_place_of_a_law_may_be_off(cubic):
 @pytest.mark.parametrize("size", [1e200, np.inf])
 def test_changes_that_run_away_are_taken_for_none(cubic, monkeypatch, size):
     """Of a stiff stop, say: the derivative grows from contact to contact until it has no number any more."""
-    stretches, freedom, place = cubic
+    stretches, nuisance_prior, place = cubic
     follow = shooting.step_tangent
     monkeypatch.setattr(shooting, "step_tangent", lambda *given: size * follow(*given))
-    fit = fit_output_error(stretches, freedom, start_at(freedom, place), iterations=2)
+    fit = fit_output_error(stretches, nuisance_prior, start_at(nuisance_prior, place), iterations=2)
     assert np.isfinite(fit.cost)
     assert np.isfinite(fit.covariance).all()

@@ -25,7 +25,7 @@ def track(chain, strike):
     recordings = FittedSegments(
         training=observations,
         held_out=observations,
-        plant=make_modal_model(chain.model, observations),
+        modal_model=make_modal_model(chain.model, observations),
         noise=read_noise(observations),
         options=DiagnoseOptions(),
     )
@@ -33,7 +33,7 @@ def track(chain, strike):
 
 
 def fit_at(track, node):
-    places = track.linear.freedom.plant.places
+    places = track.linear.nuisance_prior.modal_model.places
     place = next(i for i, p in enumerate(places) if p.location.get("nodes") == [node])
     start = Start(
         law=shipped_laws()["dry_friction"],

@@ -17,13 +17,13 @@ RIGHT = 1.05  # times the cost from where the model is right
 
 def test_a_linear_model_is_fitted_in_more_than_one_step(chain, strike):
     observations = strike()
-    plant = make_modal_model(chain.model, observations)
-    stretches = transform(observations, plant, read_noise(observations), Window(duration_s=4.0, floor=1e-4))
-    away = replace(plant, omega_rad_s=plant.omega_rad_s * np.exp(OFF))
+    modal_model = make_modal_model(chain.model, observations)
+    stretches = transform(observations, modal_model, read_noise(observations), Window(duration_s=4.0, floor=1e-4))
+    away = replace(modal_model, omega_rad_s=modal_model.omega_rad_s * np.exp(OFF))
     options = DiagnoseOptions(frequency_tolerance=0.1)
     right, off = (
         fit_linear(stretches, make_nuisance_prior(one, stretches, observations.band_hz[1], options))
-        for one in (plant, away)
+        for one in (modal_model, away)
     )
     distance = 4 * (OFF / (0.1 / np.sqrt(3))) ** 2  # four modes, in prior standard deviations
     assert off.cost < RIGHT * right.cost + 2 * distance

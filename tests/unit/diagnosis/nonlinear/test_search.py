@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
-from frf_ipz.diagnosis.nonlinear.simulate import simulate, without_law
+from frf_ipz.diagnosis.nonlinear.simulate import simulate, subtract_law
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 CASES = {
@@ -48,7 +48,7 @@ def test_law_place_and_numbers_are_found(solved):
 
 def test_blows_disagree_as_the_law_makes_them(solved):
     found = solved[-1]
-    assert found.beyond_linear > 1e4  # nats
+    assert found.nonlinear_evidence > 1e4  # nats
 
 
 def test_blows_that_were_held_out_are_predicted(solved):
@@ -59,14 +59,14 @@ def test_blows_that_were_held_out_are_predicted(solved):
 
 def test_whole_records_of_all_levels_are_simulated(solved):
     *_, observations, found = solved
-    simulation = simulate(observations, found.freedom, found.fit)
+    simulation = simulate(observations, found.nuisance_prior, found.fit)
     assert simulation.simulated.shape == simulation.measured.shape
     assert (simulation.misfit < 2 * HELD_OUT).all()
 
 
 def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
     *_, observations, found = solved
-    law = found.at_work
+    law = found.law_in_time
     assert (law.record, law.is_held_out, law.response, law.unit) == ("blow 55 N", True, "acceleration", "m/s^2")
     record = next(record for record in observations.records if record.name == law.record)
     row = [sensor.channel for sensor in record.sensors].index(law.channel)
@@ -120,7 +120,7 @@ def test_one_number_that_is_told_is_enough(gap_variance, told):
 
 
 @pytest.mark.parametrize(
-    ("verdict", "beyond_linear", "said"),
+    ("verdict", "nonlinear_evidence", "said"),
     [
         ("explained", 200.0, "law"),
         ("explained", 30.0, "spring"),
@@ -128,9 +128,11 @@ def test_one_number_that_is_told_is_enough(gap_variance, told):
         ("unexplained", 200.0, "spring"),
     ],
 )
-def test_a_linear_cause_that_leaves_nothing_gives_way_to_a_proven_law_only(monkeypatch, verdict, beyond_linear, said):
+def test_a_linear_cause_that_leaves_nothing_gives_way_to_a_proven_law_only(
+    monkeypatch, verdict, nonlinear_evidence, said
+):
     monkeypatch.setattr(whole, "_with_law", lambda *_: "law")
-    found = SimpleNamespace(verdict=verdict, beyond_linear=beyond_linear)
+    found = SimpleNamespace(verdict=verdict, nonlinear_evidence=nonlinear_evidence)
     assert whole._unless_a_law("spring", found) == said
 
 
@@ -152,19 +154,19 @@ def test_a_law_outside_the_catalogue_is_not_explained(chain, strike, law, words)
     found = search_laws(chain.model, strike(law, (0, 0, 1, 0)), DiagnoseOptions())
     assert found.verdict == "unexplained"
     assert words in found.statement
-    assert dict(found.place) == {"nodes": [3]}
+    assert dict(found.location) == {"nodes": [3]}
 
 
 def test_recordings_without_the_law_are_those_of_a_linear_chain(solved):
     *_, observations, found = solved
-    rest = without_law(observations, found.freedom, found.fit)
+    rest = subtract_law(observations, found.nuisance_prior, found.fit)
     assert assess_linearity(rest).score < 0.1 * found.linearity.score
 
 
 def test_a_law_is_taken_out_of_whole_records_from_rest_that_are_loudest_late(solved, random_records):
     *_, observations, found = solved
     records = random_records(observations, 2.0)
-    rest = without_law(records, found.freedom, found.fit)
+    rest = subtract_law(records, found.nuisance_prior, found.fit)
     changed = [
         np.abs(one.responses - was.responses).max() for one, was in zip(rest.records, records.records, strict=True)
     ]
@@ -172,11 +174,11 @@ def test_a_law_is_taken_out_of_whole_records_from_rest_that_are_loudest_late(sol
 
 
 def test_a_law_alone_does_not_strain_the_model(solved):
-    assert solved[-1].strain < 0.1 * STRAINED
+    assert solved[-1].nuisance_chi2 < 0.1 * STRAINED
 
 
 @pytest.mark.parametrize(
-    ("strain", "alone", "again", "doubt", "has_dynamics", "early", "both"),
+    ("nuisance_chi2", "alone", "again", "doubt", "has_dynamics", "early", "both"),
     [
         (50.0, ("explained", 2.0), 2.0, "", False, (False, False), True),
         (50.0, ("explained", 2.0), 20.0, "", True, (False, False), True),
@@ -192,7 +194,7 @@ def test_a_law_alone_does_not_strain_the_model(solved):
     ],
 )
 def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
-    monkeypatch, strain, alone, again, doubt, has_dynamics, early, both
+    monkeypatch, nuisance_chi2, alone, again, doubt, has_dynamics, early, both
 ):
     """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
     seen = SimpleNamespace(records=())
@@ -200,12 +202,12 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,), causes=(cause,))
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
-        "without_law": lambda *_: seen,
+        "subtract_law": lambda *_: seen,
         "fit_nothing": lambda _: SimpleNamespace(log_evidence=0.0),
         "search": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
         "is_significant": lambda *_: True,
         "with_change": lambda *_: "changed model",
-        "restore": lambda *_: "restored",
+        "undo_chain_effects": lambda *_: "restored",
         "weigh": lambda *_: ["spring"],
         "finding_of": lambda cause, *_: cause,
     }
@@ -215,9 +217,15 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
     after = SimpleNamespace(training_noise=left)
     at_rest = SimpleNamespace(moving=())
     laws = SimpleNamespace(
-        strain=strain, verdict=verdict, after=after, fit="fit", freedom=at_rest, is_early=early[0], dispersion_rad=0.0
+        nuisance_chi2=nuisance_chi2,
+        verdict=verdict,
+        after=after,
+        fit="fit",
+        nuisance_prior=at_rest,
+        is_early=early[0],
+        dispersion_rad=0.0,
     )
-    eased = SimpleNamespace(verdict="explained", strain=again, is_early=early[1])
+    eased = SimpleNamespace(verdict="explained", nuisance_chi2=again, is_early=early[1])
     bench = SimpleNamespace(kind="hammer")
     found = law_beside.search_beside_law(lambda _: bench, laws, "model", seen, lambda *_: eased)
     assert found == ((eased, "spring") if both else None)

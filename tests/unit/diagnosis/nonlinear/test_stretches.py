@@ -26,8 +26,8 @@ def test_lines_that_are_left_out_are_not_fitted(chain, strike):
 @pytest.mark.parametrize(("loud_s", "expected"), [(2.0, [False, True]), (0.1, [False])], ids=["late", "early"])
 def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, random_records, loud_s, expected):
     observations = random_records(strike(), loud_s)
-    plant, noise = make_modal_model(chain.model, observations), read_noise(observations)
-    stretches = transform(observations, plant, noise, Window(duration_s=1.0))
+    modal_model, noise = make_modal_model(chain.model, observations), read_noise(observations)
+    stretches = transform(observations, modal_model, noise, Window(duration_s=1.0))
     assert stretches.moving.tolist() == 2 * expected
     for start in stretches.first_sample[stretches.moving] * stretches.step_s:
         assert start < loud_s < start + 0.3  # what lies early in a stretch counts most
@@ -35,17 +35,17 @@ def test_a_record_is_looked_at_where_it_is_loudest(chain, strike, random_records
 
 def test_a_record_is_looked_at_once_where_that_is_enough(chain, strike, random_records):
     observations = random_records(strike(), 2.0)
-    plant, noise = make_modal_model(chain.model, observations), read_noise(observations)
-    assert not transform(observations, plant, noise, Window(duration_s=1.0, loudest=False)).moving.any()
+    modal_model, noise = make_modal_model(chain.model, observations), read_noise(observations)
+    assert not transform(observations, modal_model, noise, Window(duration_s=1.0, loudest=False)).moving.any()
 
 
 def test_noise_of_the_force_is_more_of_a_weak_blow(chain, strike):
     """It is the same in all blows, and the responses follow the force."""
     observations = strike()
-    plant, quiet = make_modal_model(chain.model, observations), read_noise(observations)
+    modal_model, quiet = make_modal_model(chain.model, observations), read_noise(observations)
     loud = replace(quiet, force=replace(quiet.force, white=1e4 * max(quiet.force.white, 1e-12)))
-    added = [transform(observations, plant, noise, Window(duration_s=1.0)).noise for noise in (loud, quiet)]
-    stretches = transform(observations, plant, quiet, Window(duration_s=1.0))
+    added = [transform(observations, modal_model, noise, Window(duration_s=1.0)).noise for noise in (loud, quiet)]
+    stretches = transform(observations, modal_model, quiet, Window(duration_s=1.0))
     part = ((added[0] - added[1]).mean(1) / np.mean(np.abs(stretches.motion) ** 2, 1))[:, stretches.used].mean(1)
     peaks = np.abs(stretches.fine_force).max(1)
     assert np.all(np.diff(part[np.argsort(peaks)]) < 0)
@@ -55,7 +55,7 @@ def test_noise_of_the_force_is_more_of_a_weak_blow(chain, strike):
 def test_a_record_is_not_looked_at_where_its_motion_has_died_away(chain, strike, random_records):
     """A shaker that was running before the record, and stops half-way."""
     observations, begin, stop_s = random_records(strike(), 0.5), 120, 1.7
-    plant, noise = make_modal_model(chain.model, observations), read_noise(observations)
+    modal_model, noise = make_modal_model(chain.model, observations), read_noise(observations)
     runs = record_times(observations.records[0])[begin:] < begin * observations.records[0].step_s + stop_s
     cut = tuple(
         replace(
@@ -63,16 +63,16 @@ def test_a_record_is_not_looked_at_where_its_motion_has_died_away(chain, strike,
         )
         for record in observations.records
     )
-    stretches = transform(replace(observations, records=cut), plant, noise, Window(duration_s=1.0))
+    stretches = transform(replace(observations, records=cut), modal_model, noise, Window(duration_s=1.0))
     assert stretches.moving.all()
     assert np.max(stretches.first_sample * stretches.step_s) < stop_s
 
 
 def test_a_record_without_any_motion_is_looked_at_all_the_same(chain, strike, random_records):
     observations = random_records(strike(), 0.5)
-    plant, noise = make_modal_model(chain.model, observations), read_noise(observations)
+    modal_model, noise = make_modal_model(chain.model, observations), read_noise(observations)
     dead = tuple(replace(record, responses=np.zeros_like(record.responses)) for record in observations.records)
-    stretches = transform(replace(observations, records=dead), plant, noise, Window(duration_s=1.0))
+    stretches = transform(replace(observations, records=dead), modal_model, noise, Window(duration_s=1.0))
     assert stretches.n_records >= len(dead)
 
 
@@ -92,13 +92,15 @@ def test_blows_before_the_structure_rests_start_in_motion(chain, strike, pause_s
         for record in others
     ]  # fmt: skip
     struck_on = replace(observations, records=(first, *longer))
-    plant, noise = make_modal_model(chain.model, struck_on), read_noise(struck_on)
-    stretches = transform(struck_on, plant, noise, Window(duration_s=1.0))
+    modal_model, noise = make_modal_model(chain.model, struck_on), read_noise(struck_on)
+    stretches = transform(struck_on, modal_model, noise, Window(duration_s=1.0))
     assert stretches.moving.tolist() == [False, *[moves] * len(others)]
     assert np.all((stretches.pause_s > 0) == stretches.moving)
-    freedom = make_nuisance_prior(plant, stretches, struck_on.band_hz[1], DiagnoseOptions())
+    nuisance_prior = make_nuisance_prior(modal_model, stretches, struck_on.band_hz[1], DiagnoseOptions())
     if moves:
-        unknown = make_nuisance_prior(plant, replace(stretches, pause_s=0 * stretches.pause_s), 75.0, DiagnoseOptions())
-        fastest, slowest = (freedom.starts / unknown.starts)[:, [-1, 0]].max(0)
+        unknown = make_nuisance_prior(
+            modal_model, replace(stretches, pause_s=0 * stretches.pause_s), 75.0, DiagnoseOptions()
+        )
+        fastest, slowest = (nuisance_prior.starts / unknown.starts)[:, [-1, 0]].max(0)
         assert fastest < 0.2 * slowest
         assert slowest < 1.0

@@ -162,10 +162,10 @@ def test_neighbours_move_alike_or_the_other_way_round():
 
 @pytest.mark.parametrize(("left", "linear", "said"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 260.0, True)])
 def test_the_place_of_an_unknown_law_is_said_where_a_force_there_explains_nearly_all(left, linear, said):
-    plant = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
+    modal_model = SimpleNamespace(places=[SimpleNamespace(words="node 1", location={"nodes": [1]})])
     found = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
-    again = search._with_place(found, plant, a_force(0, 100 * left, missed=linear), search.MOSTLY)
-    assert bool(again.place) == said
+    again = search._with_place(found, modal_model, a_force(0, 100 * left, missed=linear), search.MOSTLY)
+    assert bool(again.location) == said
 
 
 def test_places_that_explain_alike_are_said_with_the_place_of_an_unknown_law():
@@ -173,9 +173,11 @@ def test_places_that_explain_alike_are_said_with_the_place_of_an_unknown_law():
     costs = {4: 22.5, 5: 20.0, 6: 21.0, 7: 23.5}
     found = anywhere._with_alike([a_force(place, cost) for place, cost in costs.items()])
     assert found.alike == (5, 6, 4)
-    plant = SimpleNamespace(places=[SimpleNamespace(words=f"node {i}", location={"nodes": [i]}) for i in range(9)])
-    said = search._with_place(search.LawSearch(verdict=search.UNEXPLAINED, linearity=None), plant, found, 0.5)
-    assert said.place == {"nodes": [5]}
+    modal_model = SimpleNamespace(
+        places=[SimpleNamespace(words=f"node {i}", location={"nodes": [i]}) for i in range(9)]
+    )
+    said = search._with_place(search.LawSearch(verdict=search.UNEXPLAINED, linearity=None), modal_model, found, 0.5)
+    assert said.location == {"nodes": [5]}
     assert said.statement.endswith("no closer than nodes 4 to 6.")
     far = anywhere._with_alike([a_force(place, 100 * cost) for place, cost in costs.items()])
     assert far.alike == (5,)
@@ -221,12 +223,14 @@ def test_several_places_are_climbed_from(monkeypatch):
 def test_a_law_is_scaled_by_how_much_a_place_that_moves_alike_moves(monkeypatch, there, strength):
     """A cubic spring of 2 at a place of shapes (1, 0); the other moves a third as much, whatever its shapes say."""
     points = SimpleNamespace(shapes=np.array([(1.0, 0.0), there]))
-    freedom = SimpleNamespace(plant=SimpleNamespace(at_places=points), of_no_place=lambda unknowns: unknowns)
+    nuisance_prior = SimpleNamespace(
+        modal_model=SimpleNamespace(at_places=points), of_no_place=lambda unknowns: unknowns
+    )
     nothing = dict.fromkeys(("unknowns", "covariance", "motion", "velocity", "force", "misfit"), np.zeros(0))
     law = SimpleNamespace(degree=3)
     fit = candidates.LawFit(law=law, place=0, strength=2.0, shape=6.0, cost=1.0, n_rows=1, **nothing)
     monkeypatch.setattr(candidates, "_size", lambda _, one: (3.0, 1.0)[one.place])
-    moved = candidates._moved(SimpleNamespace(linear=SimpleNamespace(freedom=freedom)), fit, 1)
+    moved = candidates._moved(SimpleNamespace(linear=SimpleNamespace(nuisance_prior=nuisance_prior)), fit, 1)
     assert moved.place == 1
     assert (moved.strength, moved.shape) == pytest.approx((strength, 6.0 if strength == 2 else 2.0))
 
@@ -328,7 +332,7 @@ def a_first_track(left: float, *, afresh: float, is_moving: bool = False) -> Sim
 
     return SimpleNamespace(
         stretches=SimpleNamespace(moving=SimpleNamespace(any=lambda: is_moving)),
-        linear=SimpleNamespace(cost=1e4, freedom=None),
+        linear=SimpleNamespace(cost=1e4, nuisance_prior=None),
         fit_output_error=lambda *_: shoot(left),
         fit_output_error_afresh=lambda *_: shoot(afresh),
     )

@@ -77,21 +77,21 @@ class LawFitProgress:
 
     def beside(self, place: int) -> list[int]:
         """Possible places among the few that move most like a place."""
-        near = neighbours(self.linear.freedom.plant, place, NEIGHBOURS)
+        near = neighbours(self.linear.nuisance_prior.modal_model, place, NEIGHBOURS)
         return [other for other in near if other in self.where.possible]
 
     def fit_output_error(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other stretches."""
-        known = self.linear.freedom.n_lasting
+        known = self.linear.nuisance_prior.n_lasting
         unknowns = fit.unknowns
         if len(unknowns) != len(self.linear.unknowns) or fit.n_rows != self.linear.n_rows:
             unknowns = np.concatenate([fit.unknowns[:known], self.linear.unknowns[known:]])
-        return fit_output_error(self.stretches, self.linear.freedom, fit.start(unknowns), iterations=iterations)
+        return fit_output_error(self.stretches, self.linear.nuisance_prior, fit.start(unknowns), iterations=iterations)
 
     def fit_output_error_afresh(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation from its numbers, with the linear model as it starts without a law."""
         start = fit.start(self.linear.as_stated)
-        return fit_output_error(self.stretches, self.linear.freedom, start, iterations=iterations)
+        return fit_output_error(self.stretches, self.linear.nuisance_prior, start, iterations=iterations)
 
 
 def find_candidates(
@@ -213,20 +213,22 @@ def _refined(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     fits = []
     for guess in chosen:
         start = Start(law=guess.law, place=guess.place, strength=guess.strength, shape=guess.shape, unknowns=unknowns)
-        fit = refine(track.stretches, track.linear.freedom, start, n_turns=TURNS, known=False)
+        fit = refine(track.stretches, track.linear.nuisance_prior, start, n_turns=TURNS, known=False)
         fits.append(fit if fit.strength else replace(fit, strength=guess.strength, shape=guess.shape))
     return sorted(fits, key=lambda fit: fit.cost)
 
 
 def _read(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     """Fit the laws from numbers that are read from the force."""
-    return [refine(track.stretches, track.linear.freedom, start, n_turns=TURNS) for start in _starts(track, laws)]
+    return [
+        refine(track.stretches, track.linear.nuisance_prior, start, n_turns=TURNS) for start in _starts(track, laws)
+    ]
 
 
 def _as_read(track: LawFitProgress, laws: Sequence[Law]) -> list[LawFit]:
     """Simulate the laws with the numbers read, which refining may have led astray."""
     return [
-        fit_output_error(track.stretches, track.linear.freedom, start, iterations=FIRST)
+        fit_output_error(track.stretches, track.linear.nuisance_prior, start, iterations=FIRST)
         for start in _starts(track, laws)
     ]
 
@@ -298,9 +300,9 @@ def _climb(track: LawFitProgress, fits: list[LawFit]) -> None:
 
 def _moved(track: LawFitProgress, fit: LawFit, place: int) -> LawFit:
     """Bring a law to another place, where it moves as much and does as much work as at its own."""
-    freedom = track.linear.freedom
-    here, there = freedom.plant.at_places.shapes[[fit.place, place]]
-    moved = replace(fit, place=place, unknowns=freedom.of_no_place(fit.unknowns))
+    nuisance_prior = track.linear.nuisance_prior
+    here, there = nuisance_prior.modal_model.at_places.shapes[[fit.place, place]]
+    moved = replace(fit, place=place, unknowns=nuisance_prior.of_no_place(fit.unknowns))
     if abs(float(here @ there)) < LEAST_RATIO * max(float(np.linalg.norm(here)), 1e-300) ** 2:
         return moved
     ratio = _size(track, moved) / max(_size(track, fit), 1e-300)
@@ -309,7 +311,7 @@ def _moved(track: LawFitProgress, fit: LawFit, place: int) -> LawFit:
 
 def _size(track: LawFitProgress, fit: LawFit) -> float:
     """How much the place of a law moves in all stretches, with the linear model of its fit but without its force."""
-    stretches, freedom = track.stretches, track.linear.freedom
-    response = respond(freedom.plant, stretches.s, freedom.deviations(fit.unknowns, fit.place))
-    _, motion = linear_motion_of_place(stretches, freedom, fit.unknowns, response, fit.place)
+    stretches, nuisance_prior = track.stretches, track.linear.nuisance_prior
+    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(fit.unknowns, fit.place))
+    _, motion = linear_motion_of_place(stretches, nuisance_prior, fit.unknowns, response, fit.place)
     return float(np.linalg.norm(motion))

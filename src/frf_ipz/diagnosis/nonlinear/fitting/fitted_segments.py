@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import anywhere, whereabouts
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import fit_linear
 from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import make_nuisance_prior
-from frf_ipz.diagnosis.nonlinear.recorded.dispersion import without_dispersion
 from frf_ipz.diagnosis.nonlinear.recorded.segments import Window, starts_at_rest, transform
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class FittedSegments:
     ----------
     training, held_out : Observations
         What is fitted, and what is not shown.
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     noise : ChannelNoise
         Of all recordings.
@@ -60,7 +60,7 @@ class FittedSegments:
 
     training: Observations
     held_out: Observations
-    plant: ModalModel
+    modal_model: ModalModel
     noise: ChannelNoise
     options: DiagnoseOptions
     dispersion_rad: float = 0.0
@@ -68,16 +68,18 @@ class FittedSegments:
     def without(self, dispersion_rad: float) -> FittedSegments:
         """Take back a dispersion of the converters, rad."""
         training, held_out = (
-            without_dispersion(part, dispersion_rad - self.dispersion_rad) for part in (self.training, self.held_out)
+            remove_dispersion(part, dispersion_rad - self.dispersion_rad) for part in (self.training, self.held_out)
         )
         return replace(self, training=training, held_out=held_out, dispersion_rad=dispersion_rad)
 
     def track(self, duration_s: float, floor: float, *, loudest: bool) -> LawFitProgress:
         """Cut stretches, with room for a force anywhere."""
         window = Window(duration_s=duration_s, floor=floor, loudest=loudest)
-        stretches = transform(self.training, self.plant, self.noise, window)
-        freedom = make_nuisance_prior(self.plant, stretches, self.training.band_hz[1], self.options)
-        return LawFitProgress(stretches=stretches, linear=fit_linear(stretches, freedom), where=anywhere(self.plant))
+        stretches = transform(self.training, self.modal_model, self.noise, window)
+        nuisance_prior = make_nuisance_prior(self.modal_model, stretches, self.training.band_hz[1], self.options)
+        return LawFitProgress(
+            stretches=stretches, linear=fit_linear(stretches, nuisance_prior), where=anywhere(self.modal_model)
+        )
 
     def tracks(self) -> tuple[LawFitProgress, LawFitProgress]:
         """Cut short and long stretches, and look where a force may sit."""
@@ -90,7 +92,7 @@ class FittedSegments:
         if not self.held_out.records:
             return None
         window = Window(duration_s=long.stretches.duration_s, floor=FINE)
-        return transform(self.held_out, self.plant, self.noise, window)
+        return transform(self.held_out, self.modal_model, self.noise, window)
 
     def best_dispersion(self, long: LawFitProgress, fit: LawFit) -> float:
         """Say with which dispersion of the converters a law explains best, rad; 0 where none does better.
@@ -117,8 +119,8 @@ class FittedSegments:
         return max(_lowest(near, [self._cost_without(dispersion, long, fit) for dispersion in near]), 0.0)
 
     def _cost_without(self, dispersion_rad: float, long: LawFitProgress, fit: LawFit) -> float:
-        again = transform(self.without(dispersion_rad).training, self.plant, self.noise, long.stretches.window)
-        return fit_output_error(again, long.linear.freedom, fit.start(), iterations=STEPS).cost
+        again = transform(self.without(dispersion_rad).training, self.modal_model, self.noise, long.stretches.window)
+        return fit_output_error(again, long.linear.nuisance_prior, fit.start(), iterations=STEPS).cost
 
     def _tracks(self) -> tuple[LawFitProgress, LawFitProgress]:
         """Both are longer where a linear model leaves little."""

@@ -72,9 +72,9 @@ class Whereabouts:
     forces: tuple[FreeForce, ...] = ()
 
 
-def anywhere(plant: ModalModel) -> Whereabouts:
+def anywhere(modal_model: ModalModel) -> Whereabouts:
     """Leave all places of a structure possible."""
-    every = tuple(range(len(plant.places)))
+    every = tuple(range(len(modal_model.places)))
     return Whereabouts(possible=every, equal=every)
 
 
@@ -100,7 +100,7 @@ def free_force(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: F
     best = _across(stretches, linear, place, linear.as_stated if unknowns is None else unknowns)
     used, damping = stretches.used, 0.0
     for _ in range(TURNS):
-        columns = linear.freedom.columns(stretches, best.response.on(used), best.along, place)
+        columns = linear.nuisance_prior.columns(stretches, best.response.on(used), best.along, place)
         rows = as_real(columns - best.reach * _along(best.reach, columns)[..., None, :])
         normal, slope = rows @ rows.T + np.eye(len(rows)), rows @ best.left - best.unknowns
         for _ in range(TRIALS):
@@ -131,7 +131,7 @@ def whereabouts(stretches: SegmentSet, linear: LinearFit) -> Whereabouts:
     Whereabouts
         Anywhere, where one sensor alone can tell no place from another.
     """
-    every = anywhere(linear.freedom.plant)
+    every = anywhere(linear.nuisance_prior.modal_model)
     if np.isfinite(stretches.variance).any(2).sum(1).min() < LEAST_SENSORS:
         return every
     found = {place: free_force(stretches, linear, place) for place in every.possible}
@@ -145,13 +145,13 @@ def whereabouts(stretches: SegmentSet, linear: LinearFit) -> Whereabouts:
 
 def _spread(stretches: SegmentSet, linear: LinearFit, found: dict[int, FreeForce]) -> None:
     """Fit places beside possible ones from what explains there: by themselves some end where little is explained."""
-    plant, waiting = linear.freedom.plant, sorted(found, key=lambda place: found[place].cost)
+    modal_model, waiting = linear.nuisance_prior.modal_model, sorted(found, key=lambda place: found[place].cost)
     while waiting:
         here = found[waiting.pop(0)]
         if not _is_possible(here, min(one.cost for one in found.values())):
             continue
-        start = linear.freedom.of_no_place(here.unknowns)
-        for place in neighbours(plant, here.place, BESIDE):
+        start = linear.nuisance_prior.of_no_place(here.unknowns)
+        for place in neighbours(modal_model, here.place, BESIDE):
             if found[place].cost < here.cost + TIE:
                 continue
             again = free_force(stretches, linear, place, start)
@@ -164,12 +164,12 @@ def _is_possible(free: FreeForce, least: float) -> bool:
     return free.cost < least + POSSIBLE + PART * least
 
 
-def neighbours(plant: ModalModel, place: int, count: int) -> list[int]:
+def neighbours(modal_model: ModalModel, place: int, count: int) -> list[int]:
     """List the places whose mode shapes are most like those of a place, or most like their opposite.
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     place : int
         Index in `ModalModel.places`.
@@ -181,7 +181,7 @@ def neighbours(plant: ModalModel, place: int, count: int) -> list[int]:
     list of int
         The most alike first.
     """
-    shapes = plant.at_places.shapes
+    shapes = modal_model.at_places.shapes
     alike = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
     nearest = np.argsort(-np.abs(alike @ alike[place]), kind="stable")
     return [int(i) for i in nearest if i != place][:count]
@@ -210,7 +210,7 @@ def start_at(stretches: SegmentSet, linear: LinearFit, free: FreeForce, law: Law
     nothing = Start(law=law, place=free.place, strength=0.0, shape=0.0, unknowns=free.unknowns)
     force = np.zeros((stretches.n_records, len(stretches.s)), complex)
     force[:, used] = free.force
-    response, w, v = motion_at(stretches, linear.freedom, nothing, clock, force)
+    response, w, v = motion_at(stretches, linear.nuisance_prior, nothing, clock, force)
     reach = np.abs(response.to_sensors(free.place)[:, used]) ** 2
     weight = np.sum(reach / stretches.variance[:, :, used], 1)
     best, most = nothing, 0.0
@@ -255,11 +255,11 @@ class _Across:
 
 
 def _across(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: FloatArray) -> _Across:
-    freedom, used = linear.freedom, stretches.used
+    nuisance_prior, used = linear.nuisance_prior, stretches.used
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns, place))
-    shown = linear_motion(stretches, freedom, response)
-    shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(unknowns, place))
+    shown = linear_motion(stretches, nuisance_prior, response)
+    shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(unknowns, response)
     misfit = (stretches.motion - shown)[:, :, used] * weight
     reach = response.to_sensors(place)[:, used] * weight
     along = _along(reach, misfit)

@@ -55,14 +55,16 @@ class _Shot:
         return cost if np.isfinite(cost) else np.inf
 
 
-def fit_output_error(stretches: SegmentSet, freedom: NuisancePrior, start: Start, *, iterations: int = 6) -> LawFit:
+def fit_output_error(
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, *, iterations: int = 6
+) -> LawFit:
     """Fit a law at a place.
 
     Parameters
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     start : Start
         Law, place, and first values; the strength is not zero.
@@ -74,14 +76,14 @@ def fit_output_error(stretches: SegmentSet, freedom: NuisancePrior, start: Start
     LawFit
         The best simulation.
     """
-    shot, damping = _fire(stretches, freedom, start), FIRST_DAMPING
+    shot, damping = _fire(stretches, nuisance_prior, start), FIRST_DAMPING
     while not np.isfinite(shot.cost):  # a softening spring that is too strong runs away
-        shot = _fire(stretches, freedom, replace(shot.start, strength=TAMER * shot.start.strength))
-    rows, settled = _slopes(stretches, freedom, shot), False
+        shot = _fire(stretches, nuisance_prior, replace(shot.start, strength=TAMER * shot.start.strength))
+    rows, settled = _slopes(stretches, nuisance_prior, shot), False
     for _ in range(iterations):
         before = shot.cost
         while damping < MOST_DAMPING:
-            trial = _fire(stretches, freedom, _step(shot, rows, damping))
+            trial = _fire(stretches, nuisance_prior, _step(shot, rows, damping))
             if trial.cost < shot.cost:
                 break
             damping *= SLOWER
@@ -89,21 +91,21 @@ def fit_output_error(stretches: SegmentSet, freedom: NuisancePrior, start: Start
             settled = True
             break
         shot, damping = trial, damping * FASTER
-        rows = _slopes(stretches, freedom, shot)
+        rows = _slopes(stretches, nuisance_prior, shot)
         settled = bool(shot.cost > (1 - SETTLED) * before)
         if settled:
             break
     return _finish(shot, rows, settled=settled)
 
 
-def gain_of_further(stretches: SegmentSet, freedom: NuisancePrior, start: Start, kinds: Kinds) -> float:
+def gain_of_further(stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, kinds: Kinds) -> float:
     """Say how far forces of other kinds at a law's place, free in all their strengths, would lower the cost.
 
     Parameters
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     start : Start
         The law as it was fitted.
@@ -115,9 +117,9 @@ def gain_of_further(stretches: SegmentSet, freedom: NuisancePrior, start: Start,
     float
         Drop of the weighted sum of squares, as far as small strengths tell.
     """
-    shot = _fire(stretches, freedom, start)
+    shot = _fire(stretches, nuisance_prior, start)
     forces = kinds(shot.done.motion, shot.done.velocity)
-    rows = _slopes(stretches, freedom, shot, forces)
+    rows = _slopes(stretches, nuisance_prior, shot, forces)
     n_plain = len(rows) - len(forces)
     sizes = np.linalg.norm(rows[n_plain:], axis=1)
     rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
@@ -126,16 +128,16 @@ def gain_of_further(stretches: SegmentSet, freedom: NuisancePrior, start: Start,
     return float(drops[1] - drops[0])
 
 
-def _fire(stretches: SegmentSet, freedom: NuisancePrior, start: Start) -> _Shot:
-    place = PlaceInTime(stretches=stretches, freedom=freedom, unknowns=start.unknowns, place=start.place)
+def _fire(stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start) -> _Shot:
+    place = PlaceInTime(stretches=stretches, nuisance_prior=nuisance_prior, unknowns=start.unknowns, place=start.place)
     yielding = place.yielding(constant=start.law.holds)
-    response = respond(freedom.plant, stretches.s, freedom.deviations(start.unknowns, start.place))
+    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(start.unknowns, start.place))
     used = stretches.used
     with np.errstate(all="ignore"):  # a step too far may run away: its cost is infinite
         done = step_in_time(start.law, (start.strength, start.shape), yielding, *place.without_law())
         force = _lines(stretches, done.force, holds=start.law.holds)
-        shown = linear_motion(stretches, freedom, response) - response.to_sensors(start.place) * force[:, None]
-        shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+        shown = linear_motion(stretches, nuisance_prior, response) - response.to_sensors(start.place) * force[:, None]
+        shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(start.unknowns, response)
         misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
     return _Shot(start=start, response=response, place=place, yielding=yielding, done=done, force=force, misfit=misfit)
 
@@ -149,9 +151,11 @@ def _lines(stretches: SegmentSet, force: FloatArray, *, holds: bool) -> ComplexA
     return lines * (np.expm1(AHEAD * way) - np.expm1((AHEAD - 1) * way)) / way if holds else lines
 
 
-def _slopes(stretches: SegmentSet, freedom: NuisancePrior, shot: _Shot, added: FloatArray | None = None) -> FloatArray:
+def _slopes(
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, shot: _Shot, added: FloatArray | None = None
+) -> FloatArray:
     """Derive the weighted responses by unknowns, strength and shape (times their size), and further forces."""
-    start, used, n_free = shot.start, stretches.used, len(freedom.modes)
+    start, used, n_free = shot.start, stretches.used, len(nuisance_prior.modes)
     changes = shot.place.changes(shot.done.force)
     with np.errstate(all="ignore"):  # changes that run away are taken for none below
         by_force = step_tangent(start.law, shot.yielding, shot.done, changes, added)
@@ -161,17 +165,17 @@ def _slopes(stretches: SegmentSet, freedom: NuisancePrior, shot: _Shot, added: F
     with np.errstate(all="ignore"):
         seen = -to_sensors * lines[:, :, None] * weight
     on_used = shot.response.on(used)
-    rows = freedom.columns(stretches, on_used, -shot.force[:, used], start.place, start.unknowns)
+    rows = nuisance_prior.columns(stretches, on_used, -shot.force[:, used], start.place, start.unknowns)
     rows[: 2 * n_free] += seen[: 2 * n_free]
-    first = 2 * n_free + freedom.sensors.size
-    for number in range(len(freedom.inputs)):
+    first = 2 * n_free + nuisance_prior.sensors.size
+    for number in range(len(nuisance_prior.inputs)):
         mine = stretches.input_of == number
         rows[first + number * n_free : first + (number + 1) * n_free, mine] += seen[2 * n_free : 3 * n_free, mine]
-    first += freedom.inputs.size
+    first += nuisance_prior.inputs.size
     rows[first : first + n_free] += seen[3 * n_free : 4 * n_free]
     first += n_free
-    for which in range(2 if len(freedom.moving) else 0):
-        for record in freedom.moving:
+    for which in range(2 if len(nuisance_prior.moving) else 0):
+        for record in nuisance_prior.moving:
             rows[first : first + n_free, record] += seen[(4 + which) * n_free : (5 + which) * n_free, record]
             first += n_free
     found = np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)

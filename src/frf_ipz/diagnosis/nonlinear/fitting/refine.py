@@ -115,7 +115,7 @@ class Start:
 
 
 def refine(
-    stretches: SegmentSet, freedom: NuisancePrior, start: Start, *, n_turns: int = 4, known: bool = True
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, *, n_turns: int = 4, known: bool = True
 ) -> LawFit:
     """Fit a law at a place.
 
@@ -123,7 +123,7 @@ def refine(
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     start : Start
         Law, place, and first values.
@@ -140,9 +140,9 @@ def refine(
     clock = Clock(stretches)
     best, force = None, None
     if known:
-        force = _first_force(stretches, freedom, start, clock)
+        force = _first_force(stretches, nuisance_prior, start, clock)
     for _ in range(n_turns):
-        fit, start, force = _turn(stretches, freedom, start, clock, force)
+        fit, start, force = _turn(stretches, nuisance_prior, start, clock, force)
         if best is not None and fit.cost > (1 - SETTLED) * best.cost:
             return best if best.cost <= fit.cost else fit
         best = fit
@@ -151,14 +151,14 @@ def refine(
     return best
 
 
-def _first_force(stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock) -> ComplexArray:
+def _first_force(stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, clock: Clock) -> ComplexArray:
     """Force of the law in the motion that follows without knowing it."""
-    _, w, v = motion_at(stretches, freedom, start, clock, None)
+    _, w, v = motion_at(stretches, nuisance_prior, start, clock, None)
     return clock.at_lines(start.strength * start.law.unit_force(w, v, start.shape))
 
 
 def motion_at(
-    stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[ModalResponse, FloatArray, FloatArray]:
     """Estimate how the place of a law moves.
 
@@ -166,7 +166,7 @@ def motion_at(
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     start : Start
         The place, and the values of the unknowns.
@@ -182,24 +182,24 @@ def motion_at(
     w, v : (n_blows, n_times) array
         Motion and velocity, m and m/s.
     """
-    plant = freedom.plant
-    response = respond(plant, stretches.s, freedom.deviations(start.unknowns, start.place))
-    beyond = stretches.motion - linear_motion(stretches, freedom, response)
-    beyond[freedom.moving] -= freedom.sensor_starts(start.unknowns, response)
-    own, linear = linear_motion_of_place(stretches, freedom, start.unknowns, response, start.place)
+    modal_model = nuisance_prior.modal_model
+    response = respond(modal_model, stretches.s, nuisance_prior.deviations(start.unknowns, start.place))
+    beyond = stretches.motion - linear_motion(stretches, nuisance_prior, response)
+    beyond[nuisance_prior.moving] -= nuisance_prior.sensor_starts(start.unknowns, response)
+    own, linear = linear_motion_of_place(stretches, nuisance_prior, start.unknowns, response, start.place)
     ratio = response.to_sensors(start.place) / own
     w = clock.at_times(place_motion(stretches, beyond, linear, ratio, None if force is None else -own * force))
     return response, w, clock.velocity(w)
 
 
 def _turn(
-    stretches: SegmentSet, freedom: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, clock: Clock, force: ComplexArray | None
 ) -> tuple[LawFit, Start, ComplexArray]:
     law = start.law
-    response, w, v = motion_at(stretches, freedom, start, clock, force)
-    rows, misfit = _rows(stretches, freedom, start, response, _unit_forces(start, clock, w, v))
+    response, w, v = motion_at(stretches, nuisance_prior, start, clock, force)
+    rows, misfit = _rows(stretches, nuisance_prior, start, response, _unit_forces(start, clock, w, v))
     step, covariance = step_to(rows, misfit, start.unknowns, RIDGE)
-    n = freedom.n_unknowns
+    n = nuisance_prior.n_unknowns
     strength = float(step[n]) if law.strength_can_be_negative else max(float(step[n]), 0.0)
     shape = start.shape
     if law.shape_name:
@@ -235,16 +235,23 @@ def _unit_forces(start: Start, clock: Clock, w: FloatArray, v: FloatArray) -> li
 
 
 def _rows(
-    stretches: SegmentSet, freedom: NuisancePrior, start: Start, response: ModalResponse, forces: list[ComplexArray]
+    stretches: SegmentSet,
+    nuisance_prior: NuisancePrior,
+    start: Start,
+    response: ModalResponse,
+    forces: list[ComplexArray],
 ) -> tuple[FloatArray, FloatArray]:
     """Give derivatives by unknowns, strength and shape, and the misfit without the law; weighted, (.., n_rows)."""
     used = stretches.used
     on_used = response.on(used)
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
     to_sensors = response.to_sensors(start.place)[:, used]
-    linear = linear_motion(stretches, freedom, response)
-    linear[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+    linear = linear_motion(stretches, nuisance_prior, response)
+    linear[nuisance_prior.moving] += nuisance_prior.sensor_starts(start.unknowns, response)
     misfit = as_real((stretches.motion - linear)[:, :, used] * weight)
     by_law = [as_real(-to_sensors * force[:, None, used] * weight)[None] for force in forces]
-    rows = [as_real(freedom.columns(stretches, on_used, -start.strength * forces[0][:, used], start.place)), *by_law]
+    rows = [
+        as_real(nuisance_prior.columns(stretches, on_used, -start.strength * forces[0][:, used], start.place)),
+        *by_law,
+    ]
     return np.concatenate(rows), misfit

@@ -58,11 +58,11 @@ def tell_apart(track: LawFitProgress, fits: Sequence[LawFit]) -> tuple[list[LawF
 
 def _reweighted(track: LawFitProgress, fit: LawFit) -> LawFit:
     """Fit with the variance that is left, and see what then is left of the data as they are."""
-    stretches, freedom = track.stretches, track.linear.freedom
+    stretches, nuisance_prior = track.stretches, track.linear.nuisance_prior
     for _ in range(ROUNDS):
         own = replace(stretches, variance=stretches.variance * _along_lines(stretches, _left(stretches, fit)))
-        again = fit_output_error(own, freedom, fit.start(), iterations=STEPS)
-        fit = fit_output_error(stretches, freedom, again.start(), iterations=0)
+        again = fit_output_error(own, nuisance_prior, fit.start(), iterations=STEPS)
+        fit = fit_output_error(stretches, nuisance_prior, again.start(), iterations=0)
     return fit
 
 

@@ -71,7 +71,7 @@ class LinearFit:
         Lower Cholesky factor of columns columns^T + 1.
     cost : float
         Of the best linear model, its prior included.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         The unknowns.
     unknowns : (n_unknowns,) array
         Of the best linear model.
@@ -83,7 +83,7 @@ class LinearFit:
     columns: FloatArray
     factor: FloatArray
     cost: float
-    freedom: NuisancePrior
+    nuisance_prior: NuisancePrior
     unknowns: FloatArray
 
     @property
@@ -94,17 +94,17 @@ class LinearFit:
     @property
     def as_stated(self) -> FloatArray:
         """(n_unknowns,) unknowns of the model as it is stated, and how stretches start in the best linear one."""
-        return self.freedom.as_stated(self.unknowns)
+        return self.nuisance_prior.as_stated(self.unknowns)
 
 
-def fit_linear(stretches: SegmentSet, freedom: NuisancePrior) -> LinearFit:
+def fit_linear(stretches: SegmentSet, nuisance_prior: NuisancePrior) -> LinearFit:
     """Fit the linear model alone.
 
     Parameters
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Its unknowns.
 
     Returns
@@ -112,44 +112,44 @@ def fit_linear(stretches: SegmentSet, freedom: NuisancePrior) -> LinearFit:
     LinearFit
         One step from the nominal model; its cost is what further steps come down to.
     """
-    plant, used = freedom.plant, stretches.used
-    response = respond(plant, stretches.s, nominal_values(plant))
-    beyond = stretches.motion - linear_motion(stretches, freedom, response)
-    on_used = respond(plant, stretches.s[used], nominal_values(plant))
+    modal_model, used = nuisance_prior.modal_model, stretches.used
+    response = respond(modal_model, stretches.s, nominal_values(modal_model))
+    beyond = stretches.motion - linear_motion(stretches, nuisance_prior, response)
+    on_used = respond(modal_model, stretches.s[used], nominal_values(modal_model))
     nothing = np.zeros((stretches.n_records, len(used)), complex)
-    columns = as_real(freedom.columns(stretches, on_used, nothing, None))
+    columns = as_real(nuisance_prior.columns(stretches, on_used, nothing, None))
     misfit = as_real(beyond[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
     factor = cholesky_with_prior(columns)
     seen = linalg.solve_triangular(factor, columns @ misfit, lower=True)
     unknowns = linalg.solve_triangular(factor.T, seen, lower=False)
-    beyond[freedom.moving] -= freedom.sensor_starts(unknowns, response)
+    beyond[nuisance_prior.moving] -= nuisance_prior.sensor_starts(unknowns, response)
     cost = float(misfit @ misfit - seen @ seen)
     return LinearFit(
         response=response,
-        freedom=freedom,
+        nuisance_prior=nuisance_prior,
         unknowns=unknowns,
         beyond=beyond,
         misfit=misfit,
         columns=columns,
         factor=factor,
-        cost=min(cost, _settled_cost(stretches, freedom, unknowns)),
+        cost=min(cost, _settled_cost(stretches, nuisance_prior, unknowns)),
     )
 
 
-def _settled_cost(stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray) -> float:
+def _settled_cost(stretches: SegmentSet, nuisance_prior: NuisancePrior, unknowns: FloatArray) -> float:
     """Cost of the linear model after a few steps: a law must gain more than the first one has left."""
     used, best = stretches.used, np.inf
     nothing = np.zeros((stretches.n_records, len(used)), complex)
     for _ in range(STEPS):
-        response = respond(freedom.plant, stretches.s, freedom.deviations(unknowns))
-        shown = linear_motion(stretches, freedom, response)
-        shown[freedom.moving] += freedom.sensor_starts(unknowns, response)
+        response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(unknowns))
+        shown = linear_motion(stretches, nuisance_prior, response)
+        shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(unknowns, response)
         misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
         cost = float(misfit @ misfit + unknowns @ unknowns)
         if cost > (1 - SETTLED) * best:
             return min(best, cost)
         best = cost
-        columns = as_real(freedom.columns(stretches, response.on(used), nothing, None, unknowns))
+        columns = as_real(nuisance_prior.columns(stretches, response.on(used), nothing, None, unknowns))
         normal = columns @ columns.T + np.eye(len(columns))
         unknowns = unknowns + solve_even(normal, columns @ misfit - unknowns)
     return best
@@ -176,11 +176,11 @@ def score_laws(
     list of Guess
         For each law and place the best shape, the smallest cost first; those that lower the cost only.
     """
-    plant = fit.response.plant
+    modal_model = fit.response.modal_model
     clock = Clock(stretches)
     contracted = _Contracted(stretches, fit)
-    linear_size = np.array([_of_place(fit, stretches, place)[1].std() for place in range(len(plant.places))])
-    chosen = range(len(plant.places)) if places is None else places
+    linear_size = np.array([_of_place(fit, stretches, place)[1].std() for place in range(len(modal_model.places))])
+    chosen = range(len(modal_model.places)) if places is None else places
     guesses: list[Guess] = []
     for place in chosen:
         if linear_size[place] > LEAST_MOTION * linear_size.max():
@@ -188,7 +188,7 @@ def score_laws(
     return sorted(guesses, key=lambda guess: guess.cost)
 
 
-def linear_motion(stretches: SegmentSet, freedom: NuisancePrior, response: ModalResponse) -> ComplexArray:
+def linear_motion(stretches: SegmentSet, nuisance_prior: NuisancePrior, response: ModalResponse) -> ComplexArray:
     """Give what sensors show of the force, without unknown starts.
 
     Where a stretch starts in motion, modes above the free ones follow the force as if at rest; the force's own start
@@ -198,7 +198,7 @@ def linear_motion(stretches: SegmentSet, freedom: NuisancePrior, response: Modal
     ----------
     stretches : SegmentSet
         The forces.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Which modes are free.
     response : ModalResponse
         On all lines.
@@ -208,19 +208,19 @@ def linear_motion(stretches: SegmentSet, freedom: NuisancePrior, response: Modal
     (n_blows, n_sensors, n_lines) complex array
         As `SegmentSet.motion`.
     """
-    s, moving = stretches.s, freedom.moving
+    s, moving = stretches.s, nuisance_prior.moving
     motion = response.from_inputs()[stretches.input_of] * stretches.force[:, None]
     if len(moving):
-        above = response.from_inputs(len(freedom.modes))[stretches.input_of[moving]]
+        above = response.from_inputs(len(nuisance_prior.modes))[stretches.input_of[moving]]
         force, slope = stretches.start_force[moving].T[:, :, None]
         lost = np.array([np.zeros((len(moving), len(s))), force / s, force / s + slope / s**2])
-        powers = [sensor.quantity.power for sensor in response.plant.sensors]
+        powers = [sensor.quantity.power for sensor in response.modal_model.sensors]
         motion[moving] -= above * lost[powers].swapaxes(0, 1)
     return motion
 
 
 def linear_motion_of_place(
-    stretches: SegmentSet, freedom: NuisancePrior, unknowns: FloatArray, response: ModalResponse, place: int
+    stretches: SegmentSet, nuisance_prior: NuisancePrior, unknowns: FloatArray, response: ModalResponse, place: int
 ) -> tuple[ComplexArray, ComplexArray]:
     """Give the motion of a place by the linear model alone, and how it answers a force on itself.
 
@@ -228,7 +228,7 @@ def linear_motion_of_place(
     ----------
     stretches : SegmentSet
         The forces.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     unknowns : (n_unknowns,) array
         In prior standard deviations: how stretches start that start in motion.
@@ -246,7 +246,7 @@ def linear_motion_of_place(
     """
     own, driven = response.at_place(place)
     motion = driven[stretches.input_of] * stretches.force
-    motion[freedom.moving] += freedom.place_starts(unknowns, response, place)
+    motion[nuisance_prior.moving] += nuisance_prior.place_starts(unknowns, response, place)
     return own, motion
 
 
@@ -257,7 +257,7 @@ def as_real(values: ComplexArray) -> FloatArray:
 
 
 def _of_place(fit: LinearFit, stretches: SegmentSet, place: int) -> tuple[ComplexArray, ComplexArray]:
-    return linear_motion_of_place(stretches, fit.freedom, fit.unknowns, fit.response, place)
+    return linear_motion_of_place(stretches, fit.nuisance_prior, fit.unknowns, fit.response, place)
 
 
 class _Contracted:

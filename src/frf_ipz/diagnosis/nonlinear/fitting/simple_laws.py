@@ -121,13 +121,13 @@ def fit_anything(track: LawFitProgress, place: int, n_turns: int) -> AnyForce:
         The best turn.
     """
     stretches, linear = track.stretches, track.linear
-    clock, freedom = Clock(stretches), linear.freedom
+    clock, nuisance_prior = Clock(stretches), linear.nuisance_prior
     unknowns = linear.as_stated
     force: ComplexArray | None = None
     best = np.inf
     for _ in range(n_turns):
         start = Start(law=CubicStiffness(), place=place, strength=0.0, shape=0.0, unknowns=unknowns)
-        response, w, v = motion_at(stretches, freedom, start, clock, force)
+        response, w, v = motion_at(stretches, nuisance_prior, start, clock, force)
         forces = clock.at_lines(simple_forces(w, v))
         rows, misfit = _rows(stretches, linear, response, start, forces, force)
         step, _ = step_to(rows, misfit, unknowns, RIDGE)
@@ -192,12 +192,12 @@ def _rows(
     force: ComplexArray | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Derive by unknowns and strengths, and give the misfit without any force; weighted, (.., n_rows)."""
-    freedom, used = linear.freedom, stretches.used
+    nuisance_prior, used = linear.nuisance_prior, stretches.used
     weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    shown = linear_motion(stretches, freedom, response)
-    shown[freedom.moving] += freedom.sensor_starts(start.unknowns, response)
+    shown = linear_motion(stretches, nuisance_prior, response)
+    shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(start.unknowns, response)
     misfit = as_real((stretches.motion - shown)[:, :, used] * weight)
     on_place = np.zeros((stretches.n_records, len(used)), complex) if force is None else -force[:, used]
-    by_unknowns = as_real(freedom.columns(stretches, response.on(used), on_place, start.place))
+    by_unknowns = as_real(nuisance_prior.columns(stretches, response.on(used), on_place, start.place))
     to_sensors = response.to_sensors(start.place)[:, used]
     return np.concatenate([by_unknowns, as_real(-to_sensors * forces[:, :, None, used] * weight)]), misfit

@@ -30,7 +30,7 @@ def shipped_laws() -> dict[str, Law]:
     return found
 
 
-def chosen_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, ...]:
+def select_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, ...]:
     """Give the laws that are to be looked for.
 
     Parameters

@@ -142,12 +142,12 @@ class NuisanceValues:
     place: FloatArray
 
 
-def nominal_values(plant: ModalModel) -> NuisanceValues:
+def nominal_values(modal_model: ModalModel) -> NuisanceValues:
     """Take the nominal model as it is.
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
 
     Returns
@@ -155,12 +155,12 @@ def nominal_values(plant: ModalModel) -> NuisanceValues:
     NuisanceValues
         Zeros.
     """
-    n_modes = plant.n_modes
+    n_modes = modal_model.n_modes
     return NuisanceValues(
         frequency=np.zeros(n_modes),
         damping=np.zeros(n_modes),
-        sensors=np.zeros((len(plant.sensors), n_modes)),
-        inputs=np.zeros((len(plant.inputs), n_modes)),
+        sensors=np.zeros((len(modal_model.sensors), n_modes)),
+        inputs=np.zeros((len(modal_model.inputs), n_modes)),
         place=np.zeros(n_modes),
     )
 
@@ -300,7 +300,7 @@ class ModalResponse:
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     s : (n_lines,) complex array
         rad/s.
@@ -310,7 +310,7 @@ class ModalResponse:
         1 / (s^2 + 2 zeta omega s + omega^2).
     """
 
-    plant: ModalModel
+    modal_model: ModalModel
     s: ComplexArray
     deviations: NuisanceValues
     modes: ComplexArray
@@ -318,12 +318,12 @@ class ModalResponse:
     @property
     def sensor_shapes(self) -> FloatArray:
         """(n_sensors, n_modes) shapes at the sensors as they are."""
-        return self.plant.at_sensors.shapes + self.deviations.sensors
+        return self.modal_model.at_sensors.shapes + self.deviations.sensors
 
     @property
     def input_shapes(self) -> FloatArray:
         """(n_inputs, n_modes) shapes at the blows as they are."""
-        return self.plant.at_inputs.shapes + self.deviations.inputs
+        return self.modal_model.at_inputs.shapes + self.deviations.inputs
 
     def on(self, lines: IntArray) -> ModalResponse:
         """Keep some of the lines."""
@@ -332,23 +332,25 @@ class ModalResponse:
     def from_inputs(self, first_mode: int = 0) -> ComplexArray:
         """(n_inputs, n_sensors, n_lines) receptance from blows to sensors, of the modes from one on."""
         shapes = self.input_shapes[:, None, first_mode:] * self.sensor_shapes[None, :, first_mode:]
-        return np.asarray(shapes @ self.modes[first_mode:] + self._rest(self.plant.at_inputs, self.plant.at_sensors))
+        return np.asarray(
+            shapes @ self.modes[first_mode:] + self._rest(self.modal_model.at_inputs, self.modal_model.at_sensors)
+        )
 
     def place_shapes(self, place: int) -> FloatArray:
         """(n_modes,) shapes at a place as it is."""
-        return np.asarray(self.plant.at_places.shapes[place] + self.deviations.place)
+        return np.asarray(self.modal_model.at_places.shapes[place] + self.deviations.place)
 
     def to_sensors(self, place: int) -> ComplexArray:
         """(n_sensors, n_lines) receptance from a place to the sensors."""
-        there = _some(self.plant.at_places, slice(place, place + 1))
+        there = _some(self.modal_model.at_places, slice(place, place + 1))
         shapes = self.sensor_shapes * self.place_shapes(place)
-        return np.asarray(shapes @ self.modes + self._rest(there, self.plant.at_sensors)[0])
+        return np.asarray(shapes @ self.modes + self._rest(there, self.modal_model.at_sensors)[0])
 
     def at_place(self, place: int) -> tuple[ComplexArray, ComplexArray]:
         """Receptance of a place to itself, (n_lines,), and from the blows to it, (n_inputs, n_lines)."""
-        there, shapes = _some(self.plant.at_places, slice(place, place + 1)), self.place_shapes(place)
+        there, shapes = _some(self.modal_model.at_places, slice(place, place + 1)), self.place_shapes(place)
         own = shapes**2 @ self.modes + self._rest(there, there)[0, 0]
-        driven = (self.input_shapes * shapes) @ self.modes + self._rest(there, self.plant.at_inputs)[0]
+        driven = (self.input_shapes * shapes) @ self.modes + self._rest(there, self.modal_model.at_inputs)[0]
         return np.asarray(own), np.asarray(driven)
 
     def _rest(self, loaded: Points, read: Points) -> ComplexArray:
@@ -357,12 +359,12 @@ class ModalResponse:
         return np.asarray(static.T[:, :, None] - inertial.T[:, :, None] * self.s**2)
 
 
-def respond(plant: ModalModel, s: ComplexArray, deviations: NuisanceValues) -> ModalResponse:
+def respond(modal_model: ModalModel, s: ComplexArray, deviations: NuisanceValues) -> ModalResponse:
     """Evaluate the modes of a plant on lines.
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     s : (n_lines,) complex array
         rad/s.
@@ -374,6 +376,6 @@ def respond(plant: ModalModel, s: ComplexArray, deviations: NuisanceValues) -> M
     ModalResponse
         Receptances between all points.
     """
-    omega, ratio = plant.poles(deviations)
+    omega, ratio = modal_model.poles(deviations)
     modes = 1 / (s**2 + (2 * ratio * omega)[:, None] * s + (omega**2)[:, None])
-    return ModalResponse(plant=plant, s=s, deviations=deviations, modes=modes)
+    return ModalResponse(modal_model=modal_model, s=s, deviations=deviations, modes=modes)

@@ -45,7 +45,7 @@ class NuisancePrior:
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     modes : (n_free,) int array
         Modes whose parameters are free.
@@ -63,7 +63,7 @@ class NuisancePrior:
         SegmentSet that start in motion.
     """
 
-    plant: ModalModel
+    modal_model: ModalModel
     modes: IntArray
     frequency: FloatArray
     damping: FloatArray
@@ -112,7 +112,7 @@ class NuisancePrior:
         NuisanceValues
             Zero for modes that are not free.
         """
-        found = nominal_values(self.plant)
+        found = nominal_values(self.modal_model)
         frequency, damping, sensors, inputs, place = self._split(unknowns)[:5]
         found.frequency[self.modes] = frequency * self.frequency
         found.damping[self.modes] = damping * self.damping
@@ -160,7 +160,7 @@ class NuisancePrior:
         starts, shapes = self.starts_of(unknowns), response.sensor_shapes[:, self.modes]
         seen = [
             np.einsum("cbm,cml->bl", starts, _free_motion(response, self.modes, sensor.quantity.power) * shape[:, None])
-            for sensor, shape in zip(self.plant.sensors, shapes, strict=True)
+            for sensor, shape in zip(self.modal_model.sensors, shapes, strict=True)
         ]
         return np.stack(seen, 1)
 
@@ -203,7 +203,7 @@ class NuisancePrior:
         motion = response.input_shapes[stretches.input_of][:, modes, None] * force[:, None] * own  # blow, mode, line
         if place is not None:
             motion = motion + response.place_shapes(place)[modes, None] * place_force[:, None] * own
-        omega, ratio = (part[modes] for part in self.plant.poles(response.deviations))
+        omega, ratio = (part[modes] for part in self.modal_model.poles(response.deviations))
         by_damping = -own * (2 * ratio * omega)[:, None] * response.s * self.damping[:, None]
         by_frequency = -own * ((2 * omega**2)[:, None] + (2 * ratio * omega)[:, None] * response.s)
         weight = 1 / np.sqrt(stretches.variance[:, :, stretches.used])
@@ -215,7 +215,7 @@ class NuisancePrior:
 
         parts = [seen(motion * by_frequency * self.frequency[:, None]), seen(motion * by_damping)]
         parts.append(_one_by_one(motion.swapaxes(0, 1), self.sensors, weight))
-        for number in range(len(self.plant.inputs)):
+        for number in range(len(self.modal_model.inputs)):
             mine = (stretches.input_of == number)[:, None, None]
             parts.append(seen(np.where(mine, force[:, None] * own, 0.0) * self.inputs[number][:, None]))
         spread = np.zeros(len(modes)) if place is None else self.places[place]
@@ -225,7 +225,7 @@ class NuisancePrior:
         if unknowns is not None and len(self.moving):
             columns[: 2 * len(modes), self.moving] += self._starts_by_pole(unknowns, response) * weight[self.moving]
             first = 2 * len(modes)
-            for row, sensor in enumerate(self.plant.sensors):
+            for row, sensor in enumerate(self.modal_model.sensors):
                 free = _free_motion(response, modes, sensor.quantity.power)
                 seen_starts = (
                     np.einsum("cbm,cml->mbl", self.starts_of(unknowns), free) * self.sensors[row][:, None, None]
@@ -242,9 +242,9 @@ class NuisancePrior:
             ends = []
             for way in (DIFFERENCE, -DIFFERENCE):
                 there = replace(response.deviations, **{name: getattr(response.deviations, name) + way})
-                ends.append(respond(self.plant, response.s, there))
+                ends.append(respond(self.modal_model, response.s, there))
             rows = []
-            for sensor, shape in zip(self.plant.sensors, shapes, strict=True):
+            for sensor, shape in zip(self.modal_model.sensors, shapes, strict=True):
                 up, down = (_free_motion(end, self.modes, sensor.quantity.power) for end in ends)
                 scaled = (up - down) * (shape * sizes / (2 * DIFFERENCE))[:, None]
                 rows.append(np.einsum("cbm,cml->mbl", starts, scaled))
@@ -253,7 +253,7 @@ class NuisancePrior:
 
     def _start_columns(self, response: ModalResponse, weight: FloatArray) -> list[ComplexArray]:
         columns = np.zeros((2, *self.starts.shape, *weight.shape), complex)
-        for row, (sensor, shape) in enumerate(zip(self.plant.sensors, response.sensor_shapes, strict=True)):
+        for row, (sensor, shape) in enumerate(zip(self.modal_model.sensors, response.sensor_shapes, strict=True)):
             free = _free_motion(response, self.modes, sensor.quantity.power) * shape[self.modes, None]
             for number, record in enumerate(self.moving):
                 columns[:, number, :, record, row] = free * self.starts[number][:, None] * weight[record, row]
@@ -264,7 +264,7 @@ class NuisancePrior:
 
         Hardly anything but a law shows how these start; what a linear model says of it is what it lacks elsewhere.
         """
-        starts = np.tile(self.modes >= self.plant.n_rigid, 2 * len(self.moving))
+        starts = np.tile(self.modes >= self.modal_model.n_rigid, 2 * len(self.moving))
         return np.asarray(unknowns * np.concatenate([np.zeros(self.n_lasting), starts]))
 
     def without_starts(self, unknowns: FloatArray) -> tuple[NuisancePrior, FloatArray]:
@@ -283,8 +283,8 @@ def _free_motion(response: ModalResponse, modes: IntArray, power: int) -> Comple
     acceleration and divided by s or s^2 lacks the polynomial in t that integration from rest leaves out.
     """
     s, own = response.s, response.modes[modes]
-    omega = (response.plant.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes]))[:, None]
-    ratio = (response.plant.damping_ratio[modes] * np.exp(response.deviations.damping[modes]))[:, None]
+    omega = (response.modal_model.omega_rad_s[modes] * np.exp(response.deviations.frequency[modes]))[:, None]
+    ratio = (response.modal_model.damping_ratio[modes] * np.exp(response.deviations.damping[modes]))[:, None]
     loss = 2 * ratio * omega
     displaced, moving = (
         ((s + loss) / omega, np.ones_like(own)),
@@ -304,13 +304,13 @@ def _one_by_one(motion: ComplexArray, sizes: FloatArray, weight: FloatArray) -> 
 
 
 def make_nuisance_prior(
-    plant: ModalModel, stretches: SegmentSet, top_hz: float, options: DiagnoseOptions
+    modal_model: ModalModel, stretches: SegmentSet, top_hz: float, options: DiagnoseOptions
 ) -> NuisancePrior:
     """Say what may deviate, from the tolerances of the user.
 
     Parameters
     ----------
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
     stretches : SegmentSet
         Which of them start in motion.
@@ -324,50 +324,52 @@ def make_nuisance_prior(
     NuisancePrior
         For the modes of the band and the first ones above it.
     """
-    modes = np.arange(np.searchsorted(plant.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
-    rigid = modes < plant.n_rigid
+    modes = np.arange(np.searchsorted(modal_model.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
+    rigid = modes < modal_model.n_rigid
     frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM
     moving = np.flatnonzero(stretches.moving)
     starts = np.zeros((len(moving), len(modes)))
     if len(moving):
-        response = np.abs(plant.at_inputs.shapes[stretches.input_of[moving]][:, modes]).max(1, keepdims=True)
+        response = np.abs(modal_model.at_inputs.shapes[stretches.input_of[moving]][:, modes]).max(1, keepdims=True)
         impulse = np.sqrt(np.mean(np.abs(stretches.force[:, stretches.used]) ** 2, 1))
         unknown = np.where(rigid, RIGID_SPREAD, START_SPREAD) * response * impulse[moving, None]
         pause = stretches.pause_s[moving]
-        left = LEFT_SPREAD * response * impulse.max() * decayed(plant, pause)[:, modes]
+        left = LEFT_SPREAD * response * impulse.max() * decayed(modal_model, pause)[:, modes]
         starts = np.where(pause[:, None] > 0, left, unknown)
     return NuisancePrior(
-        plant=plant,
+        modal_model=modal_model,
         modes=modes,
         frequency=np.where(rigid, CORD_SPREAD, frequency),
         damping=np.where(rigid, CORD_SPREAD, options.damping_tolerance * UNIFORM),
-        sensors=_shape_spread(plant, tuple(s.dof for s in plant.sensors), modes, options),
-        inputs=_shape_spread(plant, plant.inputs, modes, options),
-        places=_uneven(plant, modes, options),
+        sensors=_shape_spread(modal_model, tuple(s.dof for s in modal_model.sensors), modes, options),
+        inputs=_shape_spread(modal_model, modal_model.inputs, modes, options),
+        places=_uneven(modal_model, modes, options),
         starts=starts,
         moving=moving,
     )
 
 
-def _uneven(plant: ModalModel, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+def _uneven(modal_model: ModalModel, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
     """How far uneven stiffness moves shapes at places, as a part of the largest of all nodes, or of all springs."""
-    shapes = np.abs(plant.at_places.shapes[:, modes])
-    across = np.array([len(place.ends) > 1 for place in plant.places])[:, None]
+    shapes = np.abs(modal_model.at_places.shapes[:, modes])
+    across = np.array([len(place.ends) > 1 for place in modal_model.places])[:, None]
     largest = [np.where(across == kind, shapes, 0.0).max(0) for kind in (False, True)]
     return np.asarray(UNEVEN * options.stiffness_tolerance * np.where(across, largest[1], largest[0]))
 
 
-def _shape_spread(plant: ModalModel, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions) -> FloatArray:
+def _shape_spread(
+    modal_model: ModalModel, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions
+) -> FloatArray:
     """How far shapes at points may be off: by gains, uneven stiffness and, off the exact place, by their slope."""
-    largest = np.abs(plant.at_places.shapes[:, modes]).max(0)
-    points = np.vstack([plant.at_sensors.shapes, plant.at_inputs.shapes])[:, modes]
+    largest = np.abs(modal_model.at_places.shapes[:, modes]).max(0)
+    points = np.vstack([modal_model.at_sensors.shapes, modal_model.at_inputs.shapes])[:, modes]
     known = {
         dof.unsigned: dof.sign * row
-        for dof, row in zip((*(s.dof for s in plant.sensors), *plant.inputs), points, strict=True)
+        for dof, row in zip((*(s.dof for s in modal_model.sensors), *modal_model.inputs), points, strict=True)
     }
     spread = []
     for dof in dofs:
-        slope = _slope(plant, dof, known[dof.unsigned], modes)
+        slope = _slope(modal_model, dof, known[dof.unsigned], modes)
         size = np.abs(known[dof.unsigned])
         parts = (
             options.gain_tolerance * UNIFORM * size,
@@ -378,18 +380,18 @@ def _shape_spread(plant: ModalModel, dofs: tuple[Dof, ...], modes: IntArray, opt
     return np.array(spread)
 
 
-def _slope(plant: ModalModel, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
+def _slope(modal_model: ModalModel, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
     """Largest change of shapes towards neighbours, per length of the structure."""
-    if plant.model.kind == "lumped":
+    if modal_model.model.kind == "lumped":
         return np.zeros(len(modes))
-    geometry = plant.model.geometry
+    geometry = modal_model.model.geometry
     where = dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
     extent = float(np.ptp(geometry.coordinates_m, axis=0).max())
     others = [
         (float(np.linalg.norm(where[place.ends[0].node] - where[dof.node])), row)
-        for row, place in enumerate(plant.places)
+        for row, place in enumerate(modal_model.places)
         if len(place.ends) == 1 and place.ends[0].direction == dof.direction and place.ends[0].node != dof.node
     ]
     near = sorted(other for other in others if other[0] > 0)[:NEAREST]
-    slopes = [np.abs(plant.at_places.shapes[row, modes] - shape) / way for way, row in near]
+    slopes = [np.abs(modal_model.at_places.shapes[row, modes] - shape) / way for way, row in near]
     return extent * np.max(slopes, axis=0) if slopes else np.zeros(len(modes))

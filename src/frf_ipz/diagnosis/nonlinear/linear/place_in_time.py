@@ -29,7 +29,7 @@ class PlaceInTime:
     ----------
     stretches : SegmentSet
         The data.
-    freedom : NuisancePrior
+    nuisance_prior : NuisancePrior
         Unknowns of the linear model.
     unknowns : (n_unknowns,) array
         In prior standard deviations.
@@ -38,7 +38,7 @@ class PlaceInTime:
     """
 
     stretches: SegmentSet
-    freedom: NuisancePrior
+    nuisance_prior: NuisancePrior
     unknowns: FloatArray
     place: int
 
@@ -50,21 +50,21 @@ class PlaceInTime:
     @property
     def shapes(self) -> FloatArray:
         """(n_modes,) at the place."""
-        return np.asarray(self.freedom.plant.at_places.shapes[self.place] + self.deviations.place)
+        return np.asarray(self.nuisance_prior.modal_model.at_places.shapes[self.place] + self.deviations.place)
 
     @property
     def deviations(self) -> NuisanceValues:
         """Of the structure."""
-        return self.freedom.deviations(self.unknowns, self.place)
+        return self.nuisance_prior.deviations(self.unknowns, self.place)
 
     def modes(self) -> Modes:
         """Give the modes that are followed."""
-        return make_modes(*self.freedom.plant.poles(self.deviations), self.step_s)
+        return make_modes(*self.nuisance_prior.modal_model.poles(self.deviations), self.step_s)
 
     def yielding(self, *, constant: bool) -> Yielding:
         """Say how the place gives way to a force; see `make_modes` for `constant`."""
-        points = self.freedom.plant.at_places
-        omega, ratio = self.freedom.plant.poles(self.deviations)
+        points = self.nuisance_prior.modal_model.at_places
+        omega, ratio = self.nuisance_prior.modal_model.poles(self.deviations)
         weights = self.shapes**2
         static, inertial = (
             points.weights[self.place] @ part[:, self.place] for part in (points.static, points.inertial)
@@ -79,9 +79,9 @@ class PlaceInTime:
         """(2, n_blows, n_times) motion and velocity by the blows and by how stretches start."""
         modes, force = self.modes(), self.stretches.fine_force
         z = modes.drive(self.push())
-        moving = self.freedom.moving
+        moving = self.nuisance_prior.moving
         if len(moving):
-            z[moving[:, None], self.freedom.modes] += self._free(modes)
+            z[moving[:, None], self.nuisance_prior.modes] += self._free(modes)
         found = np.stack([np.einsum("m,bmt->bt", self.shapes, part) for part in self._read(modes, z)])
         rest = self._rest(force)
         return np.asarray(found + np.stack([rest, np.gradient(rest, self.step_s, axis=1)]))
@@ -100,22 +100,22 @@ class PlaceInTime:
             Per prior standard deviation: frequencies, damping ratios, shapes at the blow and at the place, and, where
             stretches start in motion, displacements and velocities at the start; of each mode that is free.
         """
-        freedom, modes = self.freedom, self.modes()
-        free = freedom.modes
+        nuisance_prior, modes = self.nuisance_prior, self.modes()
+        free = nuisance_prior.modes
         total = self.push()[:, free] - self.shapes[free, None] * law_force[:, None]
         columns = [self._by_pole(total, which) for which in (0, 1)]
         some = _some(modes, free)
-        inputs = freedom.inputs[self.stretches.input_of]
+        inputs = nuisance_prior.inputs[self.stretches.input_of]
         by_input = some.drive(inputs[:, :, None] * self.stretches.fine_force[:, None])
         columns.append(np.stack(self._read(some, by_input), 1) * self.shapes[free, None])
         columns.append(self._by_place(some, total, law_force))
-        if len(freedom.moving):
+        if len(nuisance_prior.moving):
             columns += self._by_start(some)
         return np.concatenate([column.transpose(2, 1, 0, 3) for column in columns])
 
     def push(self) -> FloatArray:
         """Give the modal forces of the blows, (n_blows, n_modes, n_times)."""
-        shapes = (self.freedom.plant.at_inputs.shapes + self.deviations.inputs)[self.stretches.input_of]
+        shapes = (self.nuisance_prior.modal_model.at_inputs.shapes + self.deviations.inputs)[self.stretches.input_of]
         return np.asarray(shapes[:, :, None] * self.stretches.fine_force[:, None])
 
     def _read(self, modes: Modes, z: np.ndarray) -> list[FloatArray]:
@@ -123,7 +123,7 @@ class PlaceInTime:
 
     def _rest(self, force: FloatArray) -> FloatArray:
         """(n_blows, n_times) motion by the modes that are not followed."""
-        points, inputs = self.freedom.plant.at_places, self.freedom.plant.at_inputs
+        points, inputs = self.nuisance_prior.modal_model.at_places, self.nuisance_prior.modal_model.at_inputs
         static, inertial = (inputs.weights @ part[:, self.place] for part in (points.static, points.inertial))
         second = np.gradient(np.gradient(force, self.step_s, axis=1), self.step_s, axis=1)
         rows = self.stretches.input_of
@@ -131,45 +131,45 @@ class PlaceInTime:
 
     def _by_pole(self, total: FloatArray, which: int) -> FloatArray:
         """(n_blows, 2, n_free, n_times) change by frequencies (0) or damping ratios (1)."""
-        freedom = self.freedom
-        free = freedom.modes
-        omega, ratio = freedom.plant.poles(self.deviations)
-        sizes = (freedom.frequency, freedom.damping)[which]
+        nuisance_prior = self.nuisance_prior
+        free = nuisance_prior.modes
+        omega, ratio = nuisance_prior.modal_model.poles(self.deviations)
+        sizes = (nuisance_prior.frequency, nuisance_prior.damping)[which]
         ends = []
         for sign in (1, -1):
             factor = np.ones((2, len(free)))
             factor[which] += sign * DIFFERENCE
             modes = make_modes(omega[free] * factor[0], ratio[free] * factor[1], self.step_s)
             z = modes.drive(total)
-            if len(freedom.moving):
-                z[freedom.moving] += self._free(modes)
+            if len(nuisance_prior.moving):
+                z[nuisance_prior.moving] += self._free(modes)
             ends.append(np.stack(self._read(modes, z), 1))
         return np.asarray((ends[0] - ends[1]) * (sizes * self.shapes[free] / (2 * DIFFERENCE))[:, None])
 
     def _by_place(self, modes: Modes, total: FloatArray, law_force: FloatArray) -> FloatArray:
         """(n_blows, 2, n_free, n_times) change by the shapes at the place: of what it reads, and of what acts on it."""
-        freedom, shapes = self.freedom, self.shapes[self.freedom.modes, None]
+        nuisance_prior, shapes = self.nuisance_prior, self.shapes[self.nuisance_prior.modes, None]
         z = modes.drive(total - shapes * law_force[:, None])
-        if len(freedom.moving):
-            z[freedom.moving] += self._free(modes)
-        sizes = freedom.places[self.place][:, None]
+        if len(nuisance_prior.moving):
+            z[nuisance_prior.moving] += self._free(modes)
+        sizes = nuisance_prior.places[self.place][:, None]
         return np.asarray(np.stack(self._read(modes, z), 1) * sizes)
 
     def _free(self, modes: Modes) -> np.ndarray:
         """(n_moving, n_free, n_times) free vibrations of the free modes, the last of `modes` or all of them."""
-        starts = self.freedom.starts_of(self.unknowns)
-        some = _some(modes, self.freedom.modes) if len(modes.poles) > len(self.freedom.modes) else modes
+        starts = self.nuisance_prior.starts_of(self.unknowns)
+        some = _some(modes, self.nuisance_prior.modes) if len(modes.poles) > len(self.nuisance_prior.modes) else modes
         return np.asarray(_begin(some, starts[0], starts[1])[:, :, None] * self._turning(some))
 
     def _by_start(self, modes: Modes) -> list[FloatArray]:
         """Each (n_blows, 2, n_free, n_times): change by displacement and velocity at the start."""
-        freedom, turning = self.freedom, self._turning(modes)
+        nuisance_prior, turning = self.nuisance_prior, self._turning(modes)
         found = []
         for which in (0, 1):
-            unit = [freedom.starts * (which == 0), freedom.starts * (which == 1)]
+            unit = [nuisance_prior.starts * (which == 0), nuisance_prior.starts * (which == 1)]
             z = np.zeros((self.stretches.n_records, *turning.shape), complex)
-            z[freedom.moving] = _begin(modes, *unit)[:, :, None] * turning
-            found.append(np.stack(self._read(modes, z), 1) * self.shapes[freedom.modes, None])
+            z[nuisance_prior.moving] = _begin(modes, *unit)[:, :, None] * turning
+            found.append(np.stack(self._read(modes, z), 1) * self.shapes[nuisance_prior.modes, None])
         return found
 
     def _turning(self, modes: Modes) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.measured.forces import force_noise, isolate_pulse
+from frf_ipz.diagnosis.measured.forces import estimate_force_noise, isolate_pulse
 from frf_ipz.diagnosis.measured.noise import Noise
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def read_noise(observations: Observations) -> ChannelNoise:
         pulses = tuple(isolate_pulse(record) for record in observations.records)
         length = float(np.median([pulse.stop - pulse.start for pulse in pulses])) * step
         found = [quiet_density([s[len(s) // 2 :] for s in mine], step).rounded(mine, step) for mine in signals]
-        force = force_noise(observations.records, pulses)
+        force = estimate_force_noise(observations.records, pulses)
         return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(found), pulse_s=length)
     forces = [record.force for record in observations.records]
     lines = _undriven(forces, step, observations.band_hz)

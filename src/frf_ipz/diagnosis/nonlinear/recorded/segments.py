@@ -142,14 +142,14 @@ class Window:
     loudest: bool = True
 
 
-def transform(observations: Observations, plant: ModalModel, noise: ChannelNoise, window: Window) -> SegmentSet:
+def transform(observations: Observations, modal_model: ModalModel, noise: ChannelNoise, window: Window) -> SegmentSet:
     """Cut stretches and transform them.
 
     Parameters
     ----------
     observations : Observations
         Blows or records.
-    plant : ModalModel
+    modal_model : ModalModel
         Names the sensors and blows.
     noise : ChannelNoise
         Of these observations.
@@ -167,24 +167,24 @@ def transform(observations: Observations, plant: ModalModel, noise: ChannelNoise
         If recordings differ in their time step.
     """
     step = common_step(observations)
-    cuts, n = _cuts(observations, window, step, plant)
+    cuts, n = _cuts(observations, window, step, modal_model)
     sigma = DECAYS / (n * step)
     s = np.asarray(sigma + 2j * np.pi * np.fft.rfftfreq(n, step))
     force = np.zeros((len(cuts), len(s)), complex)
     start_force, fine_force = np.zeros((len(cuts), 2)), np.zeros((len(cuts), FINER * n))
-    motion = np.zeros((len(cuts), len(plant.sensors), len(s)), complex)
+    motion = np.zeros((len(cuts), len(modal_model.sensors), len(s)), complex)
     present = np.zeros(motion.shape[:2], bool)
     for number, cut in enumerate(cuts):
-        rows = [_row(plant, sensor.channel, sensor.dof) for sensor in cut.record.sensors]
+        rows = [_row(modal_model, sensor.channel, sensor.dof) for sensor in cut.record.sensors]
         finer = _finer(cut, n)
         fine_force[number] = finer[0]
         lines, start_force[number] = _lines(cut, finer, sigma)
         force[number], motion[number, rows] = lines[0], lines[1:]
         present[number, rows] = True
-    motion /= s ** np.array([sensor.quantity.power for sensor in plant.sensors])[:, None]
+    motion /= s ** np.array([sensor.quantity.power for sensor in modal_model.sensors])[:, None]
     frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
     floor = np.where(frequency <= observations.band_hz[1], window.floor, OUTSIDE)
-    known, of_force = _noise(plant, noise, s, sigma)
+    known, of_force = _noise(modal_model, noise, s, sigma)
     size = uniform_filter1d(np.abs(motion) ** 2, AROUND, axis=2, mode="nearest")
     noisy = known + np.minimum(of_force / np.maximum(np.abs(force) ** 2, 1e-300), 1.0)[:, None] * size
     variance = np.where(present[..., None], noisy + floor**2 * size, np.inf)
@@ -199,7 +199,7 @@ def transform(observations: Observations, plant: ModalModel, noise: ChannelNoise
         motion=motion,
         noise=noisy,
         variance=variance,
-        input_of=np.array([plant.inputs.index(cut.record.input_dof) for cut in cuts]),
+        input_of=np.array([modal_model.inputs.index(cut.record.input_dof) for cut in cuts]),
         record_of=np.array([cut.number for cut in cuts]),
         moving=np.array([cut.is_moving for cut in cuts]),
         pause_s=np.array([cut.pause_s for cut in cuts]),
@@ -208,13 +208,15 @@ def transform(observations: Observations, plant: ModalModel, noise: ChannelNoise
     )
 
 
-def _noise(plant: ModalModel, noise: ChannelNoise, s: ComplexArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+def _noise(
+    modal_model: ModalModel, noise: ChannelNoise, s: ComplexArray, sigma: float
+) -> tuple[FloatArray, FloatArray]:
     """Variances of `SegmentSet.motion`, (n_sensors, n_lines), and of `SegmentSet.force`, (n_lines,), by noise."""
     frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
     energy = (1 - np.exp(-2 * DECAYS)) / (2 * sigma)
     own = [
         noise.response_energy(_noise_row(noise, sensor), frequency, energy) / np.abs(s) ** (2 * sensor.quantity.power)
-        for sensor in plant.sensors
+        for sensor in modal_model.sensors
     ]
     return np.array(own), noise.force_energy(frequency, energy)
 
@@ -229,12 +231,12 @@ class _Cut:
     pause_s: float = 0.0
 
 
-def decayed(plant: ModalModel, pause_s: FloatArray) -> FloatArray:
+def decayed(modal_model: ModalModel, pause_s: FloatArray) -> FloatArray:
     """Give how much of each mode is left after a pause, (n, n_modes), at most: damping may be less than is stated."""
-    return np.asarray(np.exp(-SLOWER * np.outer(pause_s, plant.damping_ratio * plant.omega_rad_s)))
+    return np.asarray(np.exp(-SLOWER * np.outer(pause_s, modal_model.damping_ratio * modal_model.omega_rad_s)))
 
 
-def _cuts(observations: Observations, window: Window, step: float, plant: ModalModel) -> tuple[list[_Cut], int]:
+def _cuts(observations: Observations, window: Window, step: float, modal_model: ModalModel) -> tuple[list[_Cut], int]:
     """Where stretches start: at the blow, or, of a shaker, spread over the record."""
     records, wanted = observations.records, round(window.duration_s / step)
     if observations.kind == "hammer" and not window.start_s:
@@ -242,7 +244,8 @@ def _cuts(observations: Observations, window: Window, step: float, plant: ModalM
         starts = [max(int(np.argmax(np.abs(pulse.record.force) > 0)) - BEFORE, 0) for pulse in pulses]
         n = min(wanted, *(record.n_samples - start for record, start in zip(records, starts, strict=True)))
         pauses = [
-            record.duration_s if record.follows and _is_left(plant, record.duration_s) else 0.0 for record in records
+            record.duration_s if record.follows and _is_left(modal_model, record.duration_s) else 0.0
+            for record in records
         ]
         return [
             _Cut(i, pulse.record, start, is_moving=pause > 0, pause_s=pause)
@@ -269,9 +272,9 @@ def _cuts(observations: Observations, window: Window, step: float, plant: ModalM
     return cuts, n
 
 
-def _is_left(plant: ModalModel, pause_s: float) -> bool:
+def _is_left(modal_model: ModalModel, pause_s: float) -> bool:
     """Tell whether the structure still moves when the next blow comes."""
-    return bool(decayed(plant, np.array([pause_s]))[:, plant.n_rigid :].max() > LEFT)
+    return bool(decayed(modal_model, np.array([pause_s]))[:, modal_model.n_rigid :].max() > LEFT)
 
 
 def _alive(size: FloatArray, n: int, room: int) -> int:
@@ -385,5 +388,5 @@ def _noise_row(noise: ChannelNoise, sensor: Sensor) -> int:
     return noise.sensors.index((sensor.channel, sensor.dof))
 
 
-def _row(plant: ModalModel, channel: str, dof: object) -> int:
-    return next(i for i, s in enumerate(plant.sensors) if (s.channel, s.dof) == (channel, dof))
+def _row(modal_model: ModalModel, channel: str, dof: object) -> int:
+    return next(i for i, s in enumerate(modal_model.sensors) if (s.channel, s.dof) == (channel, dof))

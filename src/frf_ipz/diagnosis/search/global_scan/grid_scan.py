@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.physics.response import Response
     from frf_ipz.diagnosis.search.fit import Fit
 
@@ -91,7 +91,12 @@ def causes_of(effect: Effect, specimen: ModelContext) -> list[Cause]:
 
 
 def _search(
-    bench: InferenceProblem, specimen: ModelContext, measured: Measured, base: Fit, unknown: FloatArray, error: float
+    bench: InferenceProblem,
+    specimen: ModelContext,
+    measured: TransferFunctions,
+    base: Fit,
+    unknown: FloatArray,
+    error: float,
 ) -> list[Start]:
     causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
     weights = weights_of(measured, error)
@@ -106,7 +111,7 @@ def _search(
 
 def _sketched(
     specimen: ModelContext,
-    measured: Measured,
+    measured: TransferFunctions,
     base: Fit,
     response: Response,
     weights: FloatArray,
@@ -140,7 +145,12 @@ def _between(specimen: ModelContext, causes: Sequence[Cause], starts: Sequence[S
 
 
 def best_start(
-    bench: InferenceProblem, base: Fit, cause: Cause, measured: Measured, weights: FloatArray, unknown: FloatArray
+    bench: InferenceProblem,
+    base: Fit,
+    cause: Cause,
+    measured: TransferFunctions,
+    weights: FloatArray,
+    unknown: FloatArray,
 ) -> Start:
     """Try the values that an effect proposes to start from.
 
@@ -152,7 +162,7 @@ def best_start(
         What is supposed already.
     cause : Cause
         Effect and place.
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
     weights : (n_points, n_frfs) array
         Over the squared misfit.

@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.search.hypothesis import Hypothesis
 
 STEP = 1e-4  # of the logarithm of a parameter, for its derivative
@@ -42,7 +42,12 @@ def robust_misfit(misfit: ComplexArray, weights: FloatArray) -> float:
 
 
 def refine(
-    hypothesis: Hypothesis, measured: Measured, weights: FloatArray, values: FloatArray, *, iterations: int = 12
+    hypothesis: Hypothesis,
+    measured: TransferFunctions,
+    weights: FloatArray,
+    values: FloatArray,
+    *,
+    iterations: int = 12,
 ) -> tuple[FloatArray, float]:
     """Improve values on a contour far from the axis.
 
@@ -50,7 +55,7 @@ def refine(
     ----------
     hypothesis : Hypothesis
         Causes at their places.
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions far from the axis.
     weights : (n_points, n_frfs) array
         Over the squared misfit.

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Signature
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.physics.basis import Basis
     from frf_ipz.diagnosis.physics.layout import Layout
     from frf_ipz.diagnosis.physics.response import Response
@@ -131,7 +131,7 @@ def missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
 
 def search_sketches(
     causes: Sequence[Cause], sketches: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
-    measured: Measured, weights: FloatArray,
+    measured: TransferFunctions, weights: FloatArray,
 ) -> list[Start]:  # fmt: skip
     """Find the best values of each effect at each place.
 
@@ -147,7 +147,7 @@ def search_sketches(
         Its coordinates.
     layout : Layout
         Sensors and blows.
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions on the contour of the sketches.
     weights : (n_points, n_frfs) array
         Over the squared misfit.

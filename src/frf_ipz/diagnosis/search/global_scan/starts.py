@@ -17,7 +17,7 @@ from frf_ipz.diagnosis.search.hypothesis import Cause
 from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.search.fit import Fit
 
 Supposed: TypeAlias = tuple[tuple[Cause, ...], Start]
@@ -112,7 +112,7 @@ def step_far(bench: InferenceProblem, known: tuple[Cause, ...], start: Start) ->
     return _step(bench, known, start, bench.coarse)
 
 
-def _step(bench: InferenceProblem, known: tuple[Cause, ...], start: Start, measured: Measured) -> Start:
+def _step(bench: InferenceProblem, known: tuple[Cause, ...], start: Start, measured: TransferFunctions) -> Start:
     weights = weights_of(measured, REFINED_ERROR)
     seen = {start.cause.key}
     for _ in range(MOST_STEPS):

@@ -22,7 +22,7 @@ HELD = 0.97  # of the cut-off: above, nothing was recorded, and the phase stays
 ROOM = 2048  # samples behind the record, for what is moved to before its start
 
 
-def without_dispersion(observations: Observations, dispersion_rad: float) -> Observations:
+def remove_dispersion(observations: Observations, dispersion_rad: float) -> Observations:
     """Give recordings the phase of a filter whose delay is the same at all frequencies.
 
     Parameters
@@ -42,13 +42,13 @@ def without_dispersion(observations: Observations, dispersion_rad: float) -> Obs
     return replace(observations, records=tuple(_undispersed(record, dispersion_rad) for record in observations.records))
 
 
-def latest_s(dispersion_rad: float, frequency_hz: float, step_s: float) -> float:
+def excess_delay_s(dispersion_rad: float, frequency_hz: float, step_s: float) -> float:
     """Delay at a frequency beyond that at low frequencies, s.
 
     Parameters
     ----------
     dispersion_rad : float
-        As in `without_dispersion`.
+        As in `remove_dispersion`.
     frequency_hz : float
         Hz.
     step_s : float

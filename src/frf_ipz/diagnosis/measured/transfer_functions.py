@@ -1,4 +1,4 @@
-"""Measured transfer functions on a contour, with the covariance of their errors."""
+"""TransferFunctions transfer functions on a contour, with the covariance of their errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Measured:
+class TransferFunctions:
     """Transfer functions on a contour.
 
     Parameters
@@ -65,19 +65,19 @@ class Measured:
         return np.asarray(self.s.imag / (2 * np.pi))
 
 
-def points_of(measured: Measured, kept: IntArray) -> Measured:
+def select_points(measured: TransferFunctions, kept: IntArray) -> TransferFunctions:
     """Keep some points of a contour.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
     kept : (n,) int array
         Which points.
 
     Returns
     -------
-    Measured
+    TransferFunctions
         Those points.
     """
     s: ComplexArray = measured.s[kept]
@@ -91,31 +91,31 @@ def points_of(measured: Measured, kept: IntArray) -> Measured:
     )
 
 
-def without_faint(measured: Measured) -> Measured:
+def raise_faint_sizes(measured: TransferFunctions) -> TransferFunctions:
     """Let errors of a model refer to FRFs that are large enough to be known.
 
     A sensor on a node line of all modes sees what nobody knows: how it is turned, and how asymmetric the structure is.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         Transfer functions.
 
     Returns
     -------
-    Measured
+    TransferFunctions
         The same, with sizes that are not far below that of the largest FRF of the same quantity and blow.
     """
     return replace(measured, size=np.maximum(measured.size, FAINT * _largest(measured)))
 
 
-def faint_frfs(measured: Measured) -> tuple[FrfLabel, ...]:
+def find_faint_frfs(measured: TransferFunctions) -> tuple[FrfLabel, ...]:
     """Find the FRFs that are too faint to be known over nearly all of the band.
 
     Parameters
     ----------
-    measured : Measured
-        Transfer functions, before or after `without_faint`.
+    measured : TransferFunctions
+        Transfer functions, before or after `raise_faint_sizes`.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def faint_frfs(measured: Measured) -> tuple[FrfLabel, ...]:
     return tuple(label for label, is_faint in zip(measured.labels, faint, strict=True) if is_faint)
 
 
-def _largest(measured: Measured) -> FloatArray:
+def _largest(measured: TransferFunctions) -> FloatArray:
     """Give the size of the largest FRF of the same quantity and blow, (n_points, n_frfs) array."""
     largest = np.zeros_like(measured.size)
     quantities = np.array([label.quantity.power for label in measured.labels])
@@ -193,12 +193,12 @@ def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     return white
 
 
-def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0) -> Whitening:
+def make_whitening(measured: TransferFunctions, *, tolerance: float, floor: float = 1.0) -> Whitening:
     """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
 
     Parameters
     ----------
-    measured : Measured
+    measured : TransferFunctions
         The data.
     tolerance : float
         Relative tolerance of the model: its FRFs are off by a part of it that no parameter stands for.
@@ -224,7 +224,7 @@ def whiten(measured: Measured, *, tolerance: float, floor: float = 1.0) -> White
     return Whitening(factors=found, blocks=tuple(_blocks(measured, found)))
 
 
-def _blocks(measured: Measured, factors: ComplexArray) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+def _blocks(measured: TransferFunctions, factors: ComplexArray) -> list[tuple[IntArray, FloatArray, FloatArray]]:
     """Noise of the force for each blow's place."""
     blocks = []
     for place, shared in enumerate(measured.common):
@@ -235,7 +235,7 @@ def _blocks(measured: Measured, factors: ComplexArray) -> list[tuple[IntArray, F
 
 
 def _block(
-    measured: Measured, factors: ComplexArray, frfs: IntArray, shared: ComplexArray
+    measured: TransferFunctions, factors: ComplexArray, frfs: IntArray, shared: ComplexArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     errors = measured.certain[:, frfs, None] * shared[:, None, :]
     columns = _separately(factors[frfs], errors).reshape(-1, shared.shape[1])

@@ -22,7 +22,7 @@ SHORTEST = 256  # samples after a blow that tell a mean
 SURE = 3.0  # times the difference between the means of the whole record and of its second half
 
 
-def without_dc_offset(observations: Observations) -> Observations:
+def remove_dc_offset(observations: Observations) -> Observations:
     """Take off what velocities and accelerations show where nothing moves.
 
     Parameters

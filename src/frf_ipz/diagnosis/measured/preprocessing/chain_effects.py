@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LEAST_SHOWN = 0.05  # of what a channel shows at other frequencies: what it shows less of is left as it is
 
 
-def restore(observations: Observations, change: Change) -> Observations:
+def undo_chain_effects(observations: Observations, change: Change) -> Observations:
     """Take out of recordings what a change of the measuring chain has done to them.
 
     Parameters

@@ -11,17 +11,17 @@ from scipy import linalg
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
 from frf_ipz.diagnosis.measured.forces import (
-    CUT_OFF,
+    MISSING_SAMPLES,
     Pulse,
-    cut_off,
-    force_noise,
+    estimate_force_noise,
+    gate_covariance,
+    gate_variance,
     isolate_pulse,
-    window_energies,
-    window_energy,
+    missing_ringing,
 )
-from frf_ipz.diagnosis.measured.lines import Lines, lines_of_band, same_places
+from frf_ipz.diagnosis.measured.group_spectra import GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
-from frf_ipz.diagnosis.measured.transfer import Measured
+from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, spectra
 from frf_ipz.frf import FrfLabel
 
@@ -36,7 +36,7 @@ COMMON_PART = 1e-2  # of a line's own: independent parts of shared errors below 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Survey:
+class RecordSurvey:
     """What has to be known about recordings before a contour is laid.
 
     Parameters
@@ -63,7 +63,7 @@ class Survey:
     least_decay_1_s: float
 
 
-def survey(observations: Observations) -> Survey:
+def survey_records(observations: Observations) -> RecordSurvey:
     """Find resonances, noise, and how fast records decay.
 
     Parameters
@@ -73,24 +73,24 @@ def survey(observations: Observations) -> Survey:
 
     Returns
     -------
-    Survey
-        What `measure` needs.
+    RecordSurvey
+        What `estimate_transfer_functions` needs.
     """
     is_hammer = observations.kind == "hammer"
     whole = _pulses(observations)
     pulses = _from_pulses(whole, observations.kind)
     groups = _records_of(pulses)
-    decay = forgetting_1_s(record for group in groups for record in group)
-    line_sets = [lines_of_band(group, observations.band_hz, decay) for group in groups]
+    decay = window_decay_1_s(record for group in groups for record in group)
+    line_sets = [transform_group(group, observations.band_hz, decay) for group in groups]
     resonances = _resonances(line_sets, decay)
     gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
     if is_hammer:
         flat = tuple(p for group in whole for p in group)
-        noise = force_noise(tuple(b for group in same_places(observations) for b in group), flat)
+        noise = estimate_force_noise(tuple(b for group in group_records(observations) for b in group), flat)
     else:
         noise = _noise_of_records(groups, line_sets, gone_on)
     responses = _response_noise(whole, pulses, line_sets, noise, gone_on)
-    return Survey(
+    return RecordSurvey(
         groups=groups,
         pulses=pulses,
         force=noise,
@@ -100,24 +100,24 @@ def survey(observations: Observations) -> Survey:
     )
 
 
-def forgetting_1_s(records: Iterable[ObservedRecord]) -> float:
+def window_decay_1_s(records: Iterable[ObservedRecord]) -> float:
     """Give the sigma that makes the end of the shortest record vanish, 1/s."""
     return ENOUGH / min(record.duration_s for record in records)
 
 
-def like(found: Survey, observations: Observations) -> Survey:
+def with_records(found: RecordSurvey, observations: Observations) -> RecordSurvey:
     """Give further blows the noise and the resonances of a survey.
 
     Parameters
     ----------
-    found : Survey
+    found : RecordSurvey
         Of other blows of the same test.
     observations : Observations
         The further blows, at the same places.
 
     Returns
     -------
-    Survey
+    RecordSurvey
         Of these.
     """
     pulses = _from_pulses(_pulses(observations), observations.kind)
@@ -126,7 +126,7 @@ def like(found: Survey, observations: Observations) -> Survey:
 
 def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
     """Pulses of the blows of each place; of a shaker, the whole records."""
-    groups = same_places(observations)
+    groups = group_records(observations)
     if observations.kind != "hammer":
         return tuple(
             tuple(Pulse(record=record, start=0, stop=record.n_samples) for record in group) for group in groups
@@ -166,7 +166,7 @@ def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
 def _response_noise(
     whole: tuple[tuple[Pulse, ...], ...],
     pulses: tuple[tuple[Pulse, ...], ...],
-    line_sets: list[Lines],
+    line_sets: list[GroupSpectra],
     noise: Noise,
     gone_on: list[FloatArray],
 ) -> dict[str, Noise]:
@@ -181,7 +181,7 @@ def _response_noise(
                 continue
             sensor = names.index(channel)
             energy = lines.unexplained[:, sensor]
-            kept_s = np.mean([window_energies(lines.s, pulse) for pulse in pulses[place]], axis=0)
+            kept_s = np.mean([gate_variance(lines.s, pulse) for pulse in pulses[place]], axis=0)
             known = np.abs(lines.values[:, sensor]) ** 2 * noise.density(lines.frequency_hz) * kept_s
             known += gone_on[place][:, sensor]
             stacks.append((lines.frequency_hz, energy, _gain(group, lines), known))
@@ -204,7 +204,7 @@ def _signals(groups: tuple[tuple[ObservedRecord, ...], ...], channel: str) -> li
 
 
 def _noise_of_records(
-    groups: tuple[tuple[ObservedRecord, ...], ...], line_sets: list[Lines], gone_on: list[FloatArray]
+    groups: tuple[tuple[ObservedRecord, ...], ...], line_sets: list[GroupSpectra], gone_on: list[FloatArray]
 ) -> Noise:
     """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
     found = []
@@ -217,7 +217,7 @@ def _noise_of_records(
     return Noise(white=float(white), pink=float(pink))
 
 
-def _gain(group: tuple[ObservedRecord, ...], lines: Lines) -> FloatArray:
+def _gain(group: tuple[ObservedRecord, ...], lines: GroupSpectra) -> FloatArray:
     """Energy on each line of noise of density 1 over the whole record."""
     rate = 2 * lines.s.real
     return np.asarray((1 - np.exp(-rate * _duration_s(group))) / rate)
@@ -226,7 +226,7 @@ def _gain(group: tuple[ObservedRecord, ...], lines: Lines) -> FloatArray:
 def _noise_of_single(
     groups: tuple[tuple[ObservedRecord, ...], ...],
     whole: tuple[tuple[Pulse, ...], ...],
-    line_sets: list[Lines],
+    line_sets: list[GroupSpectra],
     channel: str,
 ) -> Noise:
     """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
@@ -248,7 +248,7 @@ def _duration_s(group: tuple[ObservedRecord, ...]) -> float:
     return min(record.duration_s for record in group)
 
 
-def _resonances(line_sets: list[Lines], decay: float) -> Resonances:
+def _resonances(line_sets: list[GroupSpectra], decay: float) -> Resonances:
     lines = line_sets[0]
     level = np.zeros(len(lines.frequency_hz))
     for one in line_sets:
@@ -258,19 +258,19 @@ def _resonances(line_sets: list[Lines], decay: float) -> Resonances:
     return find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
 
 
-def measure(found: Survey, s: ComplexArray) -> Measured:
+def estimate_transfer_functions(found: RecordSurvey, s: ComplexArray) -> TransferFunctions:
     """Evaluate transfer functions on a contour.
 
     Parameters
     ----------
-    found : Survey
+    found : RecordSurvey
         Of the recordings.
     s : (n_points,) complex array
         rad/s.
 
     Returns
     -------
-    Measured
+    TransferFunctions
         With the covariance of their errors.
     """
     wide = np.asarray(np.maximum(s.real, COARSE.width * s.imag) + 1j * s.imag)
@@ -299,7 +299,7 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
             )
             covariances.append(noise + errors @ errors.conj().T)
             input_of.append(place)
-    return Measured(
+    return TransferFunctions(
         s=s,
         labels=tuple(labels),
         values=np.stack(values, 1),
@@ -310,7 +310,7 @@ def measure(found: Survey, s: ComplexArray) -> Measured:
     )
 
 
-def _constants(points: Lines, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
+def _constants(points: GroupSpectra, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
     """Error of an FRF, (n_points,), by one standard deviation of what may be left of a channel's constant."""
     durations = np.array([record.duration_s for record in group])
     units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
@@ -318,14 +318,14 @@ def _constants(points: Lines, group: tuple[ObservedRecord, ...], column: int) ->
     return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
 
 
-def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexArray:
+def _cut_off(found: RecordSurvey, place: int, points: GroupSpectra, column: int) -> ComplexArray:
     """Errors of an FRF, as independent columns, by the ringing that records lack at their beginning."""
     pulses, group = found.pulses[place], found.groups[place]
-    sizes = np.array([cut_off(pulse, record.responses) for pulse, record in zip(pulses, group, strict=True)])
+    sizes = np.array([missing_ringing(pulse, record.responses) for pulse, record in zip(pulses, group, strict=True)])
     if not sizes.any():
         return np.zeros((len(points.s), 0), np.complex128)
     step = group[0].step_s
-    units = np.exp(np.outer(points.s, step * np.arange(1, CUT_OFF + 1))) * step
+    units = np.exp(np.outer(points.s, step * np.arange(1, MISSING_SAMPLES + 1))) * step
     of_force, of_response = (
         (points.force.conj() @ size / points.power)[:, None] * units for size in (sizes[:, 0], sizes[:, 1 + column])
     )
@@ -333,7 +333,7 @@ def _cut_off(found: Survey, place: int, points: Lines, column: int) -> ComplexAr
 
 
 def _gone_on(
-    resonances: Resonances, points: Lines, group: tuple[ObservedRecord, ...]
+    resonances: Resonances, points: GroupSpectra, group: tuple[ObservedRecord, ...]
 ) -> tuple[ComplexArray, FloatArray]:
     """Transform what resonances went on to do after records ended, and say with how much of it each record ended.
 
@@ -348,23 +348,23 @@ def _gone_on(
     return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([shown for _, shown in pairs])
 
 
-def _gone_on_energy(resonances: Resonances, lines: Lines, group: tuple[ObservedRecord, ...]) -> FloatArray:
+def _gone_on_energy(resonances: Resonances, lines: GroupSpectra, group: tuple[ObservedRecord, ...]) -> FloatArray:
     """Energy, (n_lines, n_sensors), that blows do not share because of what went on after records ended."""
     units, left = _gone_on(resonances, lines, group)
     part = (1 - np.abs(lines.force) ** 2 / lines.power[:, None]) / max(len(group) - 1, 1)
     return np.asarray(np.einsum("pb,pbr,brs->ps", part, np.abs(units) ** 2, left**2, optimize=True))
 
 
-def _bias(found: Survey, place: int, points: Lines) -> FloatArray:
+def _bias(found: RecordSurvey, place: int, points: GroupSpectra) -> FloatArray:
     """Undo what noise of the force takes off the FRFs: it adds to the force's power."""
     noise = found.force.density(points.frequency_hz)
-    added = noise * np.sum([window_energies(points.s, pulse) for pulse in found.pulses[place]], axis=0)
+    added = noise * np.sum([gate_variance(points.s, pulse) for pulse in found.pulses[place]], axis=0)
     return np.asarray(1 / (1 - np.minimum(added / points.power, MOST_BIAS)))
 
 
-def _at(group: tuple[ObservedRecord, ...], s: ComplexArray) -> Lines:
+def _at(group: tuple[ObservedRecord, ...], s: ComplexArray) -> GroupSpectra:
     pairs = spectra(group, s)
-    return Lines(
+    return GroupSpectra(
         s=s,
         force=np.stack([force for force, _ in pairs], 1),
         responses=np.stack([responses for _, responses in pairs], 1),
@@ -378,7 +378,7 @@ def _record_noise(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexAr
     return np.asarray(np.outer(root, root) * (1 - np.exp(-rate * duration_s)) / rate)
 
 
-def _common(found: Survey, place: int, points: Lines) -> ComplexArray:
+def _common(found: RecordSurvey, place: int, points: GroupSpectra) -> ComplexArray:
     """Errors that the force's noise puts on all FRFs of a place, as independent columns."""
     n = len(points.frequency_hz)
     if found.force.white == 0:
@@ -388,7 +388,7 @@ def _common(found: Survey, place: int, points: Lines) -> ComplexArray:
     total = np.zeros((n, n), np.complex128)
     for column, pulse in enumerate(found.pulses[place]):
         force = points.force[:, column]
-        total += np.outer(force.conj(), force) * window_energy(s, pulse)
+        total += np.outer(force.conj(), force) * gate_covariance(s, pulse)
     total *= np.outer(root, root) / np.outer(points.power, points.power)
     own = np.sqrt(np.diag(total).real)  # lines that a shaker hardly drives err by far more than others
     values, vectors = linalg.eigh(total / np.outer(own, own))

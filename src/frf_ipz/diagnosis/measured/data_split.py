@@ -9,17 +9,29 @@ import numpy as np
 
 from frf_ipz.diagnosis.measured.contour import COARSE, MIDDLE, fine_contour, wide_contour
 from frf_ipz.diagnosis.measured.forces import is_sweep
-from frf_ipz.diagnosis.measured.from_frfs import FrfSurvey, lines_along, measure_frfs, search_frfs, survey_frfs
-from frf_ipz.diagnosis.measured.from_impacts import Survey, forgetting_1_s, like, measure, survey
-from frf_ipz.diagnosis.measured.from_running import finer_frfs
-from frf_ipz.diagnosis.measured.transfer import points_of, without_faint
+from frf_ipz.diagnosis.measured.from_frfs import (
+    FrfSurvey,
+    continue_frfs,
+    continue_frfs_coarsely,
+    select_nearest_lines,
+    survey_frfs,
+)
+from frf_ipz.diagnosis.measured.from_records import (
+    RecordSurvey,
+    estimate_transfer_functions,
+    survey_records,
+    window_decay_1_s,
+    with_records,
+)
+from frf_ipz.diagnosis.measured.from_running_records import estimate_finer_frfs
+from frf_ipz.diagnosis.measured.transfer_functions import raise_faint_sizes, select_points
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.diagnosis.measured.transfer import Measured
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
 ENOUGH_BLOWS = 3  # at a place: one of them can be kept for the check, the rest still tell the noise
@@ -27,14 +39,14 @@ EVERY = 4  # points of the contour: one is kept for the check where blows are to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Source:
+class DataSplit:
     """What is measured, divided into what is fitted and what is kept for the check.
 
     Parameters
     ----------
-    coarse, middle, training, held_out : Measured
+    coarse, middle, training, held_out : TransferFunctions
         Far from the axis; on the way; near it; near it and never fitted.
-    survey : Survey or FrfSurvey
+    survey : RecordSurvey or FrfSurvey
         Noise and resonances of what is fitted.
     kind : str
         What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones or sweeps,
@@ -45,17 +57,17 @@ class Source:
         The blows that were kept.
     """
 
-    coarse: Measured
-    middle: Measured
-    training: Measured
-    held_out: Measured
-    survey: Survey | FrfSurvey
+    coarse: TransferFunctions
+    middle: TransferFunctions
+    training: TransferFunctions
+    held_out: TransferFunctions
+    survey: RecordSurvey | FrfSurvey
     kind: str
     held: str
     held_names: tuple[str, ...] = ()
 
 
-def divide(observations: Observations) -> Source:
+def split_data(observations: Observations) -> DataSplit:
     """Measure, and keep something for the check.
 
     Parameters
@@ -65,7 +77,7 @@ def divide(observations: Observations) -> Source:
 
     Returns
     -------
-    Source
+    DataSplit
         Transfer functions.
 
     Raises
@@ -78,14 +90,16 @@ def divide(observations: Observations) -> Source:
     kept = _kept_records(observations)
     names = {record.name for record in kept}
     fitted = tuple(record for record in observations.records if record.name not in names)
-    found = survey(replace(observations, records=fitted))
-    far = _far(observations, found.least_decay_1_s, lambda s: measure(found, s))
+    found = survey_records(replace(observations, records=fitted))
+    far = _far(observations, found.least_decay_1_s, lambda s: estimate_transfer_functions(found, s))
     s = fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s)
-    near = _looked_at(measure(found, s), observations)
+    near = _looked_at(estimate_transfer_functions(found, s), observations)
     if not kept:
         return _by_points(far, near, found, observations.kind)
-    held = without_faint(measure(like(found, replace(observations, records=kept)), near.s))
-    return Source(
+    held = raise_faint_sizes(
+        estimate_transfer_functions(with_records(found, replace(observations, records=kept)), near.s)
+    )
+    return DataSplit(
         coarse=far[0],
         middle=far[1],
         training=near,
@@ -101,7 +115,7 @@ def _sweeps(observations: Observations) -> bool:
     """Tell whether records end before the structure has answered all of a sweep."""
     if observations.kind == "hammer" or observations.frfs is None:
         return False
-    decay = forgetting_1_s(observations.records)
+    decay = window_decay_1_s(observations.records)
     return any(is_sweep(record, observations.band_hz, decay) for record in observations.records)
 
 
@@ -117,34 +131,34 @@ def _kept_records(observations: Observations) -> tuple[ObservedRecord, ...]:
     return tuple(group[1] for group in groups.values())
 
 
-def _of_frfs(observations: Observations) -> Source:
+def _of_frfs(observations: Observations) -> DataSplit:
     if observations.frfs is None:
         raise InputError("there are neither blows nor FRFs to diagnose; check the test file's entries")
     running = observations.kind == "random" and not observations.frfs.window_decay_1_s
-    frfs = finer_frfs(observations, observations.frfs) if running else observations.frfs
+    frfs = estimate_finer_frfs(observations, observations.frfs) if running else observations.frfs
     found = survey_frfs(frfs, observations.band_hz)
-    far = _far(observations, found.least_decay_1_s, lambda s: search_frfs(found, s))
+    far = _far(observations, found.least_decay_1_s, lambda s: continue_frfs_coarsely(found, s))
     kind = "running" if running else "frf"
     return _by_points(far, _looked_at(_near(found, observations), observations), found, kind)
 
 
 def _far(
-    observations: Observations, least_decay_1_s: float, at: Callable[[ComplexArray], Measured]
-) -> tuple[Measured, Measured]:
+    observations: Observations, least_decay_1_s: float, at: Callable[[ComplexArray], TransferFunctions]
+) -> tuple[TransferFunctions, TransferFunctions]:
     """Measure far from the axis, and on the way to it."""
     coarse, middle = (wide_contour(observations.band_hz, least_decay_1_s, distance) for distance in (COARSE, MIDDLE))
     return _looked_at(at(coarse), observations), _looked_at(at(middle), observations)
 
 
-def _near(found: FrfSurvey, observations: Observations) -> Measured:
+def _near(found: FrfSurvey, observations: Observations) -> TransferFunctions:
     """Smooth what was estimated from running records, on many fine lines; take others as they are."""
     if observations.records:
-        return measure_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
+        return continue_frfs(found, fine_contour(found.resonances, observations.band_hz, found.least_decay_1_s))
     spacing = float(np.median(np.diff(found.frfs.s.imag)))
-    return lines_along(found, fine_contour(found.resonances, observations.band_hz, spacing))
+    return select_nearest_lines(found, fine_contour(found.resonances, observations.band_hz, spacing))
 
 
-def _looked_at(measured: Measured, observations: Observations) -> Measured:
+def _looked_at(measured: TransferFunctions, observations: Observations) -> TransferFunctions:
     """Leave out stretches of the band, and what is nearer to them than a point's own width."""
     frequency, width = measured.frequency_hz, measured.s.real / (2 * np.pi)
     kept = np.ones(len(frequency), bool)
@@ -152,17 +166,22 @@ def _looked_at(measured: Measured, observations: Observations) -> Measured:
         kept &= (frequency < low - width) | (frequency > high + width)
     if not kept.any():
         raise InputError("[fit] exclude_hz leaves nothing of the band to diagnose; exclude narrower stretches")
-    return without_faint(points_of(measured, np.flatnonzero(kept)))
+    return raise_faint_sizes(select_points(measured, np.flatnonzero(kept)))
 
 
-def _by_points(far: tuple[Measured, Measured], near: Measured, found: Survey | FrfSurvey, kind: str) -> Source:
+def _by_points(
+    far: tuple[TransferFunctions, TransferFunctions],
+    near: TransferFunctions,
+    found: RecordSurvey | FrfSurvey,
+    kind: str,
+) -> DataSplit:
     number = np.arange(len(near.s))
     held = number % EVERY == EVERY // 2
-    return Source(
+    return DataSplit(
         coarse=far[0],
         middle=far[1],
-        training=points_of(near, np.flatnonzero(~held)),
-        held_out=points_of(near, np.flatnonzero(held)),
+        training=select_points(near, np.flatnonzero(~held)),
+        held_out=select_points(near, np.flatnonzero(held)),
         survey=found,
         kind=kind,
         held="lines",

@@ -21,9 +21,9 @@ from scipy.ndimage import uniform_filter1d
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.contour import find_resonances
-from frf_ipz.diagnosis.measured.forces import CUT_OFF, RINGING, Pulse, cut_off, isolate_pulse
-from frf_ipz.diagnosis.measured.lines import FINER, Lines, lines_of_band, same_places
-from frf_ipz.diagnosis.measured.local_pole import LocalPole, lines_near, pole_near
+from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, RINGING, Pulse, isolate_pulse, missing_ringing
+from frf_ipz.diagnosis.measured.group_spectra import FINER, GroupSpectra, group_records, transform_group
+from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
@@ -50,7 +50,7 @@ class _Group:
 
     records: tuple[ObservedRecord, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
-    lines: Lines
+    lines: GroupSpectra
     poles: ComplexArray
     pole_stds: FloatArray  # rad/s
     residues: FloatArray  # (n_poles, n_sensors), at most
@@ -123,7 +123,7 @@ class _Told:
         return np.cumsum((0, *self.counts[:-1]))
 
 
-def without_residual_motion(observations: Observations) -> Observations:
+def remove_residual_motion(observations: Observations) -> Observations:
     """Take off what no linear system answers to a blow with: constants, and motion left from a blow before.
 
     Parameters
@@ -138,7 +138,7 @@ def without_residual_motion(observations: Observations) -> Observations:
     """
     if not observations.are_from_rest:
         return observations
-    places = same_places(observations)
+    places = group_records(observations)
     if observations.kind != "hammer" and min(len(records) for records in places) < LEAST_RECORDS:
         return observations
     decay = DECAYS / min(record.duration_s for record in observations.records)
@@ -159,12 +159,12 @@ def _group(records: tuple[ObservedRecord, ...], observations: Observations, deca
     is_hammer = observations.kind == "hammer"
     pulses = tuple(isolate_pulse(record) if is_hammer else _whole(record) for record in records)
     transformed = tuple(pulse.record for pulse in pulses)
-    lines = lines_of_band(transformed, observations.band_hz, decay)
+    lines = transform_group(transformed, observations.band_hz, decay)
     found: list[LocalPole] = []
     residues = np.zeros((0, len(records[0].sensors)))
     if any(record.follows for record in records):
         from_rest = tuple(record for record in transformed if not record.follows)
-        told = lines_of_band(from_rest, observations.band_hz, decay) if from_rest else lines
+        told = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
         found = _poles(told, decay)
         nearest = [int(np.argmin(np.abs(told.s - one.pole))) for one in found]
         away = np.array([np.abs(told.s[line] - one.pole) for line, one in zip(nearest, found, strict=True)])
@@ -176,8 +176,8 @@ def _group(records: tuple[ObservedRecord, ...], observations: Observations, deca
         poles=np.array([one.pole for one in found], complex),
         pole_stds=np.array([one.std_rad_s for one in found]),
         residues=residues,
-        lacking=np.array([cut_off(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
-        * np.sqrt(CUT_OFF),
+        lacking=np.array([missing_ringing(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
+        * np.sqrt(MISSING_SAMPLES),
     )
 
 
@@ -194,7 +194,7 @@ def _without(record: ObservedRecord, found: dict[tuple[str, str], tuple[FloatArr
     return replace(record, responses=record.responses - np.array(left), constant_std=np.array(stds))
 
 
-def _poles(lines: Lines, decay: float) -> list[LocalPole]:
+def _poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
     """Poles of the structure, as far as they stand out."""
     size = np.abs(lines.values) ** 2
     level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
@@ -202,9 +202,9 @@ def _poles(lines: Lines, decay: float) -> list[LocalPole]:
     found = []
     for omega, own in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
         start = complex(-own, omega)
-        near = lines_near(lines.s, start)
+        near = lines_around_pole(lines.s, start)
         sensor = int(np.argmax(size[near].sum(0) / size.sum(0)))
-        pole = pole_near(lines.s[near], lines.values[near, sensor], start)
+        pole = fit_local_pole(lines.s[near], lines.values[near, sensor], start)
         found += [] if pole is None else [pole]
     return found
 

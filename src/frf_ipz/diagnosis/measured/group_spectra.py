@@ -17,7 +17,7 @@ FINER = 4  # lines between those of the record: peaks are seen at their tops
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lines:
+class GroupSpectra:
     """Transforms of some blows at one place.
 
     Parameters
@@ -57,7 +57,7 @@ class Lines:
         return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
 
 
-def lines_of_band(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float], decay_1_s: float) -> Lines:
+def transform_group(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float], decay_1_s: float) -> GroupSpectra:
     """Transform blows to uniform lines of a band by FFT.
 
     Parameters
@@ -71,7 +71,7 @@ def lines_of_band(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float
 
     Returns
     -------
-    Lines
+    GroupSpectra
         `FINER` times as many as the shortest record has.
     """
     n, step = min(record.n_samples for record in group), group[0].step_s
@@ -82,10 +82,10 @@ def lines_of_band(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float
     force = np.stack([np.fft.rfft(record.force[:n] * window, padded)[inside] for record in group], 1)
     responses = np.stack([np.fft.rfft(record.responses[:, :n] * window, padded)[:, inside].T for record in group], 1)
     s = np.asarray(decay_1_s + 2j * np.pi * frequency[inside], np.complex128)
-    return Lines(s=s, force=force, responses=responses)
+    return GroupSpectra(s=s, force=force, responses=responses)
 
 
-def same_places(observations: Observations) -> tuple[tuple[ObservedRecord, ...], ...]:
+def group_records(observations: Observations) -> tuple[tuple[ObservedRecord, ...], ...]:
     """Gather the blows with the same place and the same sensors.
 
     Parameters

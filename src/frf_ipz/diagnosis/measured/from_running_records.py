@@ -45,7 +45,7 @@ class Comb:
     freedom: FloatArray
 
 
-def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
+def estimate_finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     """Estimate FRFs of running records on finer lines.
 
     Parameters
@@ -62,7 +62,7 @@ def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
         together as good as the record's own lines.
     """
     kept = np.flatnonzero(frfs.in_band(observations.band_hz) & (frfs.frequency_hz > 0))
-    finer = fineness(len(kept))
+    finer = refinement_factor(len(kept))
     spacing = float(frfs.frequency_hz[1] - frfs.frequency_hz[0])
     length = round(1 / (spacing * observations.records[0].step_s))
     lines = frfs.lines(np.repeat(kept, finer))
@@ -78,7 +78,7 @@ def finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     )
 
 
-def fineness(n_lines: int) -> int:
+def refinement_factor(n_lines: int) -> int:
     """Say how many lines there are for one of the record.
 
     Parameters

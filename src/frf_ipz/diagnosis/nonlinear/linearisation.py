@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
 
 
-def linearise(fit: LawFit, plant: ModalModel) -> Linearised:
+def linearise(fit: LawFit, modal_model: ModalModel) -> Linearised:
     """Replace a law by a spring and a damper.
 
     Parameters
     ----------
     fit : LawFit
         The law, with the motion of its place in each blow.
-    plant : ModalModel
+    modal_model : ModalModel
         The structure.
 
     Returns
@@ -42,7 +42,7 @@ def linearise(fit: LawFit, plant: ModalModel) -> Linearised:
     order = np.argsort(rms)
     stiffness, damping = _spring_and_damper(motion.ravel(), velocity.ravel(), force.ravel())
     return Linearised(
-        ends=plant.places[fit.place].ends,
+        ends=modal_model.places[fit.place].ends,
         stiffness=stiffness,
         damping=damping,
         motion_rms_m=rms[order],
