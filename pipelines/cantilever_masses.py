@@ -29,14 +29,14 @@ from scipy.optimize import least_squares
 import frf_ipz
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.comparing.compare import judge
-from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn
-from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
-from frf_ipz.diagnosis.judging.findings import describe
+from frf_ipz.diagnosis.compare.compare import judge
+from frf_ipz.diagnosis.compare.learnt_nuisance import bench_of, learn
+from frf_ipz.diagnosis.compare.mass_loss import MassLoss
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import fit_nothing
+from frf_ipz.diagnosis.search.component_search import fit_nothing
+from frf_ipz.diagnosis.verdict.findings import describe
 
 SHEET = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 BAND_HZ = (110.0, 840.0)  # of the fifth resonance, at 1155 Hz, no uniform beam follows the healthy layouts

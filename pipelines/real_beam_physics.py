@@ -39,15 +39,14 @@ from matplotlib import pyplot as plt
 import frf_ipz
 import real_beams
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.judging.findings import describe
-from frf_ipz.diagnosis.judging.verdict import FOUND_NATS, goodness
+from frf_ipz.diagnosis.evidence.fit import Fit
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.observations import Observations
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.fit import Fit
-from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
-from frf_ipz.diagnosis.search.search import fit_nothing, search
-from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.diagnosis.search.component_search import fit_nothing, search
+from frf_ipz.diagnosis.verdict.findings import describe
+from frf_ipz.diagnosis.verdict.goodness import FOUND_NATS, goodness
 
 MOST_CAUSES = 6
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.evidence.inference_problem import set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.search.set_up import set_up
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.fe.response import model_frfs

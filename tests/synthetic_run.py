@@ -10,9 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from frf_ipz.diagnosis.diagnosis import Ambiguity, Curves, DataCheck, Diagnosis, LawInTime, Misfit
-from frf_ipz.diagnosis.finding import Estimate, Finding
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
+from frf_ipz.diagnosis.result import Ambiguity, Curves, DataCheck, Diagnosis, Estimate, Finding, LawInTime, Misfit
 from frf_ipz.dofs import Dof
 from frf_ipz.export.state_space import to_state_space
 from frf_ipz.fe.reduction.options import ReduceOptions

@@ -10,8 +10,8 @@ import pytest
 from diagnosed import beam, bench_of, labels, measured, observed
 from frf_ipz import DiagnoseOptions, diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.search.global_scan.grid_scan import wide_search
-from frf_ipz.diagnosis.search.search import fit_nothing
+from frf_ipz.diagnosis.search.component_search import fit_nothing
+from frf_ipz.diagnosis.search.global_scan import wide_search
 from frf_ipz.fe.changes import with_point_masses
 
 DIAGNOSIS_S = 10.0  # of a linear case

@@ -5,8 +5,8 @@ import pytest
 
 import cantilever_masses as script
 import frf_ipz
-from frf_ipz.diagnosis.comparing.compare import judge
-from frf_ipz.diagnosis.comparing.learnt_nuisance import learn
+from frf_ipz.diagnosis.compare.compare import judge
+from frf_ipz.diagnosis.compare.learnt_nuisance import learn
 
 COMMON = script.Common(in_clamp_m=0.01625, modulus_pa=2.0076e11, piece=0.0249, sensor=0.0628, to_middle_m=0.0045)
 TAUGHT, NEW = (0, 16, 32, 48), 17  # layouts of the healthy state

@@ -12,19 +12,17 @@ from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+from frf_ipz.diagnosis.model.basis import make_basis
+from frf_ipz.diagnosis.model.change import NOTHING, Change, with_change
+from frf_ipz.diagnosis.model.layout import lay_out
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.physics.basis import make_basis
-from frf_ipz.diagnosis.physics.change import NOTHING, Change
-from frf_ipz.diagnosis.physics.layout import lay_out
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis, Linearised
-    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, Linearised
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.structure import StructuralModel
 

@@ -13,28 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from frf_ipz.diagnosis.catalogue.finder import chosen_effects
-from frf_ipz.diagnosis.diagnosis import Ambiguity, Diagnosis
-from frf_ipz.diagnosis.judging.data_checks import check, warn
-from frf_ipz.diagnosis.judging.decision import (
-    CONSISTENT,
-    EXPLAINED,
-    UNEXPLAINED,
-    decide,
-    fit_without,
-    gain_over,
-    only_null,
-    without_last,
-)
-from frf_ipz.diagnosis.judging.detectable import detectable_sizes
-from frf_ipz.diagnosis.judging.figures import disagreement, prove
-from frf_ipz.diagnosis.judging.findings import describe, finding_of, weigh
-from frf_ipz.diagnosis.judging.freed_damping import complain, is_damping_alone, with_any_damping, without_level
-from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.judging.mismatch_location import trace
-from frf_ipz.diagnosis.judging.next_sensor import best_sensor
-from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
-from frf_ipz.diagnosis.judging.unnamed_force import describe_unnamed_force, find_unnamed_force
+from frf_ipz.diagnosis.effect_selection import chosen_effects
+from frf_ipz.diagnosis.evidence.inference_problem import set_up, with_errors
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
@@ -44,24 +24,47 @@ from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
-from frf_ipz.diagnosis.search.set_up import set_up, with_errors
+from frf_ipz.diagnosis.result import Ambiguity, Diagnosis
+from frf_ipz.diagnosis.verdict.data_checks import check, warn
+from frf_ipz.diagnosis.verdict.decision import (
+    CONSISTENT,
+    EXPLAINED,
+    UNEXPLAINED,
+    decide,
+    fit_without,
+    gain_over,
+    only_null,
+    without_last,
+)
+from frf_ipz.diagnosis.verdict.findings import describe, finding_of, weigh
+from frf_ipz.diagnosis.verdict.identifiability import best_sensor, detectable_sizes
+from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
+from frf_ipz.diagnosis.verdict.mismatch import disagreement, trace
+from frf_ipz.diagnosis.verdict.out_of_catalogue import (
+    another_kind,
+    complain,
+    is_damping_alone,
+    with_any_damping,
+    without_level,
+)
+from frf_ipz.diagnosis.verdict.proof import prove
+from frf_ipz.diagnosis.verdict.unnamed_force import describe_unnamed_force, find_unnamed_force
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import DataCheck
-    from frf_ipz.diagnosis.finding import Finding
-    from frf_ipz.diagnosis.judging.decision import Decision
-    from frf_ipz.diagnosis.judging.figures import Proof
-    from frf_ipz.diagnosis.judging.findings import Weighed
+    from frf_ipz.diagnosis.evidence.fit import Data
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.nonlinear.linearity import Linearity
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.diagnosis.search.fit import Data
-    from frf_ipz.diagnosis.search.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.result import DataCheck, Finding
+    from frf_ipz.diagnosis.verdict.decision import Decision
+    from frf_ipz.diagnosis.verdict.findings import Weighed
+    from frf_ipz.diagnosis.verdict.proof import Proof
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 

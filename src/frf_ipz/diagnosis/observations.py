@@ -1,16 +1,25 @@
-"""What was measured, blow by blow, calibrated and in the signs of the test: the raw material of a diagnosis."""
+"""What was measured, record by record, calibrated and in the signs of the test: the raw material of a diagnosis."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfSet
+from frf_ipz.identification.measured_lines import measured_lines
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.records import read_records
 from frf_ipz.quantities import FrfQuantity
+
+if TYPE_CHECKING:
+    from frf_ipz.ingest import records as recorded
+    from frf_ipz.ingest.campaign import VibrationTest
+    from frf_ipz.ingest.options import IngestOptions
 
 BLOCK = 128  # samples
 
@@ -210,3 +219,62 @@ def _transform(record: ObservedRecord, s: ComplexArray) -> tuple[ComplexArray, C
     inner = (within.real @ blocks + 1j * (within.imag @ blocks)).reshape(len(s), len(signals), n_blocks)
     total = np.einsum("kca,ka->kc", inner, over)
     return total[:, 0], total[:, 1:]
+
+
+def observe(
+    test: VibrationTest, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None
+) -> Observations:
+    """Gather what a diagnosis looks at.
+
+    Parameters
+    ----------
+    test : VibrationTest
+        The test.
+    options : IngestOptions
+        How its recordings are used.
+    frfs : FrfSet
+        The FRFs that were estimated from it, or elsewhere.
+    fit : FitOptions, optional
+        Says which band to look at, and which stretches of it not; without a band, the one that carries signal is
+        taken.
+
+    Returns
+    -------
+    Observations
+        Blows or records where the scale of the channels is known, and the FRFs.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used, or too few lines are left in the band.
+    """
+    chosen = fit or FitOptions()
+    band = measured_lines(frfs, chosen).band_hz
+    records: tuple[ObservedRecord, ...] = ()
+    if test.kind != "frf" and frfs.unknown_scale == "none":
+        records = tuple(
+            _record(record, test) for record in read_records(test, options) if set(record.labels) & set(test.labels)
+        )
+    kind = test.kind if records else "frf"
+    return Observations(kind=kind, records=records, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
+
+
+def _record(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
+    """Take of a blow what the FRFs of the test were estimated from: the user may have hidden a sensor."""
+    rows = [row for row, label in enumerate(record.labels) if label in test.labels]
+    labels = [record.labels[row] for row in rows]
+    return ObservedRecord(
+        name=record.name,
+        input_channel=test.input_channel.column,
+        input_dof=labels[0].input_dof,
+        sensors=tuple(
+            Sensor(channel=label.output_channel, dof=label.output_dof, quantity=label.quantity) for label in labels
+        ),
+        step_s=record.step_s,
+        force=record.force,
+        responses=record.responses[rows],
+        rested=record.starts_at_rest,
+        recording=record.recording,
+        number=record.number,
+        start_s=record.start_s,
+    )

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
-    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.result import Diagnosis, Finding
     from frf_ipz.structure import ReducedModel, StructuralModel
 
 STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly linear in it

@@ -12,7 +12,7 @@ from frf_ipz.rational import natural_frequency_hz
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs

@@ -12,8 +12,8 @@ from frf_ipz.plotting.style import FAINT, MEASURED, UPDATED, axes_or_new, colour
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis, LawInTime
     from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.diagnosis.result import Diagnosis, LawInTime
 
 MOST_RANKED = 12
 

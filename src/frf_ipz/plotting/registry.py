@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import RunFolder
     from frf_ipz.updating.updated_model import UpdatedModel

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from frf_ipz.arrays import ComplexArray, IntArray
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import Dof
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.frf import FrfLabel, FrfSet

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.frf import FrfSet
 
 ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and short when written out

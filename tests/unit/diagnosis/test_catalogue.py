@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from frf_ipz.diagnosis.catalogue.finder import chosen_effects, shipped_effects
+from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.effect_selection import chosen_effects
 from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.errors import InputError

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosed import beam, bench_of, measured
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.search import component_search as searching
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
-from frf_ipz.diagnosis.search import pairs
-from frf_ipz.diagnosis.search import search as searching
-from frf_ipz.diagnosis.search.global_scan.signatures import Start
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing, search
+from frf_ipz.diagnosis.search import pair_search as pairs
+from frf_ipz.diagnosis.search.component_search import Ranking, fit_nothing, search
+from frf_ipz.diagnosis.search.robust_refinement import Start
 
 KINDS = ("attached_resonator", "local_damper", "grounded_spring", "coupling_spring", "viscoelastic_joint")
 SEEN = 0.05  # relative

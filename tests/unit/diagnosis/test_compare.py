@@ -7,9 +7,9 @@ import pytest
 
 import frf_ipz
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.comparing.learnt_nuisance import bench_of, learn, nominal_after
-from frf_ipz.diagnosis.comparing.mass_loss import MassLoss
-from frf_ipz.diagnosis.comparing.nominal import LEAST_SQUARE, as_fitted
+from frf_ipz.diagnosis.compare.corrected_model import LEAST_SQUARE, as_fitted
+from frf_ipz.diagnosis.compare.learnt_nuisance import bench_of, learn, nominal_after
+from frf_ipz.diagnosis.compare.mass_loss import MassLoss
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses, with_scaled_parts

@@ -7,12 +7,11 @@ import pytest
 
 from diagnosed import beam, bench_of, labels, measured
 from frf_ipz.diagnosis.catalogue.effect import Place
-from frf_ipz.diagnosis.catalogue.supports import coupling_spring
-from frf_ipz.diagnosis.search.ambiguity_set import rescoring as ties
-from frf_ipz.diagnosis.search.ambiguity_set.candidate_set import fit_far, next_beside
-from frf_ipz.diagnosis.search.ambiguity_set.rescoring import settle_ties
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
+from frf_ipz.diagnosis.catalogue.effects import coupling_spring
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.search import ambiguity_set as ties
+from frf_ipz.diagnosis.search.ambiguity_set import fit_far, next_beside, settle_ties
+from frf_ipz.diagnosis.search.component_search import Ranking, fit_nothing
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.changes import with_point_masses, with_springs
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.judging import decision
-from frf_ipz.diagnosis.judging.verdict import LIMITS
-from frf_ipz.diagnosis.search.search import Ranking
+from frf_ipz.diagnosis.search.component_search import Ranking
+from frf_ipz.diagnosis.verdict import decision
+from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
 ALONE = -577.0  # nats
 

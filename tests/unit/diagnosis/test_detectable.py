@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.judging import detectable
+from frf_ipz.diagnosis.verdict import identifiability as detectable
 
 
 @pytest.mark.parametrize("size", [1.0, 1e9])

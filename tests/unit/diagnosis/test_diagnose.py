@@ -10,12 +10,12 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.finding import Finding
-from frf_ipz.diagnosis.judging.figures import prove
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.inference_problem import set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.diagnosis.result import Finding
+from frf_ipz.diagnosis.verdict.proof import prove
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses, with_springs
@@ -204,7 +204,7 @@ OWN = """
 import numpy as np
 from scipy import sparse
 from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Place
-from frf_ipz.diagnosis.physics.change import Change
+from frf_ipz.diagnosis.model.change import Change
 
 class Cord(Effect):
     name = "cord"

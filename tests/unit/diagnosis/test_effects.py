@@ -10,13 +10,13 @@ from diagnosed import beam, labels, lumped
 from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+from frf_ipz.diagnosis.evidence.hypothesis import Cause, suppose
+from frf_ipz.diagnosis.model.basis import make_basis
+from frf_ipz.diagnosis.model.change import with_change
+from frf_ipz.diagnosis.model.layout import lay_out
+from frf_ipz.diagnosis.model.nuisance import make_nuisance
+from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.physics.basis import make_basis
-from frf_ipz.diagnosis.physics.layout import lay_out
-from frf_ipz.diagnosis.physics.nuisance import make_nuisance
-from frf_ipz.diagnosis.physics.response import nuisance_jacobian
-from frf_ipz.diagnosis.search.hypothesis import Cause, suppose
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.beam_models import with_axial_force, with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_released_supports, with_scaled_parts, with_springs

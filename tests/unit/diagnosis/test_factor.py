@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import linalg
 
-from frf_ipz.diagnosis.search.map_fit import ROUNDING, _factor
+from frf_ipz.diagnosis.evidence.map_fit import ROUNDING, _factor
 
 
 def test_a_curvature_that_is_not_definite_by_rounding_has_a_factor():

@@ -4,8 +4,8 @@ import pytest
 
 from diagnosed import beam, labels, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.finding import doubt_of_place
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.result import doubt_of_place
 from frf_ipz.fe.changes import with_point_masses
 
 ADDED_KG = 2e-3

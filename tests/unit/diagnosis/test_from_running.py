@@ -8,7 +8,7 @@ import pytest
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.from_frfs import continue_frfs, survey_frfs
 from frf_ipz.diagnosis.measured.from_running_records import FINEST, estimate_finer_frfs, refinement_factor
-from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.observations import observe
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosed import beam, measured, observed
-from frf_ipz.diagnosis.judging.data_checks import check, warn
 from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.verdict.data_checks import check, warn
 
 
 @pytest.fixture(scope="module")

@@ -9,13 +9,13 @@ from scipy import linalg
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
+from frf_ipz.diagnosis.evidence import hypothesis as hypotheses
+from frf_ipz.diagnosis.evidence.inference_problem import set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.search import hypothesis as hypotheses
+from frf_ipz.diagnosis.search import component_search as search
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
-from frf_ipz.diagnosis.search import search
-from frf_ipz.diagnosis.search.global_scan.grid_scan import causes_of
-from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.diagnosis.search.global_scan import causes_of
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.numerics.pencils import generalised_eigh
 

@@ -10,14 +10,13 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, bench_of, measured, observed
 from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.judging import law_and_linear as law_beside
-from frf_ipz.diagnosis.judging.decision import only_null
-from frf_ipz.diagnosis.judging.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
+from frf_ipz.diagnosis.model.change import Change, with_change
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.diagnosis.search.search import search
+from frf_ipz.diagnosis.search.component_search import search
+from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
+from frf_ipz.diagnosis.verdict.decision import only_null
+from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.quantities import FrfQuantity

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.measured.levels import compare_levels
-from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.observations import observe
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test

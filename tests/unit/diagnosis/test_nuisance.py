@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from frf_ipz import read_model, solve_modes
+from frf_ipz.diagnosis.model.basis import make_basis
+from frf_ipz.diagnosis.model.layout import lay_out
+from frf_ipz.diagnosis.model.nuisance import UNIFORM, make_nuisance
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.basis import make_basis
-from frf_ipz.diagnosis.physics.layout import lay_out
-from frf_ipz.diagnosis.physics.nuisance import UNIFORM, make_nuisance
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity
 

@@ -7,14 +7,14 @@ import pytest
 from scipy import sparse
 
 from diagnosed import beam, bench_of, labels, measured
-from frf_ipz.diagnosis.catalogue.supports import coupling_spring
-from frf_ipz.diagnosis.judging import decision
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search.ambiguity_set import distant_places as elsewhere
-from frf_ipz.diagnosis.search.global_scan.grid_scan import wide_search
-from frf_ipz.diagnosis.search.global_scan.signatures import Start
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import Ranking, fit_nothing
+from frf_ipz.diagnosis.catalogue.effects import coupling_spring
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.model.change import with_change
+from frf_ipz.diagnosis.search import ambiguity_set as elsewhere
+from frf_ipz.diagnosis.search.component_search import Ranking, fit_nothing
+from frf_ipz.diagnosis.search.global_scan import wide_search
+from frf_ipz.diagnosis.search.robust_refinement import Start
+from frf_ipz.diagnosis.verdict import decision
 from frf_ipz.dofs import Dof
 from frf_ipz.progress import silent
 

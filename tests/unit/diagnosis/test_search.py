@@ -10,23 +10,21 @@ from numpy.testing import assert_allclose
 from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.judging.findings import Weighed, finding_of, weigh
-from frf_ipz.diagnosis.judging.mismatch_location import trace
-from frf_ipz.diagnosis.judging.verdict import goodness
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.inference_problem import set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.transfer_functions import FAINT, find_faint_frfs, raise_faint_sizes
+from frf_ipz.diagnosis.model.basis import solved
+from frf_ipz.diagnosis.model.change import Change, with_change
+from frf_ipz.diagnosis.model.modes import modify, scatter
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.physics.basis import solved
-from frf_ipz.diagnosis.physics.change import Change
-from frf_ipz.diagnosis.physics.modified import modify
-from frf_ipz.diagnosis.physics.response import scatter
+from frf_ipz.diagnosis.search import component_search as search
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
-from frf_ipz.diagnosis.search import search
-from frf_ipz.diagnosis.search.global_scan.signatures import Start
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.search import by_effect, fit_nothing
-from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.diagnosis.search.component_search import by_effect, fit_nothing
+from frf_ipz.diagnosis.search.robust_refinement import Start
+from frf_ipz.diagnosis.verdict.findings import Weighed, finding_of, weigh
+from frf_ipz.diagnosis.verdict.goodness import goodness
+from frf_ipz.diagnosis.verdict.mismatch import trace
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.changes import with_point_masses, with_springs
 

@@ -14,17 +14,11 @@ from frf_ipz.diagnosis.catalogue.effect import Place
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.judging.decision import decide
-from frf_ipz.diagnosis.judging.out_of_catalogue import another_kind
-from frf_ipz.diagnosis.judging.verdict import LIMITS, goodness
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.attach import with_change
-from frf_ipz.diagnosis.search import pairs
-from frf_ipz.diagnosis.search.global_scan.signatures import Start
-from frf_ipz.diagnosis.search.hypothesis import Cause
-from frf_ipz.diagnosis.search.local_score_test import close_search
-from frf_ipz.diagnosis.search.pairs import search_second
-from frf_ipz.diagnosis.search.search import (
+from frf_ipz.diagnosis.search import pair_search as pairs
+from frf_ipz.diagnosis.search.component_search import (
     CLOSE_EACH,
     CLOSE_FITTED,
     Ranking,
@@ -33,6 +27,12 @@ from frf_ipz.diagnosis.search.search import (
     search,
     search_beside,
 )
+from frf_ipz.diagnosis.search.pair_search import search_second
+from frf_ipz.diagnosis.search.robust_refinement import Start
+from frf_ipz.diagnosis.search.score_test import close_search
+from frf_ipz.diagnosis.verdict.decision import decide
+from frf_ipz.diagnosis.verdict.goodness import LIMITS, goodness
+from frf_ipz.diagnosis.verdict.out_of_catalogue import another_kind
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs

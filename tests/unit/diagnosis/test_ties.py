@@ -7,11 +7,11 @@ import pytest
 from scipy import linalg
 
 from diagnosed import beam, bench_of, measured
+from frf_ipz.diagnosis.evidence.inference_problem import with_errors
 from frf_ipz.diagnosis.measured.transfer_functions import select_points
-from frf_ipz.diagnosis.search.ambiguity_set import rescoring as ties
-from frf_ipz.diagnosis.search.ambiguity_set.rescoring import settle_ties
-from frf_ipz.diagnosis.search.search import fit_nothing, search
-from frf_ipz.diagnosis.search.set_up import with_errors
+from frf_ipz.diagnosis.search import ambiguity_set as ties
+from frf_ipz.diagnosis.search.ambiguity_set import settle_ties
+from frf_ipz.diagnosis.search.component_search import fit_nothing, search
 from frf_ipz.fe.changes import with_point_masses
 
 LITTLE_KG, THICKER = 2e-4, 1.0015  # the thickness takes frequencies 0.15 % off, more than a part of 0.1 %

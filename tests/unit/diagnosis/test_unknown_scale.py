@@ -7,10 +7,10 @@ import pytest
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.evidence.inference_problem import set_up
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.search.search import fit_nothing
-from frf_ipz.diagnosis.search.set_up import set_up
+from frf_ipz.diagnosis.search.component_search import fit_nothing
 from frf_ipz.fe.changes import with_point_masses
 
 FEW = DiagnoseOptions(effects=("added_mass", "local_stiffness"))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from frf_ipz.diagnosis.judging.verdict import Goodness, Limits
+from frf_ipz.diagnosis.verdict.goodness import Goodness, Limits
 
 
 @pytest.mark.parametrize("worst", ["misfit", "pull", "worst_piece", "farthest", "detuned"])

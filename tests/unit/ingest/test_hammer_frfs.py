@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.observations import observe
 from frf_ipz.dofs import parse_dof
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs

@@ -2,7 +2,7 @@
 
 import pytest
 
-from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.observations import observe
 from frf_ipz.errors import FileFormatError
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test

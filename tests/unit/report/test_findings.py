@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.diagnosis import Ambiguity
+from frf_ipz.diagnosis.result import Ambiguity
 from frf_ipz.pipeline.summary import diagnosis_lines
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.findings import marked_nodes, mismatch_nodes, plain_signs, said_in_short, verdict_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.misplacements import misplacements
+from frf_ipz.diagnosis.position_uncertainty import misplacements
 from frf_ipz.updating.position_uncertainty import PositionUncertainty, with_position_uncertainty
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model

@@ -6,7 +6,7 @@ report) follows from that. A class in a user's own file does the same::
 
     # my_effects.py, named in pipeline.toml: [diagnose] extra_effects = ["my_effects.py:Sloshing"]
     from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Signature, at_nodes
-    from frf_ipz.diagnosis.physics.change import Attachment, Change
+    from frf_ipz.diagnosis.model.change import Attachment, Change
 
     class Sloshing(Effect):
         name = "sloshing"
@@ -31,8 +31,8 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-    from frf_ipz.diagnosis.finding import Estimate
-    from frf_ipz.diagnosis.physics.change import Change
+    from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.diagnosis.result import Estimate
 
 Builder = Callable[[FloatArray], "Change"]
 """From the values of the parameters to what is changed."""

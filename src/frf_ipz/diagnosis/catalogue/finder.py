@@ -1,22 +1,86 @@
-"""Finds effects: the modules of the catalogue, and classes in users' own files; force laws have their own finder."""
+"""Finds the effects of the catalogue, and classes of effects and force laws in users' own files."""
 
 from __future__ import annotations
 
+import inspect
 import pkgutil
-from importlib import import_module
-from typing import TYPE_CHECKING
+from importlib import import_module, util
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.diagnosis import catalogue
-from frf_ipz.diagnosis.catalogue.class_finder import classes_in, read_class
 from frf_ipz.diagnosis.catalogue.effect import Effect
-from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
-from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from types import ModuleType
 
-    from frf_ipz.diagnosis.options import DiagnoseOptions
+WHERE = "[diagnose] extra_effects"
+
+
+def read_class(reference: str, folder: Path, kinds: tuple[type, ...]) -> type:
+    """Read a class from a user's file.
+
+    Parameters
+    ----------
+    reference : str
+        ``file.py:ClassName``.
+    folder : Path
+        Where paths start.
+    kinds : tuple of type
+        What it must derive from one of.
+
+    Returns
+    -------
+    type
+        Not abstract.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be loaded, or has no such class.
+    """
+    file_name, _, class_name = reference.rpartition(":")
+    path = folder / file_name
+    if not file_name or not class_name:
+        raise InputError(f"{WHERE}: '{reference}' is not understood; write it as 'file.py:ClassName'")
+    if not path.is_file():
+        raise InputError(f"{WHERE}: there is no file {path}; paths are relative to the pipeline file")
+    found: dict[str, type] = {item.__name__: item for item in classes_in(_load(path), kinds)}
+    if class_name not in found:
+        raise InputError(f"{WHERE}: {path} has no effect '{class_name}'; {did_you_mean(class_name, found)}")
+    return found[class_name]
+
+
+def classes_in(module: ModuleType, kinds: type | tuple[type, ...]) -> list[Any]:
+    """List the classes of some kinds that a module itself defines.
+
+    Parameters
+    ----------
+    module : module
+        Shipped, or a user's.
+    kinds : type or tuple of type
+        What they must derive from one of.
+
+    Returns
+    -------
+    list of type
+        Not abstract, by name.
+    """
+    classes = [item for _, item in inspect.getmembers(module, inspect.isclass) if item.__module__ == module.__name__]
+    return [item for item in classes if issubclass(item, kinds) and not inspect.isabstract(item)]
+
+
+def _load(path: Path) -> ModuleType:
+    spec = util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{WHERE}: {path} is no Python file")
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file may raise
+        raise InputError(f"{WHERE}: {path} cannot be loaded: {type(error).__name__}: {error}") from error
+    return module
 
 
 def shipped_effects() -> dict[str, Effect]:
@@ -32,36 +96,3 @@ def shipped_effects() -> dict[str, Effect]:
         if not folder.ispkg:
             found |= {item.name: item() for item in classes_in(import_module(folder.name), Effect)}
     return found
-
-
-def chosen_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
-    """Find the effects that are to be looked for, without force laws.
-
-    Parameters
-    ----------
-    options : DiagnoseOptions
-        Which ones.
-    folder : Path
-        Where paths of users' files start.
-
-    Returns
-    -------
-    dict of str to Effect
-        By name, those of the contract first.
-
-    Raises
-    ------
-    InputError
-        If an effect or a file is not known, or a class in it is no effect.
-    """
-    shipped = shipped_effects()
-    known = (*shipped, *shipped_laws())
-    for name in options.effects:
-        if name not in known:
-            raise InputError(f"[diagnose] effects names '{name}', which is no effect; {did_you_mean(name, known)}")
-    chosen = {name: effect for name, effect in shipped.items() if not options.effects or name in options.effects}
-    for reference in options.extra_effects:
-        found = read_class(reference, folder, (Effect, Law))
-        if issubclass(found, Effect):
-            chosen[found.name] = found()
-    return chosen

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Place
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-    from frf_ipz.diagnosis.physics.change import Change
+    from frf_ipz.diagnosis.model.change import Change
 
 
 def build_together(specimen: ModelContext, effects: Sequence[tuple[Effect, Place]]) -> tuple[Builder, ...]:

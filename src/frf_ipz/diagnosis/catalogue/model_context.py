@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.model.layout import Layout, extents
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.physics.layout import Layout, extents
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.physics.basis import Basis
+    from frf_ipz.diagnosis.model.basis import Basis
     from frf_ipz.structure import StructuralModel
 
 NEAREST = 8  # nodes that count as neighbours where nodes are not in a row

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import Estimate, Finding, doubt_of_place
+from frf_ipz.diagnosis.result import Estimate, Finding, doubt_of_place
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

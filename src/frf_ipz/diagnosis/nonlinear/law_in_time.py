@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import LawInTime
 from frf_ipz.diagnosis.nonlinear.recorded.segments import starts_at_rest
 from frf_ipz.diagnosis.nonlinear.simulate import simulate
+from frf_ipz.diagnosis.result import LawInTime
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress

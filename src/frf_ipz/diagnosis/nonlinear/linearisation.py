@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import Linearised
+from frf_ipz.diagnosis.result import Linearised
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
 if TYPE_CHECKING:

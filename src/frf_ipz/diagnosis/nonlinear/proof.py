@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.diagnosis import Misfit
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
 from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
+from frf_ipz.diagnosis.result import Misfit
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

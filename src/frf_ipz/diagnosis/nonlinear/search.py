@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import doubt_of_place
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import excess_delay_s
 from frf_ipz.diagnosis.nonlinear.findings import findings_of, gain_of, is_told
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH, find_candidates, is_explained
@@ -41,12 +40,11 @@ from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import agreement_with
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
+from frf_ipz.diagnosis.result import doubt_of_place
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.diagnosis import LawInTime, Misfit
-    from frf_ipz.diagnosis.finding import Finding
     from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
     from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
@@ -55,6 +53,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.diagnosis.options import DiagnoseOptions
+    from frf_ipz.diagnosis.result import Finding, LawInTime, Misfit
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from frf_ipz.diagnosis.search.fit import Fit
-from frf_ipz.diagnosis.search.global_scan.grid_scan import best_start, causes_of
-from frf_ipz.diagnosis.search.global_scan.refine import refine
-from frf_ipz.diagnosis.search.global_scan.starts import REFINED_ERROR
-from frf_ipz.diagnosis.search.inference_problem import InferenceProblem, weights_of
-from frf_ipz.diagnosis.search.map_fit import polish
+from frf_ipz.diagnosis.evidence.fit import Fit
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, weights_of
+from frf_ipz.diagnosis.evidence.map_fit import polish
+from frf_ipz.diagnosis.search.global_scan import best_start, causes_of
+from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR, refine
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect, Place
-    from frf_ipz.diagnosis.search.hypothesis import Cause, Hypothesis
+    from frf_ipz.diagnosis.evidence.hypothesis import Cause, Hypothesis
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
 """Fits by the key of their last cause."""

@@ -16,7 +16,7 @@ from frf_ipz.pipeline.stages.mismatch import corrections
 from frf_ipz.rational import without_window
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pipeline.stage_runner import StageRunner

@@ -8,10 +8,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
-from frf_ipz.diagnosis.catalogue.finder import chosen_effects
 from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
+from frf_ipz.diagnosis.effect_selection import chosen_effects
 from frf_ipz.diagnosis.measured.levels import compare_levels
-from frf_ipz.diagnosis.observed import observe
+from frf_ipz.diagnosis.observations import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.frf import FrfSet
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
     from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.progress import Progress

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray
-from frf_ipz.diagnosis.misplacements import misplacements
 from frf_ipz.diagnosis.parameters import diagnosed_basis
+from frf_ipz.diagnosis.position_uncertainty import misplacements
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
@@ -25,7 +25,7 @@ from frf_ipz.updating.update import update_model
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs

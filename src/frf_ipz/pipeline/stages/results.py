@@ -21,7 +21,7 @@ from frf_ipz.report.page import write_report
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.diagnosis.diagnosis import Diagnosis
+    from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import Dof
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 
 from diagnosed import lumped
 from frf_ipz.diagnosis.apply import apply_to_model
-from frf_ipz.diagnosis.diagnosis import Diagnosis, Linearised, Misfit
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import Place
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
+from frf_ipz.diagnosis.result import Diagnosis, Linearised, Misfit
 from frf_ipz.dofs import Dof
 from frf_ipz.runs.codec import load_result, save_result
 

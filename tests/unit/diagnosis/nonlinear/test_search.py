@@ -6,8 +6,6 @@ import pytest
 
 from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.judging import law_and_linear as law_beside
-from frf_ipz.diagnosis.judging.law_and_linear import STRAINED
 from frf_ipz.diagnosis.nonlinear.findings import is_told
 from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
@@ -15,6 +13,8 @@ from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate, subtract_law
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
+from frf_ipz.diagnosis.verdict.law_and_linear import STRAINED
 
 CASES = {
     "cubic_stiffness": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}, {"cubic_N_m3": 2e10}),

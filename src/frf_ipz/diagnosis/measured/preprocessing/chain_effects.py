@@ -12,8 +12,8 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
+    from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
-    from frf_ipz.diagnosis.physics.change import Change
 
 LEAST_SHOWN = 0.05  # of what a channel shows at other frequencies: what it shows less of is left as it is
 

@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.class_finder import classes_in, read_class
 from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.catalogue.finder import classes_in, read_class
 from frf_ipz.diagnosis.nonlinear import laws
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.model.nuisance import UNIFORM
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import (
     ModalModel,
     ModalResponse,
@@ -21,7 +22,6 @@ from frf_ipz.diagnosis.nonlinear.linear.modal_model import (
     respond,
 )
 from frf_ipz.diagnosis.nonlinear.recorded.segments import decayed
-from frf_ipz.diagnosis.physics.nuisance import UNIFORM
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet

@@ -12,7 +12,7 @@ from frf_ipz.report.wording import number, percent
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.diagnosis import LawInTime
+    from frf_ipz.diagnosis.result import LawInTime
 
 PERIODS = 12.0  # of the strongest line: what is seen before one zooms out
 MOST_POINTS = 4000  # of the force

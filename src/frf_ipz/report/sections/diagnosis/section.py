@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.finding import Estimate
+from frf_ipz.diagnosis.result import Estimate
 from frf_ipz.report.findings import place_of_mismatch, plain_signs, verdict_of
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
 from frf_ipz.report.section import Block, Section
@@ -18,8 +18,7 @@ from frf_ipz.report.wording import counted, number, percent, with_error
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frf_ipz.diagnosis.diagnosis import Curves, Diagnosis
-    from frf_ipz.diagnosis.finding import Finding
+    from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding
     from frf_ipz.report.contents import RunContents
 
 MOST_ALTERNATIVES = 15

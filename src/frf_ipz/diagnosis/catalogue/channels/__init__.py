@@ -1,1 +1,0 @@
-"""Effects: the measuring chain."""

@@ -1,1 +1,0 @@
-"""Effects: how motion is lost."""

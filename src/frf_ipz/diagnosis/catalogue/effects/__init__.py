@@ -1,0 +1,1 @@
+"""The effects that a nominal model may lack, each a module."""

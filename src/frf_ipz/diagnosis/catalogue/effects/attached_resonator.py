@@ -1,0 +1,128 @@
+"""Something that hangs on the structure and swings by itself: a cable, a loose part, an absorber."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.model.change import Attachment, Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
+LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, a damper or a mass
+RATIOS = 1e-3, 0.5
+USUAL_RATIO, WITHIN = 0.05, 1.7  # the most of what swings by itself, and the factor by which it may be more
+FREQUENCY_STEP = 1.06
+TRIED_RATIOS = (0.01, 0.06)
+MOST_RATIO = 0.2  # with more, what fits is a resonator in name only
+
+
+class AttachedResonator(Effect):
+    """A mass on a spring and a damper at a node."""
+
+    name = "attached_resonator"
+    imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
+    has_dynamics = True
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Every node that moves."""
+        return at_nodes(specimen)
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Mass, frequency, damping ratio."""
+        del place
+        low, high = specimen.band_hz
+        return (
+            Parameter(name="mass_kg", low=SMALLEST * specimen.mass_kg, high=LARGEST * specimen.mass_kg),
+            Parameter(name="frequency_hz", low=LOWEST * low, high=HIGHEST * high),
+            Parameter(name="damping_ratio", low=RATIOS[0], high=RATIOS[1]),
+        )
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Attach its dynamic stiffness."""
+        motion = _motion(specimen, place)[:, None]
+
+        def change(values: np.ndarray) -> Change:
+            mass, frequency_hz, ratio = values
+            omega = 2 * np.pi * frequency_hz
+            own, across = np.diag([0.0, mass]), np.array([[1.0, -1.0], [-1.0, 1.0]])
+            attachment = Attachment(
+                motions=motion,
+                stiffness=lambda s: mass * dynamic_mass(s, frequency_hz, ratio),
+                matrices=(own, 2 * ratio * omega * mass * across, omega**2 * mass * across),
+            )
+            return Change(attachments=(attachment,))
+
+        return change
+
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+        """All frequencies and some damping ratios."""
+        low, high = specimen.band_hz
+        count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
+        pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), TRIED_RATIOS))
+        return Signature(
+            motion=_motion(specimen, place),
+            shapes=np.array([dynamic_mass(specimen.contour, frequency, ratio) for frequency, ratio in pairs]),
+            values=np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
+            amplitudes=np.geomspace(3e-4, 0.3, 9) * specimen.mass_kg,
+        )
+
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+        """Nodes beside."""
+        return beside_node(specimen, place)
+
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+        """Expect what swings by itself to be little damped: with much damping it is a damper with a mass behind it."""
+        del specimen, place
+        beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
+        return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
+
+    def doubt(self, values: FloatArray) -> str:
+        """Doubt one that hardly swings: it can bend to what many other losses do."""
+        _, frequency_hz, ratio = values
+        if ratio <= MOST_RATIO:
+            return ""
+        return (
+            f"what looks like a resonator of {frequency_hz:.4g} Hz has a damping ratio of {100 * ratio:.2g} %, far "
+            "more than what swings by itself: it rather is another way to lose energy"
+        )
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say what swings where."""
+        return (
+            f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at {specimen.where(int(str(place.key[0])))} and "
+            f"swings by itself at {values['frequency_hz'].value:.4g} Hz with a damping ratio of "
+            f"{100 * values['damping_ratio'].value:.2g} %."
+        )
+
+
+def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexArray:
+    """Dynamic stiffness of a resonator of unit mass: s^2 (k + c s) / (k + c s + s^2).
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    frequency_hz, ratio : float
+        Of the resonator, with its foot held.
+
+    Returns
+    -------
+    (n_points,) complex array
+        N/m per kg.
+    """
+    omega = 2 * np.pi * frequency_hz
+    spring = omega**2 + 2 * ratio * omega * s
+    return np.asarray(s**2 * spring / (s**2 + spring))
+
+
+def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
+    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))

@@ -1,0 +1,87 @@
+"""An axial force in a beam: tension or compression between its supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.fe.beam_models import geometric_stiffness
+from frf_ipz.fe.kinds.beam import BeamFile
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+NEARLY_BUCKLED, STRONGEST = 0.97, 10.0  # of the buckling load: compression and tension
+TRIED = np.array([0.01, 0.03, 0.1, 0.25, 0.5, 0.8])
+
+
+class AxialLoad(Effect):
+    """An axial force that is the same all along."""
+
+    name = "axial_load"
+    imitators = ("grounded_spring", "global_stiffness", "boundary_compliance", "shear_rotary_inertia")
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Return a beam that is held at both ends."""
+        source = specimen.model.source
+        applies = isinstance(source, BeamFile) and "free" not in (source.beam.left, source.beam.right)
+        return [Place(key=())] if applies else []
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Force, from near buckling to strong tension."""
+        del place
+        load = buckling_load(specimen)
+        return (Parameter(name="force_N", low=-NEARLY_BUCKLED * load, high=STRONGEST * load, is_log=False),)
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Add geometric stiffness."""
+        del place
+        unit = geometric_stiffness(specimen.model)
+        return lambda values: Change(stiffness=values[0] * unit)
+
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+        """Both signs, from weak to strong."""
+        del place
+        load = buckling_load(specimen)
+        return load * np.concatenate([-TRIED, TRIED, [1.2, 2.0, 3.5, 6.0]])[:, None]
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how strong."""
+        del specimen, place
+        force = values["force_N"]
+        kind = "tension" if force.value > 0 else "compression"
+        return (
+            f"The beam carries an axial {kind} of {abs(force.value):.4g} N (+- {force.std:.2g}) that the model lacks."
+        )
+
+
+@lru_cache(maxsize=2)  # a search asks for it with every hypothesis
+def buckling_load(specimen: ModelContext) -> float:
+    """Find the axial compression at which the beam buckles.
+
+    Parameters
+    ----------
+    specimen : ModelContext
+        A beam.
+
+    Returns
+    -------
+    float
+        N; of one that has rigid-body modes, of its first bending.
+    """
+    shapes = specimen.basis.modes.shapes
+    everywhere = np.zeros((len(specimen.model.all_dofs), min(shapes.shape[1], 20)))
+    everywhere[~specimen.model.fixed] = shapes[:, : everywhere.shape[1]]
+    elastic = specimen.basis.modes.eigenvalues[: everywhere.shape[1]] > 0
+    everywhere = everywhere[:, elastic]
+    squares = specimen.basis.modes.eigenvalues[: len(elastic)][elastic]
+    loaded = everywhere.T @ (geometric_stiffness(specimen.model) @ everywhere)
+    return float(1 / linalg.eigh(np.asarray(loaded), np.diag(squares), eigvals_only=True)[-1])

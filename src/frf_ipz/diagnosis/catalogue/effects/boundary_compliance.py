@@ -1,0 +1,97 @@
+"""A held end of a beam that gives way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, grid
+from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.kinds.beam import BeamFile
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+ROTATION, TRANSLATION = "rotational_stiffness_Nm_rad", "translational_stiffness_N_m"
+HELD = {"clamped": ("ry", "z"), "pinned": ("z",), "sliding": ("ry",), "free": ()}
+BOUNDS = {"ry": (0.05, 3e4), "z": (0.5, 1e7)}  # over EI/L and EI/L^3
+NAMES = {"ry": ROTATION, "z": TRANSLATION}
+ONE_ALONE, OF_TWO = 14, 7  # values to start from along each stiffness
+
+
+class BoundaryCompliance(Effect):
+    """The held motion of an end is held by a spring instead."""
+
+    name = "boundary_compliance"
+    imitators = ("local_stiffness", "added_mass", "axial_load")
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Each held end of a beam: its rotation, its translation, or both."""
+        source = specimen.model.source
+        if not isinstance(source, BeamFile):
+            return []
+        found = []
+        for end, node in (("left", 1), ("right", source.beam.elements + 1)):
+            held = HELD[getattr(source.beam, end)]
+            ways = [held] if len(held) < 2 else [(held[0],), (held[1],), held]
+            found += [Place(key=(end, way), location={"end": end, "nodes": [node]}) for way in ways if way]
+        return found
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Stiffness of each spring."""
+        stiffness, length = _bending(specimen)
+        scale = {"ry": stiffness / length, "z": stiffness / length**3}
+        return tuple(
+            Parameter(
+                name=NAMES[way], low=BOUNDS[way][0] * scale[way], high=BOUNDS[way][1] * scale[way], neutral=np.inf
+            )
+            for way in _ways(place)
+        )
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Release the held DOFs and put springs there."""
+        model = specimen.model
+        node = model.source.beam.elements + 1 if place.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
+        released = tuple(model.place(Dof(node, way)) for way in _ways(place))
+        size = len(model.all_dofs)
+
+        def change(values: FloatArray) -> Change:
+            springs = sparse.csr_array((values, (released, released)), shape=(size, size))
+            return Change(released=released, stiffness=springs)
+
+        return change
+
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+        """Spread a grid, finer where there is one spring."""
+        parameters = self.parameters(specimen, place)
+        return grid(parameters, ONE_ALONE if len(parameters) == 1 else OF_TWO)
+
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+        """Give the other ways in which that end may give way."""
+        return [other for other in self.places(specimen) if other.key[0] == place.key[0] and other.key != place.key]
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say which end gives way, and how much."""
+        del specimen
+        texts = {ROTATION: "{:.4g} N m/rad in rotation", TRANSLATION: "{:.4g} N/m in translation"}
+        springs = " and ".join(texts[name].format(value.value) for name, value in values.items())
+        return f"The {place.key[0]} end is not rigidly held: its support has a stiffness of {springs}."
+
+
+def _ways(place: Place) -> tuple[str, ...]:
+    ways = place.key[1]
+    return ways if isinstance(ways, tuple) else ()
+
+
+def _bending(specimen: ModelContext) -> tuple[float, float]:
+    source = specimen.model.source
+    if not isinstance(source, BeamFile):
+        raise TypeError("only a beam has ends")
+    beam = source.beam
+    return beam.youngs_modulus_Pa * beam.width_m * beam.thickness_m**3 / 12, beam.length_m

@@ -1,0 +1,122 @@
+"""A spring between two nodes that the model lacks: a strut, a cable, parts that touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature
+from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
+from frf_ipz.diagnosis.model.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
+MOST_IN_A_ROW, MOST_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
+FURTHEST = 3  # nodes in a row around each end
+NEXT_TO = 2  # nodes in a row that count as one place: what joins them is the structure itself
+
+
+class CouplingSpring(Effect):
+    """A spring between two nodes."""
+
+    name = "coupling_spring"
+    imitators = ("grounded_spring", "local_stiffness", "axial_load")
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """All pairs of nodes that are apart and not joined by a spring already."""
+        dofs = specimen.moving_dofs
+        return [
+            _place(first.node, second.node, first.direction)
+            for first, second in combinations(dofs[:: _stride(specimen)], 2)
+            if first.direction == second.direction and _is_new(specimen, first.node, second.node)
+        ]
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Stiffness."""
+        own = specimen.stiffness_against(_motion(specimen, place))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Add it to the matrix."""
+        motion = sparse.csr_array(_motion(specimen, place)[:, None])
+        unit = sparse.csr_array(motion @ motion.T)
+        floats = is_floating(place)
+        return lambda values: Change(stiffness=values[0] * unit, floating=floats)
+
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+        """Share what a pair is worth among those that stand behind it where not all are listed."""
+        del place, values
+        return -2 * float(np.log(_stride(specimen)))
+
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+        """Draw a constant."""
+        return Signature(
+            motion=_motion(specimen, place),
+            shapes=np.ones((1, len(specimen.contour)), complex),
+            values=np.ones((1, 1)),
+        )
+
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+        """One of the ends at a node beside; in a row also both, for what one end loses the other makes up."""
+        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
+        pairs = [(near, second) for near in specimen.nodes_near(first, direction)]
+        pairs += [(first, near) for near in specimen.nodes_near(second, direction)]
+        if specimen.model.kind in ("beam", "lumped"):
+            nodes = {dof.node for dof in specimen.moving_dofs if dof.direction == direction}
+            both = [(first + step, second + other) for step, other in product((-1, 1), repeat=2)]
+            pairs += [pair for pair in both if nodes.issuperset(pair)]
+        found = _places(specimen, place, pairs)
+        return [*found, *([floating(place)] if specimen.basis.modes.n_rigid and not is_floating(place) else [])]
+
+    def around(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+        """Both ends at any nodes near: along a line of such pairs, each is nearly as good as the next."""
+        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
+        near, far = ([node, *specimen.nodes_near(node, direction, FURTHEST)] for node in (first, second))
+        return _places(specimen, place, [pair for pair in product(near, far) if pair != (first, second)])
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how stiff, and between what."""
+        stiffness = values["stiffness_N_m"]
+        first, second = (specimen.where(int(str(node))) for node in place.key[:2])
+        return (
+            f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
+            "the model lacks it."
+        )
+
+
+def _stride(specimen: ModelContext) -> int:
+    """One of how many nodes is listed."""
+    most = MOST_IN_A_ROW if specimen.model.kind == "beam" else MOST_NODES
+    return -(-len(specimen.moving_dofs) // most)
+
+
+def _place(first: int, second: int, direction: str) -> Place:
+    low, high = sorted((first, second))
+    return Place(key=(low, high, direction), location={"nodes": [low, high]})
+
+
+def _places(specimen: ModelContext, like: Place, pairs: Sequence[tuple[int, int]]) -> list[Place]:
+    """Make places of pairs of nodes, hanging or not as another."""
+    found = [_place(a, b, str(like.key[2])) for a, b in pairs if a != b and _is_new(specimen, a, b)]
+    return [floating(other) for other in found] if is_floating(like) else found
+
+
+def _is_new(specimen: ModelContext, first: int, second: int) -> bool:
+    model = specimen.model
+    if model.kind == "beam":
+        return abs(first - second) > NEXT_TO
+    return not any(part.kind == "spring" and {first, second} == set(part.nodes) for part in model.parts)
+
+
+def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
+    first, second, direction = place.key[:3]
+    ends = {dof.node: dof for dof in specimen.moving_dofs if dof.direction == direction}
+    return specimen.unit(ends[int(str(second))]) - specimen.unit(ends[int(str(first))])

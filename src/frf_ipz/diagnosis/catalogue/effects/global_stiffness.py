@@ -1,0 +1,58 @@
+"""Another stiffness of the whole structure: a wrong Young's modulus, for one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.model.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+BOUNDS = 0.2, 5.0
+TRIED = np.array([1.005, 1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2])
+
+
+class GlobalStiffness(Effect):
+    """All stiffness times a ratio."""
+
+    name = "global_stiffness"
+    imitators = ("viscoelastic_joint", "axial_load", "shear_rotary_inertia")
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Everywhere."""
+        del specimen
+        return [Place(key=())]
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Real stiffness over the model's."""
+        del place
+        tolerance = specimen.options.stiffness_tolerance
+        return (Parameter(name="stiffness_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=1.0, tolerance=tolerance),)
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Scale the matrix."""
+        del place
+        whole = specimen.model.stiffness_all
+        return lambda values: Change(stiffness=(values[0] - 1) * whole)
+
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+        """Softer and stiffer, by little and by much."""
+        del specimen, place
+        return np.concatenate([TRIED, 1 / TRIED])[:, None]
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say by how much."""
+        del specimen, place
+        ratio = values["stiffness_ratio"]
+        how = "stiffer" if ratio.value > 1 else "softer"
+        return (
+            f"The whole structure is {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} than the "
+            "model: a wrong Young's modulus, thickness or length."
+        )

@@ -1,0 +1,72 @@
+"""Loss within the material: a loss factor of the whole stiffness.
+
+K (1 + i eta) is what the loss factor means, but answers before it is asked, which no structure does: a constant loss
+factor makes the stiffness rise with frequency (Kjartansson 1979), from the model's in the middle of the band, or for
+each mode from the model's at its own frequency. Many simulations put eta / 2 to the damping ratio of each mode instead:
+the same at resonances. All four are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.model.change import Change
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+BOUNDS = 1e-5, 1.0
+CAUSAL, KEEPING_MODES, OF_MODES = "causal", "causal, mode by mode", "of modes"
+LESS_LIKELY = -3.0  # nats: less than what tells explanations apart, more than what priors of two numbers differ by
+TRIED = np.geomspace(2e-4, 0.5, 16)
+
+
+class StructuralDamping(Effect):
+    """K (1 + i eta) besides the modal damping."""
+
+    name = "structural_damping"
+    imitators = ("damping_level", "viscoelastic_joint", "local_damper")
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Everywhere, in four forms."""
+        del specimen
+        return [Place(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Loss factor."""
+        del specimen, place
+        return (Parameter(name="loss_factor", low=BOUNDS[0], high=BOUNDS[1]),)
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Give it to the stiffness, or half of it to the ratio of each mode."""
+        if place.key == (OF_MODES,):
+            return lambda values: Change(added_ratio=float(values[0]) / 2)
+        if place.key == (KEEPING_MODES,):
+            return lambda values: Change(loss_factor=float(values[0]), keeps_modes=True)
+        middle = 2 * np.pi * float(np.sqrt(specimen.band_hz[0] * specimen.band_hz[1])) if place.key else 0.0
+        return lambda values: Change(loss_factor=float(values[0]), reference_rad_s=middle)
+
+    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+        """From little to much."""
+        del specimen, place
+        return TRIED[:, None]
+
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+        """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""
+        del specimen, values
+        return LESS_LIKELY if place.key == (OF_MODES,) else 0.0
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how much."""
+        del specimen, place
+        loss = values["loss_factor"]
+        return (
+            f"The material loses energy by itself: a loss factor of {loss.value:.3g} (+- {loss.std:.2g}) of the whole "
+            "stiffness, besides the model's damping."
+        )

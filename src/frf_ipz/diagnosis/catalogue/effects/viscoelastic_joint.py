@@ -1,0 +1,164 @@
+"""A joint that relaxes: stiff when it is moved fast, soft when it is moved slowly, and lossy between."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.model.change import Attachment, Change
+from frf_ipz.dofs import Dof
+from frf_ipz.fe.kinds.beam import BeamFile
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.result import Estimate
+
+SOFTEST, STIFFEST = 1e-5, 1e2  # of the structure's own stiffness there
+SLOWEST, FASTEST = 0.15, 6.0  # relaxation rate over the edges of the band: beyond, it is a spring or a damper
+N_TIMES = 9
+LIGHT = 30.0  # frequency of the point between spring and damper over the band's upper edge: its mass is felt by nobody
+
+
+class ViscoelasticJoint(Effect):
+    """A spring and a damper in series, beside the model: at a node, across a spring, at a pinned end."""
+
+    name = "viscoelastic_joint"
+    imitators = ("local_damper", "grounded_spring", "attached_resonator", "global_stiffness")
+    has_dynamics = True
+
+    def places(self, specimen: ModelContext) -> Sequence[Place]:
+        """Every node that moves, every spring, the rotation of every pinned end."""
+        found = [Place(key=("node", *place.key), location=place.location) for place in at_nodes(specimen)]
+        springs = [part for part in specimen.model.parts if part.kind == "spring"]
+        to_ground = {node for part in springs if 0 in part.nodes for node in part.nodes}
+        found = [place for place in found if place.key[1] not in to_ground]
+        found += [Place(key=("spring", part.name), location={"springs": [part.name]}) for part in springs]
+        return found + _ends(specimen)
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Stiffness and relaxation time."""
+        own = specimen.stiffness_against(motion_at(specimen, place))
+        low, high = (2 * np.pi * edge for edge in specimen.band_hz)
+        name = "rotational_stiffness_Nm_rad" if place.key[0] == "end" else "stiffness_N_m"
+        return (
+            Parameter(name=name, low=SOFTEST * own, high=STIFFEST * own),
+            Parameter(name="relaxation_time_s", low=1 / (FASTEST * high), high=1 / (SLOWEST * low)),
+        )
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Attach its dynamic stiffness."""
+        motion = motion_at(specimen, place)[:, None]
+        light = 1 / (LIGHT * 2 * np.pi * specimen.band_hz[1]) ** 2
+
+        def change(values: FloatArray) -> Change:
+            stiffness, time = values
+            between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+            attachment = Attachment(
+                motions=motion,
+                stiffness=lambda s: stiffness * relaxing(s, time),
+                matrices=(
+                    np.diag([0.0, stiffness * light]),
+                    np.diag([0.0, stiffness * time]),
+                    stiffness * between,
+                ),
+            )
+            return Change(attachments=(attachment,))
+
+        return change
+
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+        """Draw some relaxation times."""
+        low, high = (2 * np.pi * edge for edge in specimen.band_hz)
+        times = np.geomspace(1 / (2 * high), 1 / (0.5 * low), N_TIMES)
+        return Signature(
+            motion=motion_at(specimen, place),
+            shapes=np.array([relaxing(specimen.contour, time) for time in times]),
+            values=np.stack([np.ones(N_TIMES), times], 1),
+        )
+
+    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+        """Nodes beside, and ends, which look like the nodes beside them; for others nothing."""
+        if place.key[0] != "node":
+            return []
+        inner = Place(key=place.key[1:], location=place.location)
+        beside = [Place(key=("node", *other.key), location=other.location) for other in beside_node(specimen, inner)]
+        return beside + _ends(specimen)
+
+    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+        """Joints sit at ends: one of them is as likely as one at any node between."""
+        del values
+        return float(np.log(len(at_nodes(specimen)) / len(_ends(specimen)))) if place.key[0] == "end" else 0.0
+
+    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+        """Say how stiff, how fast, where."""
+        where = {
+            "node": lambda: f"between {specimen.where(int(str(place.key[1])))} and the ground",
+            "spring": lambda: f"across the spring '{place.key[1]}'",
+            "end": lambda: f"at the {place.key[1]} end, against its rotation,",
+        }[str(place.key[0])]()
+        name, stiffness = next(iter(values.items()))
+        unit = "N m/rad" if name.startswith("rot") else "N/m"
+        return (
+            f"A joint {where} relaxes: {stiffness.value:.4g} {unit} when moved fast, nothing when moved slowly, with a "
+            f"relaxation time of {1e3 * values['relaxation_time_s'].value:.3g} ms."
+        )
+
+
+def relaxing(s: ComplexArray, time_s: float) -> ComplexArray:
+    """Dynamic stiffness of a Maxwell element of unit stiffness, s tau / (1 + s tau).
+
+    Parameters
+    ----------
+    s : (n_points,) complex array
+        rad/s.
+    time_s : float
+        Relaxation time, s.
+
+    Returns
+    -------
+    (n_points,) complex array
+        1.
+    """
+    return np.asarray(s * time_s / (1 + s * time_s))
+
+
+def _ends(specimen: ModelContext) -> list[Place]:
+    """Pinned ends of a beam."""
+    source = specimen.model.source
+    if not isinstance(source, BeamFile):
+        return []
+    return [
+        Place(key=("end", end, node), location={"end": end, "nodes": [node]})
+        for end, node in (("left", 1), ("right", source.beam.elements + 1))
+        if getattr(source.beam, end) == "pinned"
+    ]
+
+
+def motion_at(specimen: ModelContext, place: Place) -> FloatArray:
+    """Weights of all DOFs in what a joint sees.
+
+    Parameters
+    ----------
+    specimen : ModelContext
+        What is tested.
+    place : Place
+        A node, a spring, or a pinned end.
+
+    Returns
+    -------
+    (n_all,) array
+        The motion of a node, the stretch of a spring, the rotation of an end.
+    """
+    kind = place.key[0]
+    if kind == "node":
+        return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key[1:]))
+    if kind == "end":
+        return specimen.unit(Dof(int(str(place.key[2])), "ry"))
+    part = next(part for part in specimen.model.parts if part.kind == "spring" and part.name == place.key[1])
+    motion = np.zeros(len(specimen.model.all_dofs))
+    motion[part.indices] = (-1.0, 1.0)
+    return motion

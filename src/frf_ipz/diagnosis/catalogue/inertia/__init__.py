@@ -1,1 +1,0 @@
-"""Effects: masses and resonators, shear and rotary inertia."""

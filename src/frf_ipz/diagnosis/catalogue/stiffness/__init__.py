@@ -1,1 +1,0 @@
-"""Effects: elastic parts that are softer or stiffer, or relax."""

@@ -1,1 +1,0 @@
-"""Effects: held ends, springs to ground and between nodes, axial force."""

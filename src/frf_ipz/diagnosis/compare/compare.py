@@ -1,0 +1,138 @@
+"""Compares states of a machine: the corrected model of the states before is the nominal one of the state after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.compare import mass_loss
+from frf_ipz.diagnosis.compare.learnt_nuisance import error_of_change, learn, nominal_after
+from frf_ipz.diagnosis.compare.states import CompareOptions, State
+from frf_ipz.diagnosis.compare.unexplained_change import trusted
+from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.measured.data_split import split_data
+from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.result import Diagnosis
+from frf_ipz.diagnosis.verdict.decision import CONSISTENT
+from frf_ipz.progress import silent
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.compare.learnt_nuisance import Learned
+    from frf_ipz.diagnosis.result import Finding
+    from frf_ipz.progress import Progress
+
+MASS_LOSS = f"{Path(mass_loss.__file__)}:MassLoss"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """What changed.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of the state after against what the states before lead one to expect.
+    expected : State
+        The state after as it was judged: its model if nothing had changed, and the measurement as far as it is trusted.
+    scatter : DiagnoseOptions
+        Tolerances within which nothing has changed: those stated, or what the states before show beyond them.
+    """
+
+    diagnosis: Diagnosis
+    expected: State
+    scatter: DiagnoseOptions
+
+    @property
+    def is_changed(self) -> bool:
+        """True where more differs than from test to test."""
+        return self.diagnosis.verdict != CONSISTENT
+
+    @property
+    def changes(self) -> tuple[Finding, ...]:
+        """What changed, the heaviest first; empty where nothing did, or nothing that has a name."""
+        return self.diagnosis.findings
+
+    @property
+    def statement(self) -> str:
+        """The result in a few sentences."""
+        if not self.is_changed:
+            return "Nothing has changed beyond what differs from test to test."
+        return self.diagnosis.statement
+
+
+def compare(
+    before: State | Sequence[State],
+    after: State,
+    options: CompareOptions | None = None,
+    *,
+    progress: Progress = silent,
+) -> Comparison:
+    """Find out what changed between two states of a machine, by how much and where, or that nothing did.
+
+    The model need not be right: what it is wrong by is learned from the states before. Three and more of them also
+    teach what differs from test to test. What the user knows to be different in the state after goes into its model.
+
+    Parameters
+    ----------
+    before : State or sequence of State
+        The machine as it should be, once or repeatedly.
+    after : State
+        The machine to be judged, measured with the same channels over the same band.
+    options : CompareOptions, optional
+        What the model may be wrong by, and what differs from test to test at least.
+    progress : Progress
+        Told how far it is.
+
+    Returns
+    -------
+    Comparison
+        What changed.
+
+    Raises
+    ------
+    InputError
+        If states do not show the same channels and modes, or a model lacks a DOF that was measured.
+    """
+    chosen = options or CompareOptions()
+    states = [before] if isinstance(before, State) else list(before)
+    progress(0.0, "learning from the states before")
+    return judge(learn(states, chosen), after, chosen, progress=progress)
+
+
+def judge(learned: Learned, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
+    """Judge a state by what the states before taught: for many states after the same ones.
+
+    Parameters
+    ----------
+    learned : Learned
+        From `learn`.
+    after : State
+        The machine to be judged.
+    options : CompareOptions
+        As for `learn`.
+    progress : Progress
+        Told how far it is.
+
+    Returns
+    -------
+    Comparison
+        What changed.
+    """
+    observed = trusted(after.observed, learned.gains, learned.missed)
+    source = split_data(observed)
+    nominal = replace(after, observed=observed)
+    expected = nominal_after(nominal, learned, options, source)
+    error = error_of_change(replace(nominal, model=expected), source, learned, options)
+    scatter = replace(
+        learned.scatter,
+        stiffness_tolerance=float(np.hypot(learned.scatter.stiffness_tolerance, error)),
+        frequency_tolerance=float(np.hypot(learned.scatter.frequency_tolerance, error)),
+        effects=options.effects,
+        extra_effects=(MASS_LOSS,),
+    )
+    found = diagnose(expected, observed, scatter, progress=progress)
+    return Comparison(diagnosis=found, expected=replace(nominal, model=expected), scatter=scatter)

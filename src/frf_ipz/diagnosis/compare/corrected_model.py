@@ -1,0 +1,72 @@
+"""A model as its measurement showed it: what was fitted within tolerances, put into the matrices.
+
+Errors of mass and stiffness act on the modes of the band. With their shapes Phi and with 1 + mu and Lambda + kappa for
+mass and stiffness there, ``M + (M Phi) mu (M Phi)^T`` and ``K + (M Phi) kappa (M Phi)^T`` have exactly the fitted
+modes, and every other mode as before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg, sparse
+
+from frf_ipz.fe.assembly import multiply
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.model.modes import Modes
+    from frf_ipz.structure import Matrix, StructuralModel
+
+LEAST_SQUARE = 0.01  # of the model's: a mode below the band is pulled wherever lines above it want, but stays stable
+
+
+def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
+    """Put what was fitted within tolerances into a model.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Nothing is missing: no causes.
+    unknown : (n_nuisance,) array
+        What was fitted, in standard deviations. Scatter of stiffness, mass and damping is used; places and gains
+        belong to the test, and cords to the way it was hung.
+
+    Returns
+    -------
+    StructuralModel
+        With the fitted modes; one below the band whose stiffness would be negative gets little of it.
+    """
+    values = unknown.copy()
+    sizes = hypothesis.nuisance.sizes
+    values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # cords
+    modes = hypothesis.modes(np.zeros(0), values)
+    model, m = hypothesis.specimen.model, hypothesis.nuisance.n_modes
+    plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)
+    momentum = multiply(model.mass_all, hypothesis.basis.vectors @ plain)
+    momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
+    back = linalg.inv(modes.rotation)
+    mass = back.T @ back - np.eye(m)
+    squares = np.maximum(modes.squares[:m], LEAST_SQUARE * modes.omega[:m] ** 2)
+    stiffness = back.T @ np.diag(squares) @ back - np.diag(modes.omega[:m] ** 2)
+    return replace(
+        model,
+        mass_all=_with(model.mass_all, momentum, mass),
+        stiffness_all=_with(model.stiffness_all, momentum, stiffness),
+        modal_damping=_damping(model, modes, hypothesis.nuisance.n_rigid, m),
+    )
+
+
+def _with(matrix: Matrix, momentum: FloatArray, block: FloatArray) -> Matrix:
+    added = momentum @ ((block + block.T) / 2) @ momentum.T
+    return sparse.csr_array(matrix + sparse.csr_array((added + added.T) / 2))
+
+
+def _damping(model: StructuralModel, modes: Modes, n_rigid: int, m: int) -> FloatArray:
+    """Fitted ratios of elastic modes; beyond them what the model states."""
+    if not model.modal_damping.size:
+        return model.modal_damping
+    return np.concatenate([modes.ratio[n_rigid:m], modes.stated_ratio[m : m + 1]])

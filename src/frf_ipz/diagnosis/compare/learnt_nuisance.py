@@ -1,0 +1,329 @@
+"""What the states before teach: how the model has to be corrected, and what differs although nothing has changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.diagnosis.compare.corrected_model import as_fitted
+from frf_ipz.diagnosis.compare.states import State
+from frf_ipz.diagnosis.compare.unexplained_change import Missed, missed_by, trusted
+from frf_ipz.diagnosis.evidence.inference_problem import set_up, with_errors
+from frf_ipz.diagnosis.evidence.map_fit import polish
+from frf_ipz.diagnosis.measured.data_split import DataSplit, split_data
+from frf_ipz.diagnosis.search.component_search import fit_nothing
+from frf_ipz.diagnosis.verdict.goodness import goodness
+from frf_ipz.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from frf_ipz.diagnosis.compare.states import CompareOptions
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.model.modes import Modes
+    from frf_ipz.diagnosis.options import DiagnoseOptions
+    from frf_ipz.structure import StructuralModel
+
+HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that
+ENOUGH_REPEATS = 3  # states: fewer tell nothing of scatter
+ENOUGH_STATES = 0.9  # of the states before that have to be explained by what was learned
+ENOUGH_FOR_MEDIANS = 10  # states
+NORMAL_OF_MEDIAN = 1.4826  # standard deviation over the median distance from the median
+COARSER = 4.0  # errors of fits to the states before, from try to try
+GROWTH = 1.6  # of the tolerance from try to try
+MOST_TOLERANCE = 0.3
+MOST_ERROR = 0.05  # tolerance of fits to the states before: what is larger is no matter of tolerances
+NEAR_A_PEAK = 3.0  # standard deviations of a frequency: so far from a peak of the measurement a mode may start
+MOST_START = 1.5  # standard deviations of a damping ratio
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Learned:
+    """What the states before teach.
+
+    Parameters
+    ----------
+    correction : (n_nuisance,) array
+        Of the model, in standard deviations of `options.model`; signs of modes are those at the first sensor.
+    gains : mapping of str to float
+        Of the channels, as factors.
+    scatter : DiagnoseOptions
+        Tolerances within which nothing has changed.
+    missed : Missed, optional
+        What the model cannot follow whatever is corrected; None where it follows all within `options.scatter`.
+    """
+
+    correction: FloatArray
+    gains: Mapping[str, float]
+    scatter: DiagnoseOptions
+    missed: Missed | None
+
+
+def learn(before: Sequence[State], options: CompareOptions) -> Learned:
+    """Fit the states before, and see how far apart they are.
+
+    Parameters
+    ----------
+    before : sequence of State
+        Healthy ones; with three and more their scatter is learned.
+    options : CompareOptions
+        What the model may be wrong by, and what differs from test to test at least.
+
+    Returns
+    -------
+    Learned
+        For `nominal_after`.
+
+    Raises
+    ------
+    InputError
+        If there is no state, or states do not show the same channels.
+    """
+    if not before:
+        raise InputError("there is no state before to compare with; give at least one")
+    sources = [split_data(state.observed) for state in before]
+    fits, errors = _fits(list(zip(before, sources, strict=True)), options)
+    if len({fit.hypothesis.specimen.layout.channels for fit in fits}) > 1:
+        raise InputError("the states to compare were measured with different channels; give FRFs of the same labels")
+    if len({len(fit.unknown) for fit in fits}) > 1:
+        raise InputError("the models of the states have different numbers of modes in the band; narrow the band")
+    corrections = np.array([fit.unknown * signs_of(fit) for fit in fits])
+    gains = np.array([fit.hypothesis.nuisance.unpack(fit.unknown).gains for fit in fits])
+    by_channel = dict(zip(fits[0].hypothesis.specimen.layout.channels, np.exp(np.median(gains, 0)), strict=True))
+    learned = Learned(
+        correction=np.median(corrections, 0),
+        gains=by_channel,
+        scatter=_scatter(fits, options.scatter),
+        missed=None if errors == options.scatter else missed_by([state.observed.frfs for state in before], fits),
+    )
+    return _widened(before, sources, learned, options)
+
+
+def _fits(before: Sequence[tuple[State, DataSplit]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
+    """Fit the models, as closely as nearly all of them can follow what was measured."""
+    errors = options.scatter
+    while True:
+        benches = [bench_of(state, source, options.model, errors) for state, source in before]
+        fits = [fit_from_peaks(bench, source) for bench, (_, source) in zip(benches, before, strict=True)]
+        good = [goodness(bench, fit).is_good for bench, fit in zip(benches, fits, strict=True)]
+        if np.mean(good) >= ENOUGH_STATES or errors.stiffness_tolerance > MOST_ERROR:
+            return fits, errors
+        errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
+
+
+def fit_from_peaks(bench: InferenceProblem, source: DataSplit) -> Fit:
+    """Fit the model from the frequencies and damping that peaks of the measurement show: a model may be far off.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        To fit the model.
+    source : DataSplit
+        What was measured.
+
+    Returns
+    -------
+    Fit
+        The better one of the fits from there and from the model as it is.
+    """
+    nothing, nuisance, peaks = bench.suppose(()), bench.nuisance, source.survey.resonances
+    modes = nothing.modes(np.zeros(0), np.zeros(nuisance.size))
+    start = np.zeros(nuisance.size)
+    for mode in range(nuisance.n_rigid, nuisance.n_modes):
+        apart = np.abs(np.log(peaks.omega_rad_s / modes.omega[mode]))
+        reach = NEAR_A_PEAK * nuisance.kappa_std[mode, mode] / 2
+        if apart.size and apart.min() < reach:
+            found = int(np.argmin(apart))
+            off = (peaks.omega_rad_s[found] / modes.omega[mode]) ** 2 - 1
+            start[nuisance.frequency_places[mode]] = off / nuisance.kappa_std[mode, mode]
+            ratio = peaks.decay_1_s[found] / peaks.omega_rad_s[found] / max(modes.stated_ratio[mode], 1e-9) - 1
+            damping = nuisance.damping_std[mode]
+            start[nuisance.damping_places[mode]] = np.clip(ratio / damping, -MOST_START, MOST_START)
+    fits = [polish(nothing, bench.data, np.zeros(0), unknown=start, iterations=30), fit_nothing(bench)]
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def bench_of(
+    state: State, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
+) -> InferenceProblem:
+    """Bring a state's model and measurement together, with no effects to look for.
+
+    Parameters
+    ----------
+    state : State
+        The state.
+    source : DataSplit
+        What was measured in it.
+    options : DiagnoseOptions
+        Tolerances.
+    errors : DiagnoseOptions, optional
+        Those that say how close to the measurement a fit has to come, where they are narrower.
+
+    Returns
+    -------
+    InferenceProblem
+        To fit the model.
+    """
+    frfs = state.observed.frfs
+    scale = "none" if frfs is None else frfs.unknown_scale
+    bench = set_up(state.model, source, state.observed.band_hz, options, {}, free_gains=scale)
+    if errors is None:
+        return bench
+    return replace(bench, data=with_errors(source.training, errors, free_gains=scale))
+
+
+def nominal_after(state: State, learned: Learned, options: CompareOptions, source: DataSplit) -> StructuralModel:
+    """Give the model that a state would show if nothing had changed.
+
+    Parameters
+    ----------
+    state : State
+        With a model of the same modes as the states before.
+    learned : Learned
+        From them.
+    options : CompareOptions
+        As for `learn`.
+    source : DataSplit
+        What was measured in the state.
+
+    Returns
+    -------
+    StructuralModel
+        Its model, corrected.
+    """
+    bench = bench_of(state, source, options.model)
+    nothing = bench.suppose(())
+    at_rest = np.zeros(bench.nuisance.size)
+    if len(at_rest) != len(learned.correction):
+        raise InputError("the state after has other channels or another number of modes in the band than those before")
+    signs = _signs(nothing.modes(np.zeros(0), at_rest), bench.nuisance.n_modes, nothing.nuisance.pairs, len(at_rest))
+    return as_fitted(nothing, learned.correction * signs)
+
+
+def error_of_change(corrected: State, source: DataSplit, learned: Learned, options: CompareOptions) -> float:
+    """Estimate how wrong the model's answer to a change may be: its corrections are those of the states before.
+
+    Parameters
+    ----------
+    corrected : State
+        The state after, with its corrected model.
+    source : DataSplit
+        What was measured in it.
+    learned : Learned
+        From the states before.
+    options : CompareOptions
+        As for `learn`.
+
+    Returns
+    -------
+    float
+        Largest relative change of a frequency in the band, times what the model may be wrong by.
+    """
+    fit = fit_from_peaks(bench_of(corrected, source, options.model, learned.scatter), source)
+    change = _shift(fit.hypothesis, fit.unknown)
+    return options.model.stiffness_tolerance * float(np.abs(change).max(initial=0.0))
+
+
+def _shift(hypothesis: Hypothesis, unknown: FloatArray) -> FloatArray:
+    """Relative change of the elastic frequencies in the band by what was fitted."""
+    nuisance = hypothesis.nuisance
+    modes = hypothesis.modes(np.zeros(0), unknown)
+    squares, omega = (values[nuisance.n_rigid : nuisance.n_modes] for values in (modes.squares, modes.omega))
+    inside = _in_band(hypothesis)
+    return np.asarray(np.sqrt(np.abs(squares[inside])) / omega[inside] - 1)
+
+
+def _in_band(hypothesis: Hypothesis) -> BoolArray:
+    """Tell which elastic modes lie in the band: nothing is known of others."""
+    nuisance = hypothesis.nuisance
+    modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance.size))
+    frequency = modes.omega[nuisance.n_rigid : nuisance.n_modes] / (2 * np.pi)
+    low, high = hypothesis.specimen.band_hz
+    return np.asarray((frequency > low) & (frequency < high))
+
+
+def signs_of(fit: Fit) -> FloatArray:
+    """Signs of what acts between two modes, which have none of their own: those of the shapes at the first sensor.
+
+    Parameters
+    ----------
+    fit : Fit
+        Without a cause.
+
+    Returns
+    -------
+    (n_nuisance,) array
+        1 or -1.
+    """
+    nuisance = fit.hypothesis.nuisance
+    modes = fit.hypothesis.modes(fit.values, np.zeros(nuisance.size))
+    return _signs(modes, nuisance.n_modes, nuisance.pairs, nuisance.size)
+
+
+def _signs(modes: Modes, n_modes: int, pairs: tuple[IntArray, IntArray], size: int) -> FloatArray:
+    own = np.where(modes.outputs[0, :n_modes] < 0, -1.0, 1.0)
+    signs, between = np.ones(size), own[pairs[0]] * own[pairs[1]]
+    signs[: 2 * len(between)] = np.concatenate([between, between])
+    return signs
+
+
+def _scatter(fits: Sequence[Fit], least: DiagnoseOptions) -> DiagnoseOptions:
+    """Tolerances of frequencies, damping and gains that repeated states show, or those stated where they are larger."""
+    n = len(fits)
+    if n < ENOUGH_REPEATS:
+        return least
+    frequency = np.array([_shift(fit.hypothesis, fit.unknown) for fit in fits])
+    unknowns = [fit.hypothesis.nuisance.unpack(fit.unknown) for fit in fits]
+    elastic = slice(fits[0].hypothesis.nuisance.n_rigid, None)
+    inside = _in_band(fits[0].hypothesis)
+    damping = np.array([np.log1p(unknown.damping)[elastic][inside] for unknown in unknowns])
+    gains = np.array([unknown.gains for unknown in unknowns])
+    wider = HALF_WIDTH * np.sqrt(1 + 1 / n)  # the mean that they are compared with is not exact either
+    return replace(
+        least,
+        frequency_tolerance=max(least.frequency_tolerance, wider * _rms(frequency)),
+        damping_tolerance=max(least.damping_tolerance, wider * _rms(damping)),
+        gain_tolerance=max(least.gain_tolerance, wider * _rms(gains)),
+    )
+
+
+def _rms(values: FloatArray) -> float:
+    """Give the standard deviation over states, of all columns together; by the median, for a state may be a bad one."""
+    n, columns = values.shape
+    if not columns:
+        return 0.0
+    if n < ENOUGH_FOR_MEDIANS:
+        return float(np.sqrt(np.mean(values.var(0, ddof=1))))
+    apart = np.abs(values - np.median(values, 0))
+    return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(apart, 0)) ** 2)))
+
+
+def _widened(
+    before: Sequence[State], sources: Sequence[DataSplit], learned: Learned, options: CompareOptions
+) -> Learned:
+    """Widen the tolerance of the model until nothing has changed in the states before, by the rules for those after."""
+    nominals = [
+        State(
+            model=nominal_after(state, learned, options, source),
+            observed=trusted(state.observed, learned.gains, learned.missed),
+        )
+        for state, source in zip(before, sources, strict=True)
+    ]
+    sources = [split_data(state.observed) for state in nominals]
+    scatter = learned.scatter
+    while scatter.stiffness_tolerance < MOST_TOLERANCE:
+        good = [_is_explained(state, source, scatter) for state, source in zip(nominals, sources, strict=True)]
+        if np.mean(good) >= ENOUGH_STATES:
+            break
+        scatter = replace(scatter, stiffness_tolerance=GROWTH * scatter.stiffness_tolerance)
+    return replace(learned, scatter=scatter)
+
+
+def _is_explained(state: State, source: DataSplit, scatter: DiagnoseOptions) -> bool:
+    bench = bench_of(state, source, scatter)
+    return goodness(bench, fit_from_peaks(bench, source)).is_good

@@ -1,0 +1,112 @@
+"""What a model cannot follow whatever is corrected in it: it counts as an error of the measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.model.layout import lay_out
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.observations import Observations
+    from frf_ipz.frf import FrfSet
+
+ALIKE = 3.0  # points of a contour that share what a model cannot follow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Missed:
+    """What a model cannot follow.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Hz.
+    part : (n_lines, n_frfs) array
+        Of the measured FRFs, the median over several states.
+    """
+
+    frequency_hz: FloatArray
+    part: FloatArray
+
+
+def missed_by(measured: Sequence[FrfSet | None], fits: Sequence[Fit]) -> Missed | None:
+    """Compare fits line by line with what they were fitted to.
+
+    Parameters
+    ----------
+    measured : sequence of FrfSet
+        Of the states.
+    fits : sequence of Fit
+        Of their models.
+
+    Returns
+    -------
+    Missed or None
+        None where there are no FRFs on lines.
+    """
+    frfs = [one for one in measured if one is not None]
+    if len(frfs) < len(fits):
+        return None
+    frequency = frfs[0].frequency_hz[frfs[0].in_band(fits[0].hypothesis.specimen.band_hz)]
+    s = np.asarray(2j * np.pi * frequency, np.complex128)
+    found = []
+    for one, fit in zip(frfs, fits, strict=True):
+        values = np.stack([np.interp(frequency, one.frequency_hz, column) for column in one.values.T], axis=1)
+        model = fit.hypothesis.respond(fit.values, fit.unknown, s).values
+        size = np.maximum(np.abs(values), np.finfo(float).tiny)
+        across, own = np.sum((model.conj() * values).real / size**2, 0), np.sum(np.abs(model) ** 2 / size**2, 0)
+        scale = np.ones(one.n_frfs) if one.unknown_scale == "none" else across / own
+        found.append(np.abs(values - scale * model) / size)
+    return Missed(frequency_hz=frequency, part=np.median(found, axis=0))
+
+
+def trusted(observed: Observations, gains: Mapping[str, float], missed: Missed | None) -> Observations:
+    """Take the gains that channels had before out of what was observed, and trust it where the model can follow it.
+
+    Parameters
+    ----------
+    observed : Observations
+        Of a state.
+    gains : mapping of str to float
+        Factors by channel.
+    missed : Missed, optional
+        By the states before.
+
+    Returns
+    -------
+    Observations
+        Without gains; where something is missed it is a part of the variance of the FRFs, and blows are left out.
+    """
+    plain = _without_gains(observed, gains)
+    frfs = plain.frfs
+    if frfs is None or missed is None:
+        return plain
+    part = np.stack([np.interp(frfs.frequency_hz, missed.frequency_hz, column) for column in missed.part.T], axis=1)
+    known = np.where(np.isfinite(frfs.variance), frfs.variance, 0.0)
+    variance = known + ALIKE * (part * np.abs(frfs.values)) ** 2
+    return replace(plain, kind="frf", records=(), frfs=replace(frfs, variance=variance))
+
+
+def _without_gains(observed: Observations, gains: Mapping[str, float]) -> Observations:
+    records = tuple(
+        replace(
+            record,
+            force=record.force / gains.get(record.input_channel, 1.0),
+            responses=record.responses / np.array([[gains.get(sensor.channel, 1.0)] for sensor in record.sensors]),
+        )
+        for record in observed.records
+    )
+    frfs = observed.frfs
+    if frfs is None:
+        return replace(observed, records=records)
+    layout = lay_out(frfs.labels)
+    factors = np.exp(-layout.gain_signs @ np.log([gains.get(channel, 1.0) for channel in layout.channels]))
+    scaled = replace(frfs, values=frfs.values * factors, variance=frfs.variance * factors**2)
+    return replace(observed, records=records, frfs=scaled)

@@ -1,0 +1,1 @@
+"""Hypotheses, their MAP fits to a measurement, and the evidence of each."""

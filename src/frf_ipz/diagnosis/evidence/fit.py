@@ -1,0 +1,146 @@
+"""What hypotheses are fitted to, and what a fit comes to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions, Whitening
+    from frf_ipz.diagnosis.model.response import Response
+
+FAR_OFF = 300.0  # mean squared misfit
+NEARLY_RIGHT = 20.0  # the same: small effects are looked for on top of such a fit
+VERY_NEARLY = 2.0  # the same: nothing large can be missing
+SMALL_PULL = 600.0  # and this little is explained by what cannot be known
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit:
+    """A hypothesis at its best.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Causes at their places.
+    values : (n_parameters,) array
+        Physical values of the parameters.
+    unknown : (n_nuisance,) array
+        What cannot be known, in standard deviations.
+    misfit : float
+        Sum of squares of the whitened misfit.
+    pull : float
+        Sum of squares of the pulls of `unknown`.
+    log_evidence : float
+        nats, up to a constant that all hypotheses share.
+    covariance : (n_parameters, n_parameters) array
+        Of the parameters as searched (logarithms, parts of ranges).
+    converged : bool
+        The last step was small.
+    freedom : float
+        How many of what cannot be known the data determine: what `pull` is expected to be at most.
+    n_values : int
+        Real numbers that it was fitted to.
+    """
+
+    hypothesis: Hypothesis
+    values: FloatArray
+    unknown: FloatArray
+    misfit: float
+    pull: float
+    log_evidence: float
+    covariance: FloatArray
+    converged: bool
+    freedom: float
+    n_values: int
+
+    @property
+    def cost(self) -> float:
+        """Minus the logarithm of likelihood times prior, up to a constant."""
+        return 0.5 * (self.misfit + self.pull)
+
+    @property
+    def mean_misfit(self) -> float:
+        """Mean square of the whitened misfit."""
+        return self.misfit / self.n_values
+
+    @property
+    def is_hopeless(self) -> bool:
+        """So far off that its causes are wrong or some are missing: no time is spent on its places."""
+        return self.mean_misfit > FAR_OFF
+
+    @property
+    def is_nearly_right(self) -> bool:
+        """What it leaves is so little that small effects can explain it: they are searched on top of it."""
+        return self.mean_misfit < NEARLY_RIGHT
+
+    @property
+    def is_nearly_all(self) -> bool:
+        """Nothing large can be missing beside it."""
+        return self.mean_misfit <= VERY_NEARLY and self.pull <= SMALL_PULL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Data:
+    """What hypotheses are fitted to.
+
+    Parameters
+    ----------
+    measured : TransferFunctions
+        Transfer functions.
+    whitening : Whitening
+        Of their errors.
+    free_gains : str
+        ``none``, ``common`` or ``per_channel``: gains that nobody knows; the model's FRFs are scaled to the measured
+        ones.
+    is_bounded : bool
+        Tolerances are bounds; without them far steps are easier.
+    """
+
+    measured: TransferFunctions
+    whitening: Whitening
+    free_gains: str = "none"
+    is_bounded: bool = True
+
+    def gains(self, response: Response) -> FloatArray:
+        """Real factors that bring the model's FRFs to the measured ones where scales are unknown, (n_frfs,) array."""
+        n_frfs = len(self.measured.labels)
+        if self.free_gains == "none":
+            return np.ones(n_frfs)
+        model, measured = self._compared(response.values), self._compared(self.measured.values)
+        across, own = np.sum(model * measured, 1), np.sum(model**2, 1)
+        if self.free_gains == "common":
+            return np.full(n_frfs, across.sum() / own.sum())
+        return np.asarray(across / own)
+
+    def misfit(self, response: Response) -> FloatArray:
+        """Whitened difference of measurement and model, (n_data,) array."""
+        return self.whitening(self.measured.values - self.gains(response) * response.values)
+
+    def slopes(self, response: Response, changes: ComplexArray) -> FloatArray:
+        """Whitened changes of the model's FRFs, (n_data, n) array, without what gains that nobody knows make up for.
+
+        [Kaufman1975] L. Kaufman, A variable projection method for solving separable nonlinear least squares problems,
+        BIT 15 (1975) 49-57.
+        """
+        white = self.whitening(self.gains(response)[:, None] * changes)
+        if self.free_gains == "none":
+            return white
+        model = self._compared(response.values)
+        by_frf = white.reshape(len(model), model.shape[1], -1)
+        across, own = np.einsum("fd,fdn->fn", model, by_frf), np.sum(model**2, 1)[:, None]
+        if self.free_gains == "common":
+            across, own = np.broadcast_to(across.sum(0), across.shape), np.broadcast_to(own.sum(), own.shape)
+        return np.asarray((by_frf - model[:, :, None] * (across / own)[:, None]).reshape(white.shape))
+
+    def _compared(self, values: ComplexArray) -> FloatArray:
+        """Weigh FRFs as misfits are weighed, (n_frfs, 2 n_points) array; by their size where there is no whitening."""
+        if self.whitening.factors.size:
+            return self.whitening(values).reshape(len(self.measured.labels), -1)
+        relative = (values / self.measured.size).T
+        return np.concatenate([relative.real, relative.imag], axis=1)

@@ -1,1 +1,0 @@
-"""From fits to what is said: gates, figures, verdict, probabilities, ambiguities."""

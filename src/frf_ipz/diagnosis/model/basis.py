@@ -1,0 +1,272 @@
+"""A model in few coordinates: its modes, and the static shapes that sensors, blows and effects need.
+
+The modes go well beyond the band. Static deflections under unit loads at sensors and blows make the basis exact at low
+frequency there; those under the loads that an effect makes (a support that gives way, elements that are softer) do the
+same for the effect, so that a large change is as exact as a small one. One basis serves every value of an effect's
+parameters at a place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.fe.assembly import multiply
+from frf_ipz.fe.eigen import ModalBasis, solve_basis
+from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.pencils import generalised_eigh
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.structure import Matrix, StructuralModel
+
+BEYOND = 4.0  # times the highest frequency: modes that are kept
+LEAST_MODES = 12
+INDEPENDENT = 1e-8  # of a vector: what is left of it beside the basis
+ALIKE = 1e-12  # of the sum of squares: new shapes that are combinations of others
+LOADED_MODES = 1.5  # times the highest frequency: modes whose loads by an effect get a static shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Basis:
+    """Coordinates in which mass is the identity.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The nominal model.
+    modes : ModalBasis
+        Its lowest modes, with the factor of K + tau M.
+    vectors : (n_all, q) array
+        Motion of all DOFs for each coordinate.
+    stiffness, damping : (q, q) array
+        Of the nominal model; damping is the viscous one of its matrix.
+    highest_rad_s : float
+        Top of the band.
+    places : tuple of int
+        Rows of all DOFs where sensors and blows are.
+    """
+
+    model: StructuralModel
+    modes: ModalBasis
+    vectors: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    highest_rad_s: float
+    places: tuple[int, ...]
+
+    @property
+    def loaded(self) -> FloatArray:
+        """Shapes of the modes near the band, at all DOFs, (n_all, m) array."""
+        count = max(int(np.count_nonzero(np.sqrt(self.modes.eigenvalues) <= LOADED_MODES * self.highest_rad_s)), 1)
+        return _everywhere(self.model, self.modes.shapes[:, :count])
+
+    def project(self, matrix: Matrix) -> FloatArray:
+        """Bring a matrix of all DOFs into these coordinates.
+
+        Parameters
+        ----------
+        matrix : (n_all, n_all) sparse array
+            Symmetric.
+
+        Returns
+        -------
+        (q, q) array
+            The same in the basis.
+        """
+        return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
+
+
+def make_basis(model: StructuralModel, highest_rad_s: float, places: Sequence[int]) -> Basis:
+    """Find the modes of a model, and the static shapes of its sensors and blows.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The nominal model.
+    highest_rad_s : float
+        Top of the band.
+    places : sequence of int
+        Rows of all DOFs where sensors and blows are.
+
+    Returns
+    -------
+    Basis
+        For the nominal model.
+    """
+    order = int(np.count_nonzero(~model.fixed))
+    modes = solve_basis(model) if order < DENSE_ORDER else _large(model, highest_rad_s)
+    low = max(int(np.count_nonzero(np.sqrt(modes.eigenvalues) <= BEYOND * highest_rad_s)), min(LEAST_MODES, order))
+    start = modes.first(low)
+    loads = np.zeros((len(model.all_dofs), len(places)))
+    loads[list(places), np.arange(len(places))] = 1.0
+    plain = Basis(
+        model=model,
+        modes=modes,
+        vectors=_everywhere(model, start.shapes),
+        stiffness=np.diag(start.eigenvalues),
+        damping=np.zeros((low, low)),
+        highest_rad_s=highest_rad_s,
+        places=tuple(places),
+    )
+    return _joined(plain, _deflections(plain, loads))
+
+
+def _large(model: StructuralModel, highest_rad_s: float) -> ModalBasis:
+    modes = solve_basis(model, up_to_hz=BEYOND * highest_rad_s / (2 * np.pi))
+    if len(modes.eigenvalues) < LEAST_MODES:
+        modes = solve_basis(model, n_modes=LEAST_MODES)
+    return modes
+
+
+def enrich(basis: Basis, change: Change) -> Basis:
+    """Add the static shapes that a change needs.
+
+    Parameters
+    ----------
+    basis : Basis
+        Of the nominal model.
+    change : Change
+        An effect at typical values of its parameters; only the place matters.
+
+    Returns
+    -------
+    Basis
+        For this effect at this place.
+    """
+    if change.model is not None:
+        basis = _exchanged(change.model, basis.highest_rad_s, basis.places)
+    model, loads, shapes = basis.model, [], []
+    if change.released:
+        constraint = _constraint_shapes(basis, change.released)
+        shapes.append(constraint)
+        loads.append(_inertia(model, constraint))
+    around = np.hstack([basis.loaded, *shapes])
+    for matrix in (change.stiffness, change.mass):
+        if matrix is not None:
+            first = multiply(matrix, around)
+            loads.append(first)
+            if np.linalg.matrix_rank(first, tol=1e-9 * np.linalg.norm(first)) > 2:
+                loads.append(multiply(matrix, _deflections(basis, first)))
+    loads += [attachment.motions for attachment in change.attachments]
+    if change.moved:
+        loads.append(_unit_loads(basis, tuple(change.moved.values())))
+    if not loads:
+        return basis
+    shapes.append(_deflections(basis, np.hstack(loads)))
+    return _joined(basis, np.hstack(shapes))
+
+
+@lru_cache(maxsize=2)  # a search asks for the same one again and again
+def _exchanged(model: StructuralModel, highest_rad_s: float, places: tuple[int, ...]) -> Basis:
+    return make_basis(model, highest_rad_s, places)
+
+
+def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
+    """Solve for the modes of a modified structure.
+
+    The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
+    times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    change : Change
+        What is different in mass and stiffness.
+
+    Returns
+    -------
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2.
+    vectors : (q, q) array
+        Columns are modes in terms of the basis, mass-normalised.
+    """
+    stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
+    mass = np.eye(len(stiffness))
+    if change.mass is not None:
+        mass = mass + basis.project(change.mass)
+    shift = basis.modes.shift
+    try:
+        inverses, vectors = generalised_eigh(mass, stiffness + shift * mass)
+    except linalg.LinAlgError:
+        squares, vectors = linalg.eigh(stiffness, mass, check_finite=False)
+        return squares, vectors
+    inverses, vectors = np.maximum(inverses[::-1], np.finfo(float).tiny), vectors[:, ::-1]
+    return 1 / inverses - shift, vectors / np.sqrt(np.sum(vectors * (mass @ vectors), axis=0))
+
+
+def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:
+    rows = [row for dof, row in basis.model.places.items() if dof.node in nodes and not basis.model.fixed[row]]
+    loads = np.zeros((len(basis.model.all_dofs), len(rows)))
+    loads[rows, np.arange(len(rows))] = 1.0
+    return loads
+
+
+def _everywhere(model: StructuralModel, shapes: FloatArray) -> FloatArray:
+    everywhere = np.zeros((len(model.all_dofs), shapes.shape[1]))
+    everywhere[~model.fixed] = shapes
+    return everywhere
+
+
+def _deflections(basis: Basis, loads: FloatArray) -> FloatArray:
+    """(K + tau M)^-1 times loads at the free DOFs, without what is not independent."""
+    free = loads[~basis.model.fixed]
+    sizes = np.linalg.norm(free, axis=0)
+    left, sizes, _ = np.linalg.svd(free[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
+    free = left[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
+    return _everywhere(basis.model, basis.modes.factor.solve(free))
+
+
+def _constraint_shapes(basis: Basis, released: tuple[int, ...]) -> FloatArray:
+    """Motion of everything when one held DOF after the other is moved by 1."""
+    model, free = basis.model, np.flatnonzero(~basis.model.fixed)
+    shapes = np.zeros((len(model.all_dofs), len(released)))
+    for column, place in enumerate(released):
+        pull = model.stiffness_all[:, [place]].toarray() + basis.modes.shift * model.mass_all[:, [place]].toarray()
+        shapes[free, column] = -basis.modes.factor.solve(pull[free, 0])
+        shapes[place, column] = 1.0
+    return shapes
+
+
+def _inertia(model: StructuralModel, shapes: FloatArray) -> FloatArray:
+    return multiply(model.mass_all, shapes)
+
+
+def _joined(basis: Basis, shapes: FloatArray) -> Basis:
+    """Add shapes, made orthonormal in mass; those that the basis holds already are left out."""
+    model = basis.model
+    for _ in range(2):  # the second time takes off what rounding left in the first
+        sizes = _sizes(model, shapes)
+        shapes = shapes / np.where(sizes > 0, sizes, 1.0)
+        shapes = shapes - basis.vectors @ (basis.vectors.T @ multiply(model.mass_all, shapes))
+        shapes = shapes[:, _sizes(model, shapes) > INDEPENDENT]
+    shapes = shapes / _sizes(model, shapes)
+    values, axes = linalg.eigh(shapes.T @ multiply(model.mass_all, shapes))
+    kept = values > ALIKE
+    fresh = shapes @ (axes[:, kept] / np.sqrt(values[kept]))
+    vectors = np.hstack([basis.vectors, fresh])
+    return Basis(
+        model=model,
+        modes=basis.modes,
+        vectors=vectors,
+        stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
+        damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
+        highest_rad_s=basis.highest_rad_s,
+        places=basis.places,
+    )
+
+
+def _sizes(model: StructuralModel, shapes: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(np.sum(shapes * multiply(model.mass_all, shapes), 0), 0.0)))
+
+
+def _symmetric(matrix: FloatArray) -> FloatArray:
+    return np.asarray((matrix + matrix.T) / 2)

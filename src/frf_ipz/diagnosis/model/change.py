@@ -1,0 +1,219 @@
+"""What an effect changes: mass and stiffness, supports, damping, the measuring chain; and a model so changed.
+
+The changed model is given as matrices, for the stages that know no effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.dofs import Dof
+
+if TYPE_CHECKING:
+    from frf_ipz.structure import Matrix, StructuralModel
+
+
+Transfer = Callable[[ComplexArray], ComplexArray]
+"""A function of s: (n_points,) complex array, rad/s, to (n_points,) complex array."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Attachment:
+    """A dynamic stiffness on motions of the structure.
+
+    Parameters
+    ----------
+    motions : (n_all, r) array
+        Each column is a motion: weights of all DOFs of the model.
+    stiffness : callable
+        Dynamic stiffness against each of the motions, N/m or N m/rad.
+    matrices : tuple of (1 + n, 1 + n) arrays, optional
+        The same as mass, damping and stiffness between one motion and n motions of its own: what brings it into a model
+        that has matrices only. Without them it cannot be brought there.
+    """
+
+    motions: FloatArray
+    stiffness: Transfer
+    matrices: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Change:
+    """Everything that an effect changes; what is left out stays.
+
+    Parameters
+    ----------
+    model : StructuralModel, optional
+        Another model in the place of the nominal one, with the same DOFs.
+    mass, stiffness : (n_all, n_all) sparse array, optional
+        What is added to the matrices of all DOFs.
+    released : tuple of int
+        Held DOFs (rows of all) that may move; `stiffness` says what holds them.
+    floating : bool
+        A free structure stays free: what is added hangs as softly as the structure, whose rigid-body modes stay.
+    attachments : tuple of Attachment
+        What has dynamics of its own. Modal damping is that of the structure without them.
+    modal_ratio : float, optional
+        Damping ratio of all modes, instead of the model's.
+    added_ratio : float
+        Damping ratio of all modes besides their own.
+    loss_factor : float
+        Of the whole stiffness: K (1 + i eta), besides the modal damping.
+    reference_rad_s : float
+        Where the stiffness is the model's: it rises with frequency, as causality asks of a constant loss factor. 0 for
+        the same at all frequencies.
+    keeps_modes : bool
+        The stiffness of each mode is the model's at the mode's own frequency instead, and rises from there.
+    channels : mapping of str to Transfer
+        What a channel shows over what it should show.
+    moved : mapping of str to int
+        Output channels, and the node where the sensor really is.
+    """
+
+    model: StructuralModel | None = None
+    mass: Matrix | None = None
+    stiffness: Matrix | None = None
+    released: tuple[int, ...] = ()
+    floating: bool = False
+    attachments: tuple[Attachment, ...] = ()
+    modal_ratio: float | None = None
+    added_ratio: float = 0.0
+    loss_factor: float = 0.0
+    reference_rad_s: float = 0.0
+    keeps_modes: bool = False
+    channels: Mapping[str, Transfer] = field(default_factory=dict)
+    moved: Mapping[str, int] = field(default_factory=dict)
+
+    def __add__(self, other: Change) -> Change:
+        """Put two effects together."""
+        return Change(
+            model=self.model if other.model is None else other.model,
+            mass=_sum(self.mass, other.mass),
+            stiffness=_sum(self.stiffness, other.stiffness),
+            released=tuple(dict.fromkeys((*self.released, *other.released))),
+            floating=self.floating or other.floating,
+            attachments=(*self.attachments, *other.attachments),
+            modal_ratio=self.modal_ratio if other.modal_ratio is None else other.modal_ratio,
+            added_ratio=self.added_ratio + other.added_ratio,
+            loss_factor=self.loss_factor + other.loss_factor,
+            reference_rad_s=self.reference_rad_s or other.reference_rad_s,
+            keeps_modes=self.keeps_modes or other.keeps_modes,
+            channels=_product(self.channels, other.channels),
+            moved={**self.moved, **other.moved},
+        )
+
+
+def _sum(first: Matrix | None, second: Matrix | None) -> Matrix | None:
+    if first is None or second is None:
+        return first if second is None else second
+    return first + second
+
+
+def _product(first: Mapping[str, Transfer], second: Mapping[str, Transfer]) -> dict[str, Transfer]:
+    both = {**first, **second}
+    for name in first.keys() & second.keys():
+        both[name] = _both(first[name], second[name])
+    return both
+
+
+def _both(first: Transfer, second: Transfer) -> Transfer:
+    return lambda s: np.asarray(first(s) * second(s))
+
+
+NOTHING = Change()
+
+
+def with_change(model: StructuralModel, change: Change) -> StructuralModel:
+    """Put a change into a model.
+
+    Modal damping cannot hold a loss factor eta: each mode gets eta / 2 besides its own ratio, which is the same at its
+    resonance.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The nominal model.
+    change : Change
+        What is different; its channels are left alone.
+
+    Returns
+    -------
+    StructuralModel
+        With further DOFs at new nodes where something is attached that moves by itself.
+    """
+    changed = model if change.model is None else change.model
+    fixed = changed.fixed.copy()
+    fixed[list(change.released)] = False
+    stated = changed.modal_damping if change.modal_ratio is None else np.array([change.modal_ratio])
+    added = change.added_ratio + change.loss_factor / 2
+    if added:
+        stated = (stated if stated.size else np.zeros(1)) + added
+    changed = replace(
+        changed,
+        fixed=fixed,
+        mass_all=changed.mass_all if change.mass is None else sparse.csr_array(changed.mass_all + change.mass),
+        stiffness_all=changed.stiffness_all
+        if change.stiffness is None
+        else sparse.csr_array(changed.stiffness_all + change.stiffness),
+        damping_all=changed.damping_all if change.modal_ratio is None else 0 * changed.damping_all,
+        modal_damping=stated,
+    )
+    for attachment in change.attachments:
+        changed = _attached(changed, attachment)
+    return changed
+
+
+def _attached(model: StructuralModel, attachment: Attachment) -> StructuralModel:
+    """Put mass, damping and stiffness between the motions of an attachment and motions of its own."""
+    if attachment.matrices is None:
+        return model
+    own = attachment.matrices[0].shape[0] - 1
+    mass, damping, stiffness = (
+        _grown(matrix, own) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
+    )
+    for motion in attachment.motions.T:
+        padded = sparse.csr_array(np.concatenate([motion, np.zeros(len(model.all_dofs) - len(motion) + own)])[None])
+        extra = sparse.csr_array(
+            (np.ones(own), (np.arange(own), len(model.all_dofs) + np.arange(own))), shape=(own, padded.shape[1])
+        )
+        rows = sparse.vstack([padded, extra]).tocsr() if own else padded
+        mass, damping, stiffness = (
+            sparse.csr_array(whole + rows.T @ sparse.csr_array(part) @ rows)
+            for whole, part in zip((mass, damping, stiffness), attachment.matrices, strict=True)
+        )
+    return _with_dofs(model, attachment.motions[:, 0], own, (mass, damping, stiffness))
+
+
+def _grown(matrix: Matrix, by: int) -> Matrix:
+    return sparse.csr_array(sparse.block_diag([matrix, sparse.csr_array((by, by))])) if by else matrix
+
+
+def _with_dofs(
+    model: StructuralModel, motion: FloatArray, count: int, matrices: tuple[Matrix, Matrix, Matrix]
+) -> StructuralModel:
+    """Name the new DOFs after the place where they are attached."""
+    mass, damping, stiffness = matrices
+    where = model.all_dofs[int(np.argmax(np.abs(motion)))]
+    geometry = model.geometry
+    first = int(max(geometry.nodes.max(), max(dof.node for dof in model.all_dofs))) + 1
+    fresh = tuple(Dof(first + number, where.direction) for number in range(count))
+    here = geometry.coordinates_m[np.searchsorted(geometry.nodes, where.node)]
+    return replace(
+        model,
+        all_dofs=(*model.all_dofs, *fresh),
+        fixed=np.concatenate([model.fixed, np.zeros(count, bool)]),
+        mass_all=mass,
+        stiffness_all=stiffness,
+        damping_all=damping,
+        geometry=replace(
+            geometry,
+            nodes=np.concatenate([geometry.nodes, [dof.node for dof in fresh]]).astype(np.int64),
+            coordinates_m=np.vstack([geometry.coordinates_m, *([here[None]] * count)]),
+        ),
+    )

@@ -1,0 +1,248 @@
+"""The modes of a modified structure: as its matrices have them, and with scatter within the tolerances.
+
+Structural changes are solved for in the basis, so that damping belongs to the modes that the structure really has;
+scatter then acts on those modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.model.basis import solved
+from frf_ipz.diagnosis.model.layout import motion_row
+from frf_ipz.diagnosis.model.nuisance import all_shift_rows
+from frf_ipz.dofs import Dof
+from frf_ipz.numerics.pencils import generalised_eigh
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.model.basis import Basis
+    from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.diagnosis.model.layout import Layout
+    from frf_ipz.diagnosis.model.nuisance import Nuisance, Unknowns
+
+RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
+LEAST_RATIO = 1e-6  # where a model states no damping at all
+UNCOUPLED = 1e-3  # of the largest damping of a mode: what a matrix couples modes by that counts for nothing
+SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
+MOST_OF_MASS = 0.5  # of a modal mass: scatter takes no more away
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modified:
+    """A modified structure without scatter.
+
+    Parameters
+    ----------
+    change : Change
+        What is different.
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2; 0 for rigid-body modes.
+    vectors : (q_basis, q) array
+        The modes in terms of the basis.
+    stated_ratio : (q,) array
+        Damping ratios, with what a damping matrix of the model adds to each mode.
+    is_coupled : bool
+        The damping matrix couples modes.
+    """
+
+    change: Change
+    squares: FloatArray
+    vectors: FloatArray
+    stated_ratio: FloatArray
+    is_coupled: bool
+
+
+def modify(basis: Basis, change: Change) -> Modified:
+    """Solve for the modes of a modified structure.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    change : Change
+        What is different in structure and damping.
+
+    Returns
+    -------
+    Modified
+        Its modes, by ascending frequency.
+    """
+    squares, vectors = solved(basis, change)
+    largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
+    vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
+    n_rigid = basis.modes.n_rigid
+    elastic = squares[n_rigid] if len(squares) > n_rigid else 1.0
+    squares = np.where(np.abs(squares) <= RIGID * abs(elastic), 0.0, squares)
+    if change.floating:
+        squares[:n_rigid] = 0.0
+    stated = _ratios(basis, change, squares) + change.added_ratio
+    is_coupled = False
+    if change.modal_ratio is None and basis.damping.any():
+        viscous = vectors.T @ basis.damping @ vectors
+        own, omega = np.diag(viscous), np.sqrt(np.abs(squares))
+        stated[n_rigid:] += own[n_rigid:] / (2 * omega[n_rigid:])
+        is_coupled = bool(np.abs(coupling(viscous)).max() > UNCOUPLED * own.max())
+    stated[:n_rigid] = SUSPENSION_RATIO
+    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled)
+
+
+def coupling(viscous: FloatArray) -> FloatArray:
+    """Take the damping of each mode by itself out of a damping matrix in modal coordinates, (q, q)."""
+    return viscous - np.diag(np.diag(viscous))
+
+
+def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
+    if change.modal_ratio is not None:
+        return np.full(len(squares), change.modal_ratio)
+    stated = basis.model.modal_damping
+    if not stated.size:
+        return np.full(len(squares), LEAST_RATIO if not basis.damping.any() else 0.0)
+    number = np.maximum(np.arange(len(squares)) - basis.modes.n_rigid, 0)
+    return stated[np.minimum(number, stated.size - 1)].copy()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modes:
+    """Modes of a modified structure at sensors and blows.
+
+    Parameters
+    ----------
+    omega : (q,) array
+        rad/s, before scatter; 0 for rigid-body modes.
+    squares : (q,) array
+        Squared frequencies with scatter.
+    stated_ratio, ratio : (q,) array
+        Damping ratios without and with scatter.
+    rotation : (m, m) array
+        Columns are the modes with scatter in terms of those without.
+    outputs, inputs : (n, q) array
+        Shapes with scatter, with signs.
+    output_shifts, input_shifts : (n, n_axes, q) array
+        How they change with places, 1/m.
+    vectors : (q_basis, q) array
+        The modes in terms of the basis.
+    viscous : (q, q) array, optional
+        What the model's damping matrix couples modes by; what it damps each mode by is in its ratio.
+    """
+
+    omega: FloatArray
+    squares: FloatArray
+    stated_ratio: FloatArray
+    ratio: FloatArray
+    rotation: FloatArray
+    outputs: FloatArray
+    inputs: FloatArray
+    output_shifts: FloatArray
+    input_shifts: FloatArray
+    vectors: FloatArray
+    viscous: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """Sensors and blows in the coordinates of a basis.
+
+    Parameters
+    ----------
+    outputs, inputs : (n, q) array
+        With signs.
+    output_shifts, input_shifts : (n, n_axes, q) array
+        Their change with places, 1/m.
+    """
+
+    outputs: FloatArray
+    inputs: FloatArray
+    output_shifts: FloatArray
+    input_shifts: FloatArray
+
+
+def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) -> Rows:
+    """Bring sensors and blows into the coordinates of a basis.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    layout : Layout
+        Sensors and blows.
+    change : Change
+        Says which sensors are elsewhere.
+    nuisance : Nuisance
+        Says along which axes places are uncertain.
+
+    Returns
+    -------
+    Rows
+        Sensors where the change says they are.
+    """
+    outputs = tuple(
+        Dof(change.moved.get(channel, dof.node), dof.direction, dof.sign) for channel, dof in layout.outputs
+    )
+    return Rows(
+        outputs=np.array([motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,
+        inputs=np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors,
+        output_shifts=all_shift_rows(basis, nuisance, outputs),
+        input_shifts=all_shift_rows(basis, nuisance, layout.inputs),
+    )
+
+
+def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) -> Modes:
+    """Add to a modified structure what cannot be known.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    modified : Modified
+        The structure.
+    rows : Rows
+        Sensors and blows.
+    unknowns : Unknowns
+        What cannot be known.
+
+    Returns
+    -------
+    Modes
+        By ascending frequency without scatter.
+    """
+    omega = np.sqrt(np.abs(modified.squares))
+    scattered, rotation = _scatter(modified.squares, omega, unknowns)
+    m = len(rotation)
+    turned = modified.vectors.copy()
+    turned[:, :m] = modified.vectors[:, :m] @ rotation
+    ratio = modified.stated_ratio.copy()
+    ratio[:m] *= 1 + unknowns.damping
+    viscous = coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
+    return Modes(
+        omega=omega,
+        squares=scattered,
+        stated_ratio=modified.stated_ratio,
+        ratio=ratio,
+        rotation=rotation,
+        outputs=rows.outputs @ turned,
+        inputs=rows.inputs @ turned,
+        output_shifts=rows.output_shifts @ turned,
+        input_shifts=rows.input_shifts @ turned,
+        vectors=turned,
+        viscous=viscous,
+    )
+
+
+def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
+    m, rigid = len(unknowns.kappa), len(unknowns.cords)
+    if not (unknowns.kappa.any() or unknowns.mu.any() or unknowns.cords.any()):
+        return squares, np.eye(m)
+    block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
+    block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
+    mu = unknowns.mu
+    if np.linalg.norm(mu) > MOST_OF_MASS:  # no step may take all mass away
+        least = float(linalg.eigvalsh(mu, subset_by_index=(0, 0), check_finite=False)[0])
+        mu = mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))
+    values, rotation = generalised_eigh(block, np.eye(m) + mu)
+    rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
+    return np.concatenate([values, squares[m:]]), rotation

@@ -1,0 +1,386 @@
+"""What the owner of a structure cannot know about it, within the tolerances that they state.
+
+Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
+``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
+the shapes, and with it of the zeros. Damping ratios of modes, places of sensors and blows, and gains of channels come
+beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over the square
+root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much faster than a
+normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a normal prior.
+
+Near a struck place FRFs hold how the structure gives way around the blow, which depends on the size of the contact and
+which no mesh tells well: the compliance of all modes beyond those with scatter is not known exactly.
+
+Gains multiply the model's FRFs. As errors in proportion to the measured FRFs they would follow their noise, and pull
+every fit to smaller FRFs by the product of their variance and the number of points.
+
+[dAgostini1994] G. D'Agostini, On the use of the covariance matrix to fit correlated data, Nuclear Instruments and
+Methods in Physics Research A 346 (1994) 306-311.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.diagnosis.model.layout import extents, kink_beside, motion_row, shift_rows
+from frf_ipz.fe.beam_models import with_formulation
+from frf_ipz.fe.eigen import solve_basis
+from frf_ipz.fe.kinds.beam import BeamFile
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.model.basis import Basis
+    from frf_ipz.diagnosis.model.layout import Layout
+    from frf_ipz.diagnosis.options import DiagnoseOptions
+    from frf_ipz.dofs import Dof
+
+UNIFORM = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
+ACROSS = 0.5  # kappa and mu between two modes, over those of one: fields average out
+MASS_PART = 0.5  # tolerance of masses over that of stiffness
+CORDS = 0.02  # frequency of a free structure in its cords, over its first elastic one
+MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
+LOWERED = 1.2  # times the top of the band: modes that shear would bring there
+MOST_MODES = 16
+LESS_CONVERGED = 20.0  # growth of a mode's error with its frequency over the top of the band: meshes suit the band
+REDUCED = 80.0  # the same with the square: what is far beyond the band may be lost in a reduction
+LOCAL = 0.05  # of the compliance of all modes beyond those with scatter: what is not known
+MOST_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
+EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
+STEEPER = 1.0  # per standard deviation: how much faster
+FARTHEST = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
+UNSTATED_SPREAD = 0.5  # of the damping ratio of a mode that nobody states: in its cords, or far beyond the band
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Unknowns:
+    """Values of all that cannot be known.
+
+    Parameters
+    ----------
+    kappa, mu : (m, m) array
+        Relative errors of stiffness and mass on the first modes, symmetric.
+    damping : (m,) array
+        Relative errors of damping ratios.
+    cords : (n_rigid,) array
+        Squared frequencies of rigid-body modes, (rad/s)^2.
+    output_shift, input_shift : (n, n_axes) array
+        How far sensors and blows are from their places, m.
+    local : (n_frfs,) array
+        Errors of the compliance that modes beyond those with scatter give to the FRFs, m/N.
+    gains : (n_channels,) array
+        Relative errors of the channels' gains, as logarithms.
+    """
+
+    kappa: FloatArray
+    mu: FloatArray
+    damping: FloatArray
+    cords: FloatArray
+    output_shift: FloatArray
+    input_shift: FloatArray
+    local: FloatArray
+    gains: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Nuisance:
+    """Parameters of what cannot be known, each in units of its standard deviation.
+
+    Parameters
+    ----------
+    n_modes, n_rigid : int
+        Modes with scatter, rigid-body modes among them.
+    kappa_std, mu_std : (m, m) array
+        Standard deviations.
+    damping_std : (m,) array
+        Of damping ratios, relative.
+    cords_std : float
+        Of squared frequencies of rigid-body modes, (rad/s)^2.
+    axes : tuple of str
+        Along which places are uncertain.
+    shift_std : (n_axes,) array
+        m.
+    n_outputs, n_inputs : int
+        Sensor positions and blows.
+    local_std : (n_frfs,) array
+        Of the compliance of modes beyond those with scatter, m/N, with the signs of the FRFs.
+    n_channels : int
+        Channels with gains.
+    gain_std : float
+        Of gains, relative.
+    is_stated : (m,) bool array
+        Modes whose frequency and damping a tolerance states: elastic ones of the band.
+    """
+
+    n_modes: int
+    n_rigid: int
+    kappa_std: FloatArray
+    mu_std: FloatArray
+    damping_std: FloatArray
+    cords_std: float
+    axes: tuple[str, ...]
+    shift_std: FloatArray
+    n_outputs: int
+    n_inputs: int
+    local_std: FloatArray
+    n_channels: int
+    gain_std: float
+    is_stated: BoolArray
+
+    @property
+    def pairs(self) -> tuple[IntArray, IntArray]:
+        """Rows and columns of the upper triangle of kappa and mu."""
+        return _triangle(self.n_modes)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of parameters: kappa, mu, damping, cords, shifts of sensors and blows, local, gains."""
+        n_pairs = self.n_modes * (self.n_modes + 1) // 2
+        shifts = len(self.axes)
+        return (
+            *(n_pairs, n_pairs, self.n_modes, self.n_rigid),
+            *(shifts * self.n_outputs, shifts * self.n_inputs, len(self.local_std), self.n_channels),
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of all parameters."""
+        return sum(self.sizes)
+
+    @property
+    def frequency_places(self) -> IntArray:
+        """Where the relative errors of the squared frequencies, kappa_ii, stand among the parameters."""
+        rows, columns = self.pairs
+        return np.flatnonzero(rows == columns).astype(np.int64)
+
+    @property
+    def damping_places(self) -> IntArray:
+        """Where the relative errors of the damping ratios stand among the parameters."""
+        return np.arange(self.n_modes) + 2 * self.sizes[0]
+
+    @property
+    def gain_places(self) -> IntArray:
+        """Where the gains stand among the parameters."""
+        return np.arange(self.size - self.n_channels, self.size)
+
+    @property
+    def is_bounded(self) -> BoolArray:
+        """Which parameters a tolerance bounds, (size,) array: frequencies, damping, places and gains."""
+        rows, columns = self.pairs
+        own = (rows == columns) & self.is_stated[rows]
+        n_shifts = len(self.axes) * (self.n_outputs + self.n_inputs)
+        cords, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
+        shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
+        return np.concatenate([own, own, self.is_stated, cords, shifts, local, gains])
+
+    def with_part(self, part: float) -> Nuisance:
+        """Give the same with a part of the tolerances of stiffness, mass and frequencies.
+
+        Parameters
+        ----------
+        part : float
+            Of each standard deviation of `kappa` and `mu`.
+
+        Returns
+        -------
+        Nuisance
+            With the same parameters.
+        """
+        return replace(self, kappa_std=part * self.kappa_std, mu_std=part * self.mu_std)
+
+    def in_parts(self, values: FloatArray, part: float) -> FloatArray:
+        """Give the same state in the standard deviations of `with_part`.
+
+        Parameters
+        ----------
+        values : (size,) array
+            Parameters in standard deviations.
+        part : float
+            As for `with_part`.
+
+        Returns
+        -------
+        (size,) array
+            Parameters in the other standard deviations.
+        """
+        n_fields = sum(self.sizes[:2])
+        return np.concatenate([values[:n_fields] / part, values[n_fields:]])
+
+    def pulls(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Give the square roots of twice the prior's cost, and their slopes.
+
+        Parameters
+        ----------
+        values : (size,) array
+            Parameters in standard deviations.
+        is_bounded : bool
+            False for a normal prior of all.
+
+        Returns
+        -------
+        pulls : (size,) array
+            As the parameters, but beyond the edge of a tolerance larger and larger.
+        slopes : (size,) array
+            Of the pulls by the parameters.
+        """
+        if not is_bounded:
+            return values, np.ones_like(values)
+        outside = np.where(self.is_bounded, np.maximum(np.abs(values) - EDGE, 0.0), 0.0)
+        curved = np.minimum(outside, FARTHEST)
+        added = STEEPER * curved * (2 * outside - curved)
+        return values + np.sign(values) * added, 1 + 2 * STEEPER * curved
+
+    def unpack(self, values: FloatArray) -> Unknowns:
+        """Give physical values.
+
+        Parameters
+        ----------
+        values : (size,) array
+            Parameters in standard deviations.
+
+        Returns
+        -------
+        Unknowns
+            The values.
+        """
+        ends = list(accumulate(self.sizes))
+        parts = [values[start:end] for start, end in pairwise((0, *ends))]
+        return Unknowns(
+            kappa=self._symmetric(parts[0]) * self.kappa_std,
+            mu=self._symmetric(parts[1]) * self.mu_std,
+            damping=np.maximum(parts[2] * self.damping_std, -0.95),
+            cords=parts[3] * self.cords_std,
+            output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
+            input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
+            local=self.local_std * parts[6],
+            gains=np.clip(parts[7] * self.gain_std, -MOST_GAIN, MOST_GAIN),
+        )
+
+    def _symmetric(self, triangle: FloatArray) -> FloatArray:
+        rows, columns = self.pairs
+        matrix = np.zeros((self.n_modes, self.n_modes))
+        matrix[rows, columns] = matrix[columns, rows] = triangle
+        return matrix
+
+
+@cache
+def _triangle(size: int) -> tuple[IntArray, IntArray]:
+    rows, columns = np.triu_indices(size)
+    return rows.astype(np.int64), columns.astype(np.int64)
+
+
+def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nuisance:
+    """Turn tolerances into standard deviations.
+
+    Parameters
+    ----------
+    basis : Basis
+        Of the nominal model.
+    layout : Layout
+        Sensors and blows.
+    options : DiagnoseOptions
+        Tolerances.
+
+    Returns
+    -------
+    Nuisance
+        The parameters.
+    """
+    frequencies = np.sqrt(basis.modes.eigenvalues)
+    n_modes = max(int(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s)), 1, _lowered(basis))
+    n_modes = min(n_modes, MOST_MODES, len(frequencies))
+    n_rigid = min(basis.modes.n_rigid, n_modes)
+    stiffness, mass = options.stiffness_tolerance * UNIFORM, MASS_PART * options.stiffness_tolerance * UNIFORM
+    kappa, mu = np.full((n_modes, n_modes), ACROSS * stiffness), np.full((n_modes, n_modes), ACROSS * mass)
+    np.fill_diagonal(kappa, np.hypot(stiffness, 2 * options.frequency_tolerance * UNIFORM))
+    np.fill_diagonal(mu, mass)
+    beyond = np.maximum(frequencies[:n_modes] / basis.highest_rad_s - 1, 0.0)
+    growth = 1 + LESS_CONVERGED * beyond + REDUCED * beyond**2
+    kappa *= np.sqrt(np.outer(growth, growth))
+    kappa[:n_rigid] = kappa[:, :n_rigid] = 0.0
+    first = frequencies[n_rigid] if len(frequencies) > n_rigid else 0.0
+    span = extents(basis.model)
+    directions = {dof.direction for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)}
+    axes = tuple(axis for axis in span if directions != {axis})
+    shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes])
+    beyond_scatter = LOCAL * _local(basis, layout, n_modes)
+    return Nuisance(
+        n_modes=n_modes,
+        n_rigid=n_rigid,
+        kappa_std=kappa,
+        mu_std=mu,
+        damping_std=_damping_std(options.damping_tolerance * UNIFORM, growth, n_rigid),
+        cords_std=(CORDS * first) ** 2,
+        axes=axes,
+        shift_std=shift_std,
+        n_outputs=len(layout.outputs),
+        n_inputs=len(layout.inputs),
+        local_std=np.copysign(np.hypot(beyond_scatter, _corners(basis, layout, shift_std)), beyond_scatter),
+        n_channels=len(layout.channels),
+        gain_std=options.gain_tolerance * UNIFORM,
+        is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
+    )
+
+
+def _lowered(basis: Basis) -> int:
+    """Count the modes that shear, where a thick beam was modelled without it, could bring into the band."""
+    source = basis.model.source
+    if not isinstance(source, BeamFile) or source.beam.formulation != "euler-bernoulli":
+        return 0
+    squares = solve_basis(with_formulation(basis.model, "timoshenko")).eigenvalues
+    return int(np.count_nonzero(np.sqrt(squares) <= LOWERED * basis.highest_rad_s))
+
+
+def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
+    """Relative standard deviations of damping ratios: modes beyond the band are measured by no one who states them."""
+    std = np.maximum(stated, np.minimum(stated * growth, UNSTATED_SPREAD))
+    std[:n_rigid] = UNSTATED_SPREAD
+    return std
+
+
+def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
+    """Compliance of each FRF by all modes beyond those with scatter, m/N."""
+    outputs = np.array([motion_row(basis.model, dof) for _, dof in layout.outputs]) @ basis.vectors
+    inputs = np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors
+    shift = basis.modes.shift
+    whole = outputs @ np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), inputs.T)
+    scattered = (outputs[:, :n_modes] / (basis.modes.eigenvalues[:n_modes] + shift)) @ inputs[:, :n_modes].T
+    return np.asarray((whole - scattered)[layout.output_of, layout.input_of])
+
+
+def _corners(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
+    """Give the compliance, m/N, by which an FRF may be off where sensor and blow meet: it has a corner there."""
+    apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
+    sensors = np.array([dof.node for _, dof in layout.outputs])
+    struck = np.array([dof.node for dof in layout.inputs])
+    meet = sensors[layout.output_of] == struck[layout.input_of]
+    kinks = np.array([kink_beside(basis.model, dof) for dof in layout.inputs])
+    return np.asarray(np.where(meet, apart * kinks[layout.input_of], 0.0))
+
+
+def all_shift_rows(basis: Basis, nuisance: Nuisance, dofs: tuple[Dof, ...]) -> FloatArray:
+    """Rows in the basis by which motions change with places.
+
+    Parameters
+    ----------
+    basis : Basis
+        Coordinates.
+    nuisance : Nuisance
+        Says along which axes places are uncertain.
+    dofs : tuple of Dof
+        Of sensors or blows.
+
+    Returns
+    -------
+    (n_dofs, n_axes, q) array
+        1/m.
+    """
+    rows = np.zeros((len(dofs), len(nuisance.axes), basis.vectors.shape[1]))
+    for index, dof in enumerate(dofs):
+        for axis, row in shift_rows(basis.model, dof).items():
+            if axis in nuisance.axes:
+                rows[index, nuisance.axes.index(axis)] = row @ basis.vectors
+    return rows

@@ -1,0 +1,215 @@
+"""FRFs of a modified model, and their derivatives by what cannot be known.
+
+Structural changes are solved for in the basis, so that damping belongs to the modes that the structure really has.
+Scatter then acts on those modes, and what has dynamics of its own (resonators, dampers) is attached last, by the
+inversion lemma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.model.basis import Basis
+    from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.diagnosis.model.layout import Layout
+    from frf_ipz.diagnosis.model.modes import Modes
+    from frf_ipz.diagnosis.model.nuisance import Nuisance, Unknowns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """FRFs, and the modal motions that they are made of.
+
+    Parameters
+    ----------
+    values : (n_points, n_frfs) complex array
+        SI, in the quantities of the FRFs, as the channels show them.
+    modes : Modes
+        The modes.
+    output_motion, input_motion : (n_points, q, n) complex array
+        Modal motion for unit forces at sensors and blows, attachments included.
+    chain : (n_points, n_frfs) complex array
+        Factor from receptance to what is shown.
+    s : (n_points,) complex array
+        rad/s.
+    attached_motion : (n_points, q, n) complex array
+        Modal motion for unit forces where something is attached, without it.
+    attached_stiffness : (n_points, n, n) complex array
+        Forces on the structure there per motion that it would have without.
+    """
+
+    values: ComplexArray
+    modes: Modes
+    output_motion: ComplexArray
+    input_motion: ComplexArray
+    chain: ComplexArray
+    s: ComplexArray
+    attached_motion: ComplexArray
+    attached_stiffness: ComplexArray
+
+
+def respond(
+    modes: Modes, change: Change, layout: Layout, unknowns: Unknowns, s: ComplexArray, basis: Basis
+) -> Response:
+    """Evaluate the FRFs of a modified structure.
+
+    Parameters
+    ----------
+    modes : Modes
+        Of the structure.
+    change : Change
+        Its attachments, loss factor and channels.
+    layout : Layout
+        Sensors and blows.
+    unknowns : Unknowns
+        Shifts of sensors and blows, and gains.
+    s : (n_points,) complex array
+        rad/s.
+    basis : Basis
+        Of the structure.
+
+    Returns
+    -------
+    Response
+        What would be measured without noise.
+    """
+    left = modes.outputs + np.einsum("na,naq->nq", unknowns.output_shift, modes.output_shifts)
+    right = modes.inputs + np.einsum("na,naq->nq", unknowns.input_shift, modes.input_shifts)
+    n_left = len(left)
+    motions = [attachment.motions for attachment in change.attachments]
+    attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
+    loads = np.concatenate([left, right, attached])
+    motion = _solve(modes, _modulus(change, modes, s), loads, s)
+    own = motion[:, :, len(left) + len(right) :]
+    stiffness = _coupled(own, attached, change, s)
+    motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
+    output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
+    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of] + unknowns.local
+    chain = s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ unknowns.gains)
+    return Response(
+        values=receptance * chain,
+        modes=modes,
+        output_motion=output_motion,
+        input_motion=input_motion,
+        chain=chain,
+        s=s,
+        attached_motion=own,
+        attached_stiffness=stiffness,
+    )
+
+
+def _modulus(change: Change, modes: Modes, s: ComplexArray) -> ComplexArray:
+    """Stiffness over that of the model, (n_points, 1 or q); of Kjartansson (1979) where it has to be causal."""
+    loss = change.loss_factor
+    if not loss or not (change.reference_rad_s or change.keeps_modes):
+        return np.full((len(s), 1), 1 + 1j * loss)
+    middle = np.array([change.reference_rad_s])
+    if change.keeps_modes:
+        middle = np.where(modes.omega > 0, modes.omega, 1.0)  # rigid-body modes have no stiffness to lose energy
+    return np.asarray(np.hypot(1, loss) * (s[:, None] / middle) ** (2 / np.pi * np.arctan(loss)))
+
+
+def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArray) -> ComplexArray:
+    """Modal motion under loads, (n_points, q, n_loads)."""
+    damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
+    denominators = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
+    if modes.viscous is None:
+        return np.asarray(loads.T[None] / denominators[:, :, None])
+    dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))
+    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads.T, (len(s), *loads.T.shape))), np.complex128)
+
+
+def _coupled(own: ComplexArray, attached: FloatArray, change: Change, s: ComplexArray) -> ComplexArray:
+    """D (1 + R D)^-1 of all attachments, (n_points, n, n)."""
+    n = len(attached)
+    if n == 0:
+        return np.zeros((len(s), 0, 0), complex)
+    stiffness = np.concatenate(
+        [
+            np.repeat(attachment.stiffness(s)[:, None], attachment.motions.shape[1], 1)
+            for attachment in change.attachments
+        ],
+        axis=1,
+    )
+    inner = np.eye(n) + stiffness[:, :, None] * np.matmul(attached, own)
+    return np.linalg.solve(inner, stiffness[:, :, None] * np.eye(n))
+
+
+def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:
+    factors = np.ones((len(s), len(layout.output_of)), complex)
+    for channel, transfer in change.channels.items():
+        gain = transfer(s)
+        for index, name in enumerate(layout.input_channels):
+            if name == channel:
+                factors[:, layout.input_of == index] /= gain[:, None]
+        for index, (name, _) in enumerate(layout.outputs):
+            if name == channel:
+                factors[:, layout.output_of == index] *= gain[:, None]
+    return factors
+
+
+def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) -> ComplexArray:
+    """Differentiate FRFs by what cannot be known.
+
+    Parameters
+    ----------
+    response : Response
+        At the point of linearisation.
+    nuisance : Nuisance
+        The parameters.
+    layout : Layout
+        Sensors and blows.
+
+    Returns
+    -------
+    (n_points, n_frfs, size) complex array
+        Per standard deviation of each parameter.
+    """
+    modes, s, m = response.modes, response.s, nuisance.n_modes
+    scattered_left = response.output_motion[:, :m].swapaxes(1, 2)[:, layout.output_of]  # point, FRF, mode
+    scattered_right = response.input_motion[:, :m].swapaxes(1, 2)[:, layout.input_of]
+    left, right = scattered_left @ modes.rotation.T, scattered_right @ modes.rotation.T
+    i, j = nuisance.pairs
+    omega = modes.omega[:m]
+    products = left[:, :, i] * right[:, :, j]
+    products += np.where(i != j, left[:, :, j] * right[:, :, i], 0.0)
+    products *= -response.chain[:, :, None]
+    own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance.damping_std
+    rigid = slice(0, nuisance.n_rigid)
+    changed = -response.chain[:, :, None] * scattered_left * scattered_right
+    parts = [
+        products * (omega[i] * omega[j] * nuisance.kappa_std[i, j]),
+        products * nuisance.mu_std[i, j] * (s**2)[:, None, None],
+        changed * own * s[:, None, None],
+        -response.chain[:, :, None] * left[:, :, rigid] * right[:, :, rigid] * nuisance.cords_std,
+        *(
+            np.moveaxis(part, 1, 2) * response.chain[:, :, None]
+            for part in _shift_jacobians(response, nuisance, layout)
+        ),
+        response.chain[:, :, None] * np.diag(nuisance.local_std),
+        response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std),
+    ]
+    return np.concatenate(parts, axis=2)
+
+
+def _shift_jacobians(response: Response, nuisance: Nuisance, layout: Layout) -> list[ComplexArray]:
+    modes = response.modes
+    outputs = np.einsum("naq,kqi->knai", modes.output_shifts, response.input_motion)
+    inputs = np.einsum("naq,kqo->knao", modes.input_shifts, response.output_motion)
+    n_frfs = len(layout.output_of)
+    found: list[ComplexArray] = []
+    for count, own, other, motion in (
+        (nuisance.n_outputs, layout.output_of, layout.input_of, outputs),
+        (nuisance.n_inputs, layout.input_of, layout.output_of, inputs),
+    ):
+        part = np.zeros((len(response.s), count, len(nuisance.axes), n_frfs), np.complex128)
+        frf = np.arange(n_frfs)
+        part[:, own, :, frf] = motion[:, own, :, other]
+        found.append((part * nuisance.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
+    return found

@@ -1,0 +1,59 @@
+"""How far sensors and blows may be from their places, for the stages that update the model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.model.layout import extents, shift_rows
+from frf_ipz.diagnosis.model.nuisance import UNIFORM
+from frf_ipz.updating.position_uncertainty import PositionUncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.structure import ReducedModel, StructuralModel
+
+
+def misplacements(
+    model: StructuralModel, reduced: ReducedModel, labels: Sequence[FrfLabel], tolerance_m_per_m: float
+) -> tuple[PositionUncertainty, ...]:
+    """Turn a tolerance of places into rows of the reduced model.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    reduced : ReducedModel
+        Made from it.
+    labels : sequence of FrfLabel
+        What was measured.
+    tolerance_m_per_m : float
+        Half width of what can be, over the size of the structure along an axis.
+
+    Returns
+    -------
+    tuple of PositionUncertainty
+        Of each sensor and each blow along each axis; none for lumped models, whose masses have no places.
+    """
+    spans = extents(model)
+    ends = dict.fromkeys(end for label in labels for end in ((label.output_dof, True), (label.input_dof, False)))
+    return tuple(
+        PositionUncertainty(
+            dof=dof, is_output=is_output, row=tolerance_m_per_m * UNIFORM * spans[axis] * _inside(model, reduced, row)
+        )
+        for dof, is_output in ends
+        for axis, row in shift_rows(model, dof).items()
+    )
+
+
+def _inside(model: StructuralModel, reduced: ReducedModel, row: FloatArray) -> FloatArray:
+    """Weights of all DOFs, as a row of the reduced model; DOFs that are held do not move."""
+    found = np.zeros(len(reduced.dofs))
+    for place in np.flatnonzero(row).tolist():
+        if not model.fixed[place]:
+            found += row[place] * reduced.row(model.all_dofs[place])
+    return found

@@ -1,0 +1,355 @@
+"""Global scan for large effects: all of them at all locations for many values, far from the axis, where all is smooth.
+
+Many effects are one dynamic stiffness D on one motion p. The FRFs then change by ``-R_sp D / (1 + R_pp D) R_ph``: for
+every line the misfit is a quadratic of one complex number, whose three coefficients do not depend on the effect. All
+such effects at all locations, for all values of their parameters, cost a few operations a line each; the others are
+evaluated value by value. Misfits count by their logarithm.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, weights_of
+from frf_ipz.diagnosis.search.robust_refinement import Start, robust_misfit
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Signature
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
+    from frf_ipz.diagnosis.model.basis import Basis
+    from frf_ipz.diagnosis.model.layout import Layout
+    from frf_ipz.diagnosis.model.response import Response
+
+AT_ONCE = 400  # motions: keeps arrays within some ten MB
+AMPLITUDES = np.geomspace(1e-3, 300.0, 20)  # over the stiffness of the structure against the motion
+CLOSER = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
+LARGEST_FLEXIBILITY = 2500  # DOFs up to which the static flexibility of all of them is found
+WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
+SCATTER_ERROR = 0.1  # the same where scatter was fitted
+LOOKED_AROUND = 16  # places of each effect: where not all places are looked at, those beside the best are
+
+
+Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
+"""Of the misfit of each line with a dynamic stiffness on a motion: constant, linear, square; and R_pp."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Receptances:
+    """FRFs to, from and at motions, on top of what is supposed already.
+
+    Parameters
+    ----------
+    across : (n_points, n_frfs, n_motions) complex array
+        R_sp R_ph as the channels show it.
+    own : (n_points, n_motions) complex array
+        R_pp.
+    """
+
+    across: ComplexArray
+    own: ComplexArray
+
+
+def receptances(base: Response, basis: Basis, layout: Layout, motions: FloatArray, rest: FloatArray) -> Receptances:
+    """Evaluate FRFs of motions.
+
+    Parameters
+    ----------
+    base : Response
+        Of what is supposed already.
+    basis : Basis
+        Its coordinates.
+    layout : Layout
+        Sensors and blows.
+    motions : (n_all, n_motions) array
+        Weights of all DOFs.
+    rest : (n_motions,) array
+        Static flexibility that the basis lacks, m/N.
+
+    Returns
+    -------
+    Receptances
+        Of the motions.
+    """
+    shapes = motions.T @ basis.vectors @ base.modes.vectors
+    left, right = np.matmul(shapes, base.output_motion), np.matmul(shapes, base.input_motion)
+    across = left[:, :, layout.output_of] * right[:, :, layout.input_of] * base.chain[:, None, :]
+    s, modes = base.s[:, None], base.modes
+    damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
+    own = (1 / (s**2 + s * damping + modes.squares)) @ (shapes**2).T + rest
+    if base.attached_motion.shape[2]:
+        felt = np.matmul(shapes, base.attached_motion)
+        own = own - np.einsum("kpa,kab,kpb->kp", felt, base.attached_stiffness, felt)
+    return Receptances(across=np.moveaxis(across, 1, 2), own=np.asarray(own))
+
+
+def missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
+    """Find the static flexibility of motions that a basis lacks.
+
+    Parameters
+    ----------
+    basis : Basis
+        Of the nominal model.
+    motions : (n_all, n_motions) array
+        Weights of all DOFs.
+
+    Returns
+    -------
+    (n_motions,) array
+        m/N; zero for models that are too large.
+    """
+    model, shift = basis.model, basis.modes.shift
+    free = motions[~model.fixed]
+    if len(free) > LARGEST_FLEXIBILITY:
+        return np.zeros(motions.shape[1])
+    used = np.flatnonzero(np.abs(free).max(1) > 0)
+    loads = np.zeros((len(free), len(used)))
+    loads[used, np.arange(len(used))] = 1.0
+    flexibility = basis.modes.factor.solve(loads)[used]
+    whole = np.sum(free[used] * (flexibility @ free[used]), 0)
+    shapes = motions.T @ basis.vectors
+    inside = np.sum(shapes * np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), shapes.T).T, 1)
+    return np.asarray(np.maximum(whole - inside, 0.0))
+
+
+def search_sketches(
+    causes: Sequence[Cause], sketches: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
+    measured: TransferFunctions, weights: FloatArray,
+) -> list[Start]:  # fmt: skip
+    """Find the best values of each effect at each place.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+        What is tried.
+    sketches : sequence of Signature
+        The same as dynamic stiffness.
+    base : Response
+        Of what is supposed already.
+    basis : Basis
+        Its coordinates.
+    layout : Layout
+        Sensors and blows.
+    measured : TransferFunctions
+        Transfer functions on the contour of the sketches.
+    weights : (n_points, n_frfs) array
+        Over the squared misfit.
+
+    Returns
+    -------
+    list of Start
+        One a cause.
+    """
+    misfit = measured.values - base.values
+    constant = np.sum(weights * np.abs(misfit) ** 2, 1)
+    found = []
+    for group in _by_motion(sketches):
+        motions = np.stack([sketches[members[0]].motion for members in group], 1)
+        parts = receptances(base, basis, layout, motions, missing_flexibility(basis, motions))
+        linear = np.einsum("kf,kfp->kp", weights * misfit.conj(), parts.across)
+        square = np.einsum("kf,kfp->kp", weights, np.abs(parts.across) ** 2)
+        for column, members in enumerate(group):
+            terms = constant, linear[:, column], square[:, column], parts.own[:, column]
+            found += [_best(causes[member], sketches[member], terms) for member in members]
+    return found
+
+
+def _by_motion(sketches: Sequence[Signature]) -> Iterator[list[list[int]]]:
+    """Sketches on the same motion share their receptances; motions come in handy numbers."""
+    same: dict[bytes, list[int]] = {}
+    for index, sketch in enumerate(sketches):
+        same.setdefault(sketch.motion.tobytes(), []).append(index)
+    groups = list(same.values())
+    for start in range(0, len(groups), AT_ONCE):
+        yield groups[start : start + AT_ONCE]
+
+
+def _best(cause: Cause, sketch: Signature, terms: Terms) -> Start:
+    own = terms[3]
+    if sketch.amplitudes is None:
+        scale = np.median(np.abs(own)) * np.median(np.abs(sketch.shapes), axis=1)
+        amplitudes = AMPLITUDES[None, :] / scale[:, None]
+    else:
+        amplitudes = np.broadcast_to(sketch.amplitudes, (len(sketch.shapes), len(sketch.amplitudes)))
+    costs = _costs(sketch.shapes, amplitudes, terms)
+    shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    best, cost = amplitudes[shape, size], costs[shape, size]
+    for closer in CLOSER if amplitudes.shape[1] > 1 else ():
+        around = best * closer
+        costs = _costs(sketch.shapes[shape, None], around[None], terms)[0]
+        nearest = int(np.argmin(costs))
+        best, cost = around[nearest], costs[nearest]
+    values = sketch.values[shape].copy()
+    if len(values):
+        values[sketch.amplitude] *= best
+    return Start(cause=cause, values=values, cost=float(cost))
+
+
+def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
+    """Robust misfits of shapes times amplitudes, (n_shapes, n_amplitudes)."""
+    constant, linear, square, own = terms
+    stiffness = amplitudes[:, :, None] * shapes[:, None, :]
+    effective = stiffness / (1 + own * stiffness)
+    squares = constant + 2 * (effective * linear).real + np.abs(effective) ** 2 * square
+    return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2))
+
+
+def wide_search(bench: InferenceProblem, base: Fit) -> list[Start]:
+    """Look for large effects, far from the axis.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    base : Fit
+        What is supposed already.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, by rising cost.
+    """
+    return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
+
+
+def search_among_scatter(bench: InferenceProblem, base: Fit) -> list[Start]:
+    """Look for large effects half-way to the axis, beside the scatter that was fitted without them.
+
+    Scatter takes up what shifts natural frequencies; what it cannot, stands out.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    base : Fit
+        What is supposed already.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, by rising cost.
+    """
+    specimen = replace(bench.specimen, contour=bench.middle.s)
+    return _search(bench, specimen, bench.middle, base, base.unknown, SCATTER_ERROR)
+
+
+def causes_of(effect: Effect, specimen: ModelContext) -> list[Cause]:
+    """Give an effect at all its places.
+
+    Parameters
+    ----------
+    effect : Effect
+        What.
+    specimen : ModelContext
+        What is tested.
+
+    Returns
+    -------
+    list of Cause
+        One a place.
+    """
+    places = effect.places(specimen)
+    return [Cause(effect=effect, place=place, n_places=len(places)) for place in places]
+
+
+def _search(
+    bench: InferenceProblem,
+    specimen: ModelContext,
+    measured: TransferFunctions,
+    base: Fit,
+    unknown: FloatArray,
+    error: float,
+) -> list[Start]:
+    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
+    weights = weights_of(measured, error)
+    response = base.hypothesis.respond(base.values, unknown, measured.s)
+    sketch = partial(_sketched, specimen, measured, base, response, weights)
+    found, direct = sketch(causes)
+    found.sort(key=lambda start: start.cost)
+    found += sketch(_between(specimen, causes, found))[0]
+    found += [best_start(bench, base, cause, measured, weights, unknown) for cause in direct]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def _sketched(
+    specimen: ModelContext,
+    measured: TransferFunctions,
+    base: Fit,
+    response: Response,
+    weights: FloatArray,
+    causes: Sequence[Cause],
+) -> tuple[list[Start], list[Cause]]:
+    """Find the best values of causes that can be sketched, and which ones cannot."""
+    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
+    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
+    found = search_sketches(
+        [cause for cause, _ in drawn], [sketch for _, sketch in drawn], response, base.hypothesis.basis,
+        specimen.layout, measured, weights,
+    )  # fmt: skip
+    return found, [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+
+
+def _between(specimen: ModelContext, causes: Sequence[Cause], starts: Sequence[Start]) -> list[Cause]:
+    """Give the places beside the best of each effect that are none of those where it was looked for."""
+    seen = {cause.key for cause in causes}
+    counts, found = Counter[str](), list[Cause]()
+    for start in starts:
+        effect = start.cause.effect
+        counts[effect.name] += 1
+        if counts[effect.name] > LOOKED_AROUND:
+            continue
+        for place in effect.neighbours(specimen, start.cause.place):
+            cause = Cause(effect=effect, place=place, n_places=start.cause.n_places)
+            if cause.key not in seen:
+                seen.add(cause.key)
+                found.append(cause)
+    return found
+
+
+def best_start(
+    bench: InferenceProblem,
+    base: Fit,
+    cause: Cause,
+    measured: TransferFunctions,
+    weights: FloatArray,
+    unknown: FloatArray,
+) -> Start:
+    """Try the values that an effect proposes to start from.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    base : Fit
+        What is supposed already.
+    cause : Cause
+        Effect and place.
+    measured : TransferFunctions
+        Transfer functions.
+    weights : (n_points, n_frfs) array
+        Over the squared misfit.
+    unknown : (n_nuisance,) array
+        What cannot be known, in standard deviations.
+
+    Returns
+    -------
+    Start
+        The best of them.
+    """
+    hypothesis = bench.suppose((*base.hypothesis.causes, cause), exact=False)
+    grid = cause.effect.starts(bench.specimen, cause.place)
+    costs = []
+    for values in grid:
+        response = hypothesis.respond(np.concatenate([base.values, values]), unknown, measured.s)
+        costs.append(robust_misfit(measured.values - response.values, weights))
+    place = int(np.argmin(costs))
+    return Start(cause=cause, values=grid[place], cost=costs[place])

@@ -1,1 +1,0 @@
-"""Far from the axis, where no peak is narrow: wide search, and the way back."""

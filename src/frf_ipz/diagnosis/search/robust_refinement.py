@@ -1,0 +1,288 @@
+"""Refines the values that a global scan led to, steps to better locations, and comes half the way back to the axis.
+
+Far from the axis every peak is so wide that no other minimum is near, and every step down leads on; near it, only the
+right location has a way. Half-way, values are exact enough for a fit near the axis to find narrow peaks. Only the
+parameters of the effects move. The misfit of each line counts by its logarithm, so that lines which nothing explains
+yet do not dominate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, weights_of
+
+if TYPE_CHECKING:
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
+
+STEP = 1e-4  # of the logarithm of a parameter, for its derivative
+LONGEST_STEP = 0.5
+MOST_DAMPING = 1e4
+GOOD_ENOUGH = 0.01  # change of the robust misfit
+REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
+PLACES_EACH = 3  # of an effect that are refined
+STEPPED, NOT_FAR = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
+STEPPED_CLOSER = 3  # the same half-way to the axis
+NEAR = 2  # nodes or elements: places so near count as one there
+MOST_STEPS = 12
+GAIN = 0.5  # nats: a neighbour must be better by that
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Where a fit may begin.
+
+    Parameters
+    ----------
+    cause : Cause
+        Effect and place.
+    values : (n_parameters,) array
+        Physical values of its parameters.
+    cost : float
+        Robust misfit there; the lower the better.
+    """
+
+    cause: Cause
+    values: FloatArray
+    cost: float
+
+
+def robust_misfit(misfit: ComplexArray, weights: FloatArray) -> float:
+    """Sum of the logarithms of the lines' misfits.
+
+    Parameters
+    ----------
+    misfit : (n_points, n_frfs) complex array
+        Measurement minus model.
+    weights : (n_points, n_frfs) array
+        Over its square.
+
+    Returns
+    -------
+    float
+        nats.
+    """
+    return float(np.sum(np.log1p(np.sum(weights * np.abs(misfit) ** 2, 1))))
+
+
+def refine(
+    hypothesis: Hypothesis,
+    measured: TransferFunctions,
+    weights: FloatArray,
+    values: FloatArray,
+    *,
+    iterations: int = 12,
+) -> tuple[FloatArray, float]:
+    """Improve values on a contour far from the axis.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Causes at their places.
+    measured : TransferFunctions
+        Transfer functions far from the axis.
+    weights : (n_points, n_frfs) array
+        Over the squared misfit.
+    values : (n_parameters,) array
+        Physical values to start from.
+    iterations : int
+        At most that many.
+
+    Returns
+    -------
+    values : (n_parameters,) array
+        Better ones.
+    misfit : float
+        Robust misfit there.
+    """
+    unknown = np.zeros(hypothesis.nuisance.size)
+
+    def misfit_at(searched: FloatArray) -> ComplexArray:
+        response = hypothesis.respond(hypothesis.physical(searched), unknown, measured.s)
+        return np.asarray(measured.values - response.values)
+
+    point = hypothesis.start_at(values)
+    misfit = misfit_at(point)
+    cost, damping = robust_misfit(misfit, weights), 1e-2
+    if not len(point):
+        return values, cost
+    for _ in range(iterations):
+        curvature, gradient = _normal(misfit_at, point, misfit, weights, hypothesis.high)
+        gain = 0.0
+        while damping < MOST_DAMPING:
+            step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature) + 1e-12), gradient)
+            step *= min(1.0, LONGEST_STEP / float(np.abs(step).max() + 1e-300))
+            trial = np.clip(point + step, hypothesis.low, hypothesis.high)
+            trial_misfit = misfit_at(trial)
+            trial_cost = robust_misfit(trial_misfit, weights)
+            if trial_cost < cost:
+                gain, point, misfit, cost = cost - trial_cost, trial, trial_misfit, trial_cost
+                damping = max(0.2 * damping, 1e-6)
+                break
+            damping *= 6.0
+        if gain < GOOD_ENOUGH:
+            break
+    return hypothesis.physical(point), cost
+
+
+def _normal(
+    misfit_at: Callable[[FloatArray], ComplexArray],
+    point: FloatArray,
+    misfit: ComplexArray,
+    weights: FloatArray,
+    high: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    robust = weights / (1 + np.sum(weights * np.abs(misfit) ** 2, 1))[:, None]
+    columns = []
+    for index in range(len(point)):
+        moved = point.copy()
+        step = STEP if moved[index] + STEP <= high[index] else -STEP
+        moved[index] += step
+        columns.append(((misfit - misfit_at(moved)) / step).ravel())
+    derivative = np.stack(columns, 1)
+    weighted = robust.ravel()[:, None] * derivative
+    return (derivative.conj().T @ weighted).real, (weighted.conj().T @ misfit.ravel()).real
+
+
+Supposed: TypeAlias = tuple[tuple[Cause, ...], Start]
+"""What is supposed already, and one more cause with the values of all."""
+
+
+def refine_far(bench: InferenceProblem, base: Fit, starts: Sequence[Start]) -> list[Start]:
+    """Refine the best starts of a wide search, and step to better places.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    base : Fit
+        What is supposed already.
+    starts : sequence of Start
+        By rising cost.
+
+    Returns
+    -------
+    list of Start
+        With the values of all causes, by rising cost.
+    """
+    weights = weights_of(bench.coarse, REFINED_ERROR)
+    found = []
+    for start in spread(starts, PLACES_EACH):
+        hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
+        values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
+        found.append(Start(cause=start.cause, values=values, cost=cost))
+    found.sort(key=lambda start: start.cost)
+    stepped = [
+        step_far(bench, base.hypothesis.causes, start)
+        for start in found[:STEPPED]
+        if start.cost < NOT_FAR * found[0].cost
+    ]
+    best: dict[tuple[object, ...], Start] = {}
+    for start in sorted([*stepped, *found[len(stepped) :]], key=lambda start: start.cost):
+        best.setdefault(start.cause.key, start)
+    return list(best.values())
+
+
+def bring_closer(bench: InferenceProblem, starts: Sequence[Supposed]) -> list[Supposed]:
+    """Bring starts half the way to the axis: their values, and the places of the best.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    starts : sequence of (tuple of Cause, Start)
+        Each with what is supposed besides.
+
+    Returns
+    -------
+    list of (tuple of Cause, Start)
+        By rising cost half-way.
+    """
+    weights = weights_of(bench.middle, REFINED_ERROR)
+    closer = []
+    for known, start in starts:
+        values, cost = refine(bench.suppose((*known, start.cause)), bench.middle, weights, start.values)
+        closer.append((known, Start(cause=start.cause, values=values, cost=cost)))
+    closer.sort(key=lambda one: one[1].cost)
+    best = [(known, _step(bench, known, start, bench.middle)) for known, start in closer[:STEPPED_CLOSER]]
+    return sorted([*best, *closer[STEPPED_CLOSER:]], key=lambda one: one[1].cost)
+
+
+def step_far(bench: InferenceProblem, known: tuple[Cause, ...], start: Start) -> Start:
+    """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    known : tuple of Cause
+        What is supposed besides, at the same places.
+    start : Start
+        With the values of all.
+
+    Returns
+    -------
+    Start
+        The same cause at a better place.
+    """
+    return _step(bench, known, start, bench.coarse)
+
+
+def _step(bench: InferenceProblem, known: tuple[Cause, ...], start: Start, measured: TransferFunctions) -> Start:
+    weights = weights_of(measured, REFINED_ERROR)
+    seen = {start.cause.key}
+    for _ in range(MOST_STEPS):
+        better = start
+        for place in start.cause.effect.neighbours(bench.specimen, start.cause.place):
+            cause = Cause(effect=start.cause.effect, place=place, n_places=start.cause.n_places)
+            hypothesis = bench.suppose((*known, cause))
+            if cause.key in seen or len(hypothesis.parameters) != len(start.values):
+                continue
+            seen.add(cause.key)
+            values, cost = refine(hypothesis, measured, weights, start.values, iterations=3)
+            if cost < better.cost - GAIN:
+                better = Start(cause=cause, values=values, cost=cost)
+        if better is start:
+            break
+        start = better
+    return start
+
+
+def spread(starts: Iterable[Start], each: int) -> list[Start]:
+    """Take the best places of each effect that are not beside each other.
+
+    Parameters
+    ----------
+    starts : iterable of Start
+        By rising cost.
+    each : int
+        How many of each effect.
+
+    Returns
+    -------
+    list of Start
+        Those taken, by effect.
+    """
+    taken: dict[str, list[Start]] = {}
+    for start in starts:
+        mine = taken.setdefault(start.cause.effect.name, [])
+        if len(mine) < each and not any(_beside(start.cause, other.cause) for other in mine):
+            mine.append(start)
+    return [start for mine in taken.values() for start in mine]
+
+
+def _beside(first: Cause, second: Cause) -> bool:
+    if len(first.place.key) != len(second.place.key):
+        return False
+    pairs = list(zip(first.place.key, second.place.key, strict=True))
+    numbers = [abs(a - b) for a, b in pairs if isinstance(a, int) and isinstance(b, int)]
+    others_agree = all(a == b for a, b in pairs if not (isinstance(a, int) and isinstance(b, int)))
+    return others_agree and bool(numbers) and max(numbers) <= NEAR

@@ -1,0 +1,252 @@
+"""Search for small effects on top of a fit that is nearly right: what each promises beyond what scatter can explain.
+
+A small effect changes the FRFs in proportion to its size, so that one projection gives the best size and the evidence
+of each, at every place. The signatures of effects that are one dynamic stiffness on one motion are weighed together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from frf_ipz.diagnosis.model.response import nuisance_jacobian
+from frf_ipz.diagnosis.search.global_scan import AT_ONCE, causes_of, receptances
+from frf_ipz.diagnosis.search.robust_refinement import Start
+from frf_ipz.numerics.least_squares import cholesky_with_prior
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.diagnosis.catalogue.effect import Parameter, Signature
+    from frf_ipz.diagnosis.evidence.fit import Data, Fit
+    from frf_ipz.diagnosis.evidence.hypothesis import Cause, Hypothesis
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.model.response import Response
+
+COLUMNS = 600  # signatures that are weighed together
+BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear
+LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
+FADING = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Score:
+    """Weighs misfits by what scatter cannot explain.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        The data.
+    base : Fit
+        What is supposed already.
+    data : Data
+        What misfits are of.
+    misfit : (n_data,) array
+        Whitened misfit of the base, as it would be without scatter.
+    columns : (n_data, n_nuisance) array
+        Whitened derivatives of the FRFs by the pulls of what cannot be known.
+    factor : (n_nuisance, n_nuisance) array
+        Lower Cholesky factor of their curvature with its prior.
+    pulls : (n_nuisance,) array
+        Of the base.
+    response : Response
+        Of the base.
+    """
+
+    bench: InferenceProblem
+    base: Fit
+    data: Data
+    misfit: FloatArray
+    columns: FloatArray
+    factor: FloatArray
+    pulls: FloatArray
+    response: Response
+
+    def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
+        """Change of the FRFs by some values, scatter as in the base."""
+        searched = hypothesis.start_at(np.concatenate([self.base.values, values]))
+        response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, self.data.measured.s)
+        return np.asarray(response.values - self.response.values)
+
+    def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
+        """Half the fall of the sum of squares at some values, nats."""
+        misfit = self._misfit(hypothesis, hypothesis.start_at(np.concatenate([self.base.values, values])))
+        return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
+
+    def weigh(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        """Find the best sizes of changes, and the gain of each.
+
+        Parameters
+        ----------
+        changes : (n_points, n_frfs, n) complex array
+            Of the FRFs, for size 1.
+
+        Returns
+        -------
+        sizes, gains : (n,) array
+            Sizes may be negative; gains in nats.
+        """
+        white = self.data.slopes(self.response, changes)
+        seen = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
+        known = linalg.solve_triangular(self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False)
+        squares = np.maximum(np.sum(white**2, 0) - np.sum(seen**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
+        across = self.misfit @ white - known @ seen
+        return across / squares, 0.5 * across**2 / squares
+
+    def _misfit(self, hypothesis: Hypothesis, searched: FloatArray) -> FloatArray:
+        """Whitened misfit, as it would be without scatter."""
+        data = self.data
+        response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, data.measured.s)
+        return data.misfit(response) + self.columns @ self.pulls
+
+    def _square(self, one: FloatArray, other: FloatArray) -> float:
+        seen = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (one, other)]
+        return float(one @ other - seen[0] @ seen[1])
+
+
+def score_on(bench: InferenceProblem, base: Fit, data: Data) -> Score:
+    """Prepare scores on top of a fit.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        What is tested.
+    base : Fit
+        What is supposed already.
+    data : Data
+        What misfits are of.
+
+    Returns
+    -------
+    Score
+        For any further cause.
+    """
+    response = base.hypothesis.respond(base.values, base.unknown, data.measured.s)
+    jacobian = nuisance_jacobian(response, bench.nuisance, bench.specimen.layout)
+    pulls, slopes = bench.nuisance.pulls(base.unknown)
+    columns = data.slopes(response, jacobian) / slopes
+    return Score(
+        bench=bench,
+        base=base,
+        data=data,
+        misfit=data.misfit(response) + columns @ pulls,
+        columns=columns,
+        factor=cholesky_with_prior(columns.T),
+        pulls=pulls,
+        response=response,
+    )
+
+
+def close_search(bench: InferenceProblem, base: Fit) -> list[Start]:
+    """Look for small effects.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and effects.
+    base : Fit
+        What is supposed already, nearly right.
+
+    Returns
+    -------
+    list of Start
+        The best values of each cause, the most promising first; the cost is minus the gain in nats.
+    """
+    score = score_on(bench, base, bench.thin)
+    specimen = replace(bench.specimen, contour=bench.thin.measured.s)
+    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
+    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
+    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
+    response = base.hypothesis.respond(base.values, base.unknown, specimen.contour)
+    found = _drawn(score, response, drawn)
+    found += [_direct(score, cause) for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Signature]]) -> list[Start]:
+    """Weigh all shapes of all sketches; keep the best of each."""
+    best: dict[int, Start] = {}
+    batch: list[tuple[int, int, ComplexArray]] = []
+    for first in range(0, len(drawn), AT_ONCE):
+        some = drawn[first : first + AT_ONCE]
+        motions = np.stack([sketch.motion for _, sketch in some], 1)
+        hypothesis = score.base.hypothesis
+        layout = hypothesis.specimen.layout
+        across = receptances(response, hypothesis.basis, layout, motions, np.zeros(len(some))).across
+        for column, (_, sketch) in enumerate(some):
+            for shape, curve in enumerate(sketch.shapes):
+                batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))
+                if len(batch) == COLUMNS:
+                    _weigh(score, drawn, batch, best)
+                    batch = []
+    if batch:
+        _weigh(score, drawn, batch, best)
+    return list(best.values())
+
+
+def _weigh(
+    score: Score,
+    drawn: list[tuple[Cause, Signature]],
+    batch: list[tuple[int, int, ComplexArray]],
+    best: dict[int, Start],
+) -> None:
+    sizes, gains = score.weigh(np.stack([change for _, _, change in batch], 2))
+    for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):
+        if size > 0 and (index not in best or -gain < best[index].cost):
+            cause, sketch = drawn[index]
+            values = sketch.values[shape].copy()
+            if sketch.amplitudes is not None and len(sketch.amplitudes) == 1:
+                values = 1 + (values - 1) * min(size, LARGEST)
+            else:
+                values[sketch.amplitude] *= size
+            best[index] = Start(cause=cause, values=values, cost=-gain)
+
+
+def _direct(score: Score, cause: Cause) -> Start:
+    """Take the first parameter away from where the effect vanishes, by as much as explains most."""
+    hypothesis = score.bench.suppose((*score.base.hypothesis.causes, cause), exact=False)
+    if not hypothesis.counts[-1]:
+        return Start(cause=cause, values=np.zeros(0), cost=-score.at(hypothesis, np.zeros(0)))
+    first, *others = hypothesis.parameters[len(score.base.values) :]
+    rest = [float(np.sqrt(parameter.low * parameter.high)) for parameter in others]
+    neutral, values = _small(first)
+    is_between = first.low < first.neutral < first.high
+    changed = score.change(hypothesis, np.array([values, *rest]))
+    if is_between:
+        changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
+    elif not _fades(changed, score.change(hypothesis, np.array([_twice(first, values), *rest]))):
+        middle = np.array([float(np.sqrt(first.low * first.high)), *rest])
+        return Start(cause=cause, values=middle, cost=-score.at(hypothesis, middle))
+    sizes, gains = score.weigh(changed[:, :, None])
+    size, gain = float(sizes[0]), float(gains[0])
+    if is_between:
+        step = size * (values - neutral)
+        if first.is_log:  # a ratio: a straight line would leave its bounds
+            step = neutral * float(np.expm1(min(step / neutral, np.log(first.high / neutral))))
+        value = neutral + step
+    elif size <= 0:
+        value, gain = values, 0.0
+    else:
+        value = values * size if first.neutral == 0 else values / size
+    return Start(cause=cause, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain)
+
+
+def _fades(change: ComplexArray, of_twice: ComplexArray) -> bool:
+    """Whether an effect vanishes with its parameter; a sensor that is turned round does not."""
+    return bool(np.linalg.norm(of_twice) > FADING * np.linalg.norm(change))
+
+
+def _twice(parameter: Parameter, value: float) -> float:
+    return value / 2 if np.isinf(parameter.neutral) else 2 * value
+
+
+def _small(parameter: Parameter) -> tuple[float, float]:
+    """Where an effect vanishes, and a value just beside."""
+    if np.isinf(parameter.neutral):
+        return parameter.neutral, parameter.high
+    if parameter.low < parameter.neutral < parameter.high:
+        step = BESIDE * (abs(parameter.neutral) or parameter.high - parameter.low)
+        return parameter.neutral, parameter.neutral + step
+    return parameter.neutral, parameter.low

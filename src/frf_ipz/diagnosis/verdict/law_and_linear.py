@@ -1,0 +1,161 @@
+"""A nonlinear law beside a linear cause: the one is taken out of the recordings, and the other is searched for.
+
+The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model,
+or where the linear cause first led to nothing and the law follows the recordings all the same.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
+from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
+from frf_ipz.diagnosis.model.change import with_change
+from frf_ipz.diagnosis.nonlinear.simulate import subtract_law
+from frf_ipz.diagnosis.search.component_search import fit_nothing, search
+from frf_ipz.diagnosis.verdict.decision import EXPLAINED, gain_over
+from frf_ipz.diagnosis.verdict.findings import finding_of, is_significant, weigh
+from frf_ipz.diagnosis.verdict.goodness import LIMITS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.nonlinear.search import LawSearch
+    from frf_ipz.diagnosis.observations import Observations
+    from frf_ipz.diagnosis.result import Finding
+    from frf_ipz.diagnosis.verdict.decision import Decision
+    from frf_ipz.structure import StructuralModel
+
+MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
+STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
+FOLLOWED = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
+RUN_AWAY = 100.0  # times the largest response: no structure moves so much more without a law
+EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
+
+
+def search_beside_linear(
+    bench: InferenceProblem,
+    linear: Decision,
+    alone: LawSearch,
+    model: StructuralModel,
+    observations: Observations,
+    search_laws: Callable[[StructuralModel, Observations], LawSearch],
+) -> tuple[LawSearch, Finding] | None:
+    """Search for a law beside the linear cause that explains most.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data, model and linear effects.
+    linear : Decision
+        What a linear search came to; where none was made, it is made here.
+    alone : LawSearch
+        What the search for a law with the nominal model came to.
+    model : StructuralModel
+        The nominal model.
+    observations : Observations
+        What was measured.
+    search_laws : callable
+        From a model and what was measured to a law.
+
+    Returns
+    -------
+    tuple of LawSearch and Finding, or None
+        The law and the linear cause, where two of three hold: the cause explains most of the misfit, the law the rest,
+        and beside the cause the law no longer strains the nominal model. None where less holds.
+    """
+    null = linear.null
+    ranking = linear.ranking if linear.ranking.fits else search(bench, null)
+    best = ranking.best
+    is_most = best.cost <= MOST_LEFT * null.cost
+    if best is null or not (is_most or alone.nuisance_chi2 >= STRAINED) or not is_significant(best, -1):
+        return None
+    if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
+        return None  # resonators and dampers follow the traces of laws
+    change = best.hypothesis.change(best.values)
+    laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
+    is_relieved = laws.fit is not None and laws.nuisance_chi2 < STRAINED and _relieves(laws, alone)
+    if sum((is_most, laws.verdict == EXPLAINED, is_relieved)) < 2:
+        return None
+    scale = max(1.0, best.mean_misfit)
+    return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+
+
+def search_beside_law(
+    bench_of: Callable[[Observations], InferenceProblem],
+    laws: LawSearch,
+    model: StructuralModel,
+    observations: Observations,
+    search_laws: Callable[[StructuralModel, Observations], LawSearch],
+) -> tuple[LawSearch, Finding] | None:
+    """Search for a linear cause beside a law that strains the nominal model, whether it explains by itself or not.
+
+    Parameters
+    ----------
+    bench_of : callable
+        Brings the nominal model and what was measured together.
+    laws : LawSearch
+        The law that was found with the nominal model.
+    model : StructuralModel
+        The nominal model.
+    observations : Observations
+        What was measured.
+    search_laws : callable
+        From a model and what was measured to a law.
+
+    Returns
+    -------
+    tuple of LawSearch and Finding, or None
+        The law and the linear cause, which both explain; None where the law did not strain the model, where it did not
+        even follow the recordings, where no cause relieves the model, or where the law explains first moments only,
+        with the cause as without it.
+    """
+    without = _without(observations, laws)
+    if without is None:
+        return None
+    explains, bench = laws.verdict == EXPLAINED, bench_of(without)
+    null = fit_nothing(bench)
+    ranking = search(bench, null)
+    best = ranking.best
+    if best is null or gain_over(best, null) < LIMITS[bench.kind].found_nats or not is_significant(best, -1):
+        return None
+    follows_traces = best.hypothesis.causes[-1].effect.has_dynamics
+    if any(best.hypothesis.doubts(best.values)) or (follows_traces and not explains):
+        return None
+    change = best.hypothesis.change(best.values)
+    again = search_laws(with_change(model, change), undo_chain_effects(observations, change))
+    if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.nuisance_chi2 < STRAINED):
+        return None
+    if laws.is_early and again.is_early:  # what the law misses later is no better explained
+        return None
+    scale = max(1.0, best.mean_misfit)
+    return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+
+
+def _without(observations: Observations, laws: LawSearch) -> Observations | None:
+    """Take a law out that strained the model; None where it did not, or where what it leaves is no linear system."""
+    if (
+        laws.nuisance_chi2 < STRAINED
+        or laws.fit is None
+        or laws.nuisance_prior is None
+        or len(laws.nuisance_prior.moving)
+    ):
+        return None
+    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
+        return None
+    with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
+        without = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)
+    sizes = [
+        [np.abs(record.responses).max(initial=0.0) for record in both]
+        for both in zip(without.records, observations.records, strict=True)
+    ]
+    runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)
+    return None if runs_away else without
+
+
+def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
+    """Say whether a law strains the nominal model, and much less so beside a linear cause."""
+    return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= EASED * alone.nuisance_chi2

@@ -1,0 +1,133 @@
+"""Where the nominal model disagrees with the measurement: in which FRFs and bands, and at which node of the structure.
+
+The node is the one at which one free dynamic stiffness explains most of the misfit. On each line the stiffness may be
+any complex number; all FRFs of the line share it, so that two FRFs or more tell one node from another.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.diagnosis.evidence.inference_problem import weights_of
+from frf_ipz.diagnosis.model.response import nuisance_jacobian
+from frf_ipz.diagnosis.result import Curves
+from frf_ipz.diagnosis.search.global_scan import receptances
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+
+BANDS = 6  # pieces of the band, on a logarithmic scale
+DISAGREES = 3.0  # standard deviations
+NAMED = 3  # FRFs and bands in the text
+ERROR = 0.01  # of an FRF's size: what counts as a misfit
+FEWEST_FRFS = 2
+TELLS = 0.1  # of the misfit: a node that explains less tells nothing
+
+
+def disagreement(bench: InferenceProblem, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
+    """Say where the nominal model disagrees, beyond noise and what its tolerances allow.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        With what was fitted.
+    null : Fit
+        Of the nominal model.
+    curves : Curves
+        FRFs of all models.
+
+    Returns
+    -------
+    frequency_hz : (n,) array
+        Where it disagrees, Hz.
+    where : str
+        The same in words.
+    table : DataFrame
+        Each FRF and band, as in `Diagnosis.mismatch`.
+    """
+    nothing = np.zeros(bench.nuisance.size)
+    nominal = null.hypothesis.respond(null.values, nothing, curves.s)
+    allowed = np.sum(np.abs(nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout)) ** 2, 2)
+    spread = np.sqrt(curves.expected**2 + allowed)
+    before = np.abs(curves.measured - curves.nominal) / spread
+    after = np.abs(curves.measured - curves.explained) / curves.expected
+    frequency = curves.s.imag / (2 * np.pi)
+    table = _table(frequency, before, after, [str(label) for label in curves.labels])
+    worst = before.max(1) > DISAGREES
+    return frequency[worst], _in_words(table, frequency[worst]), table
+
+
+def _table(frequency: FloatArray, before: FloatArray, after: FloatArray, names: list[str]) -> pd.DataFrame:
+    edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-12), BANDS + 1)
+    rows = []
+    for name, first, last in zip(names, before.T, after.T, strict=True):
+        for low, high in pairwise(edges):
+            inside = (frequency >= low) & (frequency < high)
+            if inside.any():
+                rms = [float(np.sqrt(np.mean(one[inside] ** 2))) for one in (first, last)]
+                rows.append({"frf": name, "low_hz": low, "high_hz": high, "before": rms[0], "after": rms[1]})
+    return pd.DataFrame(rows)
+
+
+def _in_words(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
+    if not len(frequency_hz):
+        return "The model agrees with every FRF of the band within noise and tolerances."
+    ranked = table.sort_values("before", ascending=False).head(NAMED)
+    parts = [
+        f"{row.frf} from {row.low_hz:.4g} to {row.high_hz:.4g} Hz ({row.before:.3g} times)"
+        for row in ranked.itertuples()
+    ]
+    by_frf = table.groupby("frf")["before"].max().sort_values(ascending=False)
+    off = [name for name, value in by_frf.items() if value > DISAGREES]
+    return (
+        f"{len(off)} of {len(by_frf)} FRFs disagree, between {frequency_hz.min():.4g} and {frequency_hz.max():.4g} Hz; "
+        f"most of all, in units of what noise and tolerances explain, {'; '.join(parts)}."
+    )
+
+
+def trace(bench: InferenceProblem, null: Fit) -> dict[str, list[int]]:
+    """Trace the misfit of the nominal model to a node.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        With the data.
+    null : Fit
+        Of the nominal model.
+
+    Returns
+    -------
+    dict
+        ``{"nodes": [node]}``; empty where one FRF is all there is, or no node explains much of the misfit.
+    """
+    if len(bench.data.measured.labels) < FEWEST_FRFS:
+        return {}
+    dofs = bench.specimen.moving_dofs
+    before, left = _misfits(bench, null, np.stack([bench.specimen.unit(dof) for dof in dofs], 1))
+    best = int(np.argmin(left))
+    return {"nodes": [dofs[best].node]} if left[best] < (1 - TELLS) * before else {}
+
+
+def _misfits(bench: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
+    """Robust misfit without and with a free dynamic stiffness on each of some motions."""
+    is_near = null.is_nearly_right
+    data = bench.thin.measured if is_near else bench.coarse
+    unknown = null.unknown if is_near else np.zeros(bench.nuisance.size)
+    response = null.hypothesis.respond(null.values, unknown, data.s)
+    gains = bench.thin.gains(response) if is_near else 1.0
+    weights = weights_of(data, ERROR)
+    misfit = data.values - gains * response.values
+    none = np.zeros(motions.shape[1])
+    across = receptances(response, null.hypothesis.basis, bench.specimen.layout, motions, none).across
+    seen = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
+    size = np.einsum("kf,kfp->kp", weights, np.abs(across) ** 2)
+    before = np.sum(weights * np.abs(misfit) ** 2, axis=1)
+    taken = np.abs(seen) ** 2 / np.maximum(size, np.finfo(float).tiny)
+    left = np.log1p(np.maximum(before[:, None] - taken, 0.0)).sum(0)
+    return float(np.log1p(before).sum()), np.asarray(left)

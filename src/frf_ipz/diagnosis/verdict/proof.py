@@ -1,0 +1,130 @@
+"""How far models are from measurements, before and after: figures and curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.diagnosis.measured.transfer_functions import ROUGH_PART, SMOOTH_PART
+from frf_ipz.diagnosis.result import Curves, Misfit
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+    from frf_ipz.diagnosis.evidence.fit import Data, Fit
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.options import DiagnoseOptions
+
+MOST_NOISE = 0.3  # of an FRF: where noise is more, a norm would be one of noise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Proof:
+    """Figures of three models: as it is, with what tolerances allow, with the findings.
+
+    Parameters
+    ----------
+    before, updated, after : Misfit
+        The figures.
+    curves : Curves
+        FRFs to draw.
+    """
+
+    before: Misfit
+    updated: Misfit
+    after: Misfit
+    curves: Curves
+
+
+def prove(bench: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Proof:
+    """Compare models with what was fitted and what was not.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        With what was fitted.
+    held_out : Data
+        What was not.
+    null, final : Fit
+        Of the nominal model with what its tolerances allow, and with the findings.
+
+    Returns
+    -------
+    Proof
+        Figures and curves.
+    """
+    nothing = np.zeros(bench.nuisance.size)
+    cases = ((null, nothing), (null, null.unknown), (final, final.unknown))
+    figures = [_misfit(fit, unknown, bench.data, held_out) for fit, unknown in cases]
+    shown = [_shown(fit, unknown, bench.data) for fit, unknown in cases]
+    measured = bench.data.measured
+    curves = Curves(
+        s=measured.s,
+        labels=measured.labels,
+        measured=measured.values,
+        nominal=shown[0],
+        updated=shown[1],
+        explained=shown[2],
+        expected=expected(bench.data, bench.specimen.options),
+    )
+    return Proof(before=figures[0], updated=figures[1], after=figures[2], curves=curves)
+
+
+def expected(data: Data, options: DiagnoseOptions) -> FloatArray:
+    """Give the standard deviation of noise and of what no parameter of a model stands for.
+
+    Parameters
+    ----------
+    data : Data
+        Transfer functions.
+    options : DiagnoseOptions
+        Tolerances.
+
+    Returns
+    -------
+    (n_points, n_frfs) array
+        SI.
+    """
+    measured = data.measured
+    noise = np.array([np.diag(covariance).real for covariance in measured.covariance]).T
+    shared = np.stack([np.sum(np.abs(measured.common[place]) ** 2, 1) for place in measured.input_of], 1)
+    model = (np.hypot(SMOOTH_PART, ROUGH_PART) * options.stiffness_tolerance) ** 2
+    return np.asarray(np.sqrt(noise + shared * np.abs(measured.values) ** 2 + model * measured.size**2))
+
+
+def _shown(fit: Fit, unknown: FloatArray, data: Data) -> ComplexArray:
+    response = fit.hypothesis.respond(fit.values, unknown, data.measured.s)
+    return np.asarray(data.gains(response) * response.values)
+
+
+def _misfit(fit: Fit, unknown: FloatArray, training: Data, held_out: Data) -> Misfit:
+    figures = []
+    for data in (training, held_out):
+        response = fit.hypothesis.respond(fit.values, unknown, data.measured.s)
+        white = data.misfit(response)
+        seen = _stands_out(data)
+        measured = np.where(seen, data.measured.values, 0.0)
+        wrong = measured - np.where(seen, data.gains(response) * response.values, 0.0)
+        figures.append((_relative(wrong, measured), float(np.sqrt(white @ white / len(white)))))
+    return Misfit(
+        training=figures[0][0],
+        held_out=figures[1][0],
+        training_noise=figures[0][1],
+        held_out_noise=figures[1][1],
+    )
+
+
+def _stands_out(data: Data) -> BoolArray:
+    """Where the FRFs are more than noise; everywhere, if they are nowhere."""
+    noise = np.array([np.diag(covariance).real for covariance in data.measured.covariance]).T
+    seen = noise < (MOST_NOISE * data.measured.size) ** 2
+    return np.asarray(seen | ~seen.any(0))
+
+
+def _relative(wrong: ComplexArray, measured: ComplexArray) -> float:
+    """Norm over norm; each FRF that shows anything counts by its own size, for sensors have several units."""
+    scale = np.sqrt(np.mean(np.abs(measured) ** 2, 0))
+    shown = scale > 0
+    wrong, measured = (part[:, shown] / scale[shown] for part in (wrong, measured))
+    return float(np.linalg.norm(wrong) / np.linalg.norm(measured))

@@ -1,0 +1,233 @@
+"""A force at one location that no effect of the catalogue describes, where it explains more than what was found.
+
+Each kind is a stiffness times a function of frequency that has one number more.
+
+[Bagley1983] R. L. Bagley, P. J. Torvik, A theoretical basis for the application of fractional calculus to
+viscoelasticity, Journal of Rheology 27 (1983) 201-210.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, cast
+
+import numpy as np
+
+from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Place, Signature
+from frf_ipz.diagnosis.catalogue.effects.viscoelastic_joint import SOFTEST, STIFFEST, ViscoelasticJoint, motion_at
+from frf_ipz.diagnosis.model.change import Attachment, Change
+from frf_ipz.diagnosis.search.component_search import ranked
+from frf_ipz.diagnosis.search.global_scan import wide_search
+from frf_ipz.diagnosis.search.neighbourhood_search import climb_all
+from frf_ipz.diagnosis.search.robust_refinement import bring_closer, refine_far
+from frf_ipz.diagnosis.verdict.goodness import LIMITS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.search.robust_refinement import Start, Supposed
+    from frf_ipz.diagnosis.verdict.decision import Decision
+
+ORDERS = 0.05, 1.95
+LOSSES = 1e-3, 30.0  # in the middle of the band; with more it is a damper
+FITTED = 5  # places with large errors
+FAR_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
+
+
+class LocalForce(ViscoelasticJoint):
+    """Against the motion of any place of a joint, k g(s / s_0), s_0 in the middle of the band."""
+
+    tried: ClassVar[tuple[float, ...]]
+    """Values of the second parameter that a wide search starts from."""
+    rivals_several: ClassVar[bool] = False
+    """Any two causes may imitate it, not only those with dynamics of their own."""
+
+    @abstractmethod
+    def second_parameter(self) -> Parameter:
+        """Name and bounds of what g depends on."""
+
+    @abstractmethod
+    def per_stiffness(self, s: ComplexArray, second: float) -> ComplexArray:
+        """Give g, (n_points,) complex array, at s over that in the middle of the band."""
+
+    @abstractmethod
+    def words(self, where: str, second: float) -> str:
+        """Say what explains the measurement better than the catalogue."""
+
+    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+        """Stiffness in the middle of the band, and the second one."""
+        own = specimen.stiffness_against(motion_at(specimen, place))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own), self.second_parameter())
+
+    def build(self, specimen: ModelContext, place: Place) -> Builder:
+        """Attach its dynamic stiffness; no matrices have it."""
+        motion, middle = motion_at(specimen, place)[:, None], _middle(specimen)
+        none = np.zeros((1, 1))
+
+        def change(values: FloatArray) -> Change:
+            stiffness, second = values
+            attachment = Attachment(
+                motions=motion,
+                stiffness=lambda s: stiffness * self.per_stiffness(s / middle, float(second)),
+                matrices=(none, none, none),
+            )
+            return Change(attachments=(attachment,))
+
+        return change
+
+    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+        """Draw some values of the second parameter."""
+        unit = specimen.contour / _middle(specimen)
+        return Signature(
+            motion=motion_at(specimen, place),
+            shapes=np.array([self.per_stiffness(unit, second) for second in self.tried]),
+            values=np.stack([np.ones(len(self.tried)), self.tried], 1),
+        )
+
+
+def where_of(specimen: ModelContext, place: Place) -> str:
+    """Say in words where a force acts.
+
+    Parameters
+    ----------
+    specimen : ModelContext
+        What is tested.
+    place : Place
+        Of a joint.
+
+    Returns
+    -------
+    str
+        A node or a spring.
+    """
+    nodes = place.location.get("nodes")
+    if isinstance(nodes, list):
+        return specimen.where(int(nodes[0]))
+    return f"spring {place.key[1]}"
+
+
+def _middle(specimen: ModelContext) -> float:
+    return float(2 * np.pi * np.sqrt(np.prod(specimen.band_hz)))
+
+
+class PowerLaw(LocalForce):
+    """k (s / s_0)^order between a place and the ground: a force that rises with some power of frequency.
+
+    Springs, dampers and masses are the powers 0, 1 and 2; materials that relax over many time constants lie between
+    [Bagley1983]. What imitates such a force in the catalogue explains less than the power law itself.
+    """
+
+    name = "power_law"
+    tried = (0.25, 0.5, 0.75, 1.5)
+
+    def second_parameter(self) -> Parameter:
+        """Order."""
+        return Parameter(name="order", low=ORDERS[0], high=ORDERS[1], is_log=False)
+
+    def per_stiffness(self, s: ComplexArray, second: float) -> ComplexArray:
+        """Take a power."""
+        return np.asarray(s**second)
+
+    def words(self, where: str, second: float) -> str:
+        """Say which power."""
+        return (
+            f"a force at {where} that grows with the power {second:.2g} of frequency explains the measurement "
+            "better than springs, dampers and masses do"
+        )
+
+
+class NegativeSpring(LocalForce):
+    """k (-1 + loss s / s_0) between a place and the ground: it pushes on in the direction of the motion, with losses.
+
+    Magnets, buckled springs, control that is late: a late force -k exp(-s tau) is -k + k tau s as long as the delay tau
+    is short, takes stiffness away and damps.
+    """
+
+    name = "negative_spring"
+    tried = (0.01, 0.1, 1.0, 5.0)
+    rivals_several = True
+
+    def second_parameter(self) -> Parameter:
+        """Loss in the middle of the band."""
+        return Parameter(name="loss", low=LOSSES[0], high=LOSSES[1])
+
+    def per_stiffness(self, s: ComplexArray, second: float) -> ComplexArray:
+        """Sum a negative spring and a damper."""
+        return np.asarray(second * s - 1)
+
+    def words(self, where: str, second: float) -> str:
+        """Say how lossy."""
+        return (
+            f"a force at {where} that takes stiffness away, with a loss factor of {second:.2g} in the middle of the "
+            "band, explains the measurement better than the effects of the catalogue do"
+        )
+
+
+KINDS: tuple[LocalForce, ...] = (PowerLaw(), NegativeSpring())
+
+
+def find_unnamed_force(bench: InferenceProblem, found: Decision) -> Fit | None:
+    """Look for one force that explains more than what was found, or as much as several causes.
+
+    Parameters
+    ----------
+    bench : InferenceProblem
+        Data and model.
+    found : Decision
+        With one cause or more.
+
+    Returns
+    -------
+    Fit or None
+        Of a force; None where what was found explains as much, or is one cause that has no dynamics of its own.
+    """
+    causes = found.final.hypothesis.causes
+    are_dynamic = bool(causes) and all(cause.effect.has_dynamics for cause in causes)
+    kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(causes) > 1)]
+    if not kinds:
+        return None
+    bar = bench.fit_early(causes, found.final.values).cost + FAR_BEHIND
+    fits = [fit for kind in kinds if (fit := _best_of(bench, found.null, kind, bar)) is not None]
+    needed = found.final.log_evidence + (LIMITS[bench.kind].beside_nats if len(causes) == 1 else 0.0)
+    return max((fit for fit in fits if fit.log_evidence > needed), key=lambda fit: fit.log_evidence, default=None)
+
+
+def _best_of(bench: InferenceProblem, null: Fit, kind: LocalForce, bar: float) -> Fit | None:
+    """Fit a kind of force at its best place; none where its cost with large errors is above a bar."""
+    only = replace(bench, effects={kind.name: kind})
+    refined = refine_far(only, null, wide_search(only, null))
+    early = [only.fit_early((*known, start.cause), start.values) for known, start in _closer(only, refined)]
+    best = min(early, key=lambda fit: fit.cost)
+    if best.cost > bar:
+        return None
+    exact = only.fit_from(best)
+    fits = {exact.hypothesis.causes[-1].key: exact}
+    climb_all(only, null, fits)
+    return ranked(only, fits.values())[0]
+
+
+def describe_unnamed_force(fit: Fit) -> str:
+    """Say what explains more than the catalogue.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a force.
+
+    Returns
+    -------
+    str
+        In words that follow "Something is missing that nothing in the catalogue explains: ".
+    """
+    (cause,) = fit.hypothesis.causes
+    kind = cast("LocalForce", cause.effect)
+    return kind.words(where_of(fit.hypothesis.specimen, cause.place), float(fit.values[-1]))
+
+
+def _closer(bench: InferenceProblem, refined: Sequence[Start]) -> list[Supposed]:
+    return bring_closer(bench, [((), start) for start in refined[:FITTED]])
