@@ -129,7 +129,7 @@ def _diagnose(
     progress(0.9, "proving on what was not fitted")
     held_out = with_errors(source.held_out, options, free_gains=scale)
     found, proof = _proven(bench, held_out, found)
-    linear = _linear(bench, found, proof, gates, held=source.held)
+    linear = _linear(bench, found, proof, gates, held=source.held_out_kind)
     statement = _statement(found, linear.findings, complaint)
     linear = replace(linear, statement=statement, remains=complaint, warnings=warn(source, gates))
     if excess <= 1:

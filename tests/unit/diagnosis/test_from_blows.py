@@ -73,7 +73,7 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
         found = survey_records(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
         measured = estimate_transfer_functions(found, s)
         errors.append(np.abs(measured.values[:, 0] * np.polyval(RESONANCE[::-1], np.exp(-s / RATE_HZ)) - 1) ** 2)
-        stated.append(np.sum(np.abs(measured.common[0]) ** 2, 1))
+        stated.append(np.sum(np.abs(measured.shared_errors[0]) ** 2, 1))
     ratio = np.mean(errors, 0) / np.mean(stated, 0)
     scatter = 4 / np.sqrt(trials)  # four standard deviations of a mean of squared moduli
     assert np.all(np.abs(ratio - 1) < scatter + AS_READ)
@@ -119,7 +119,7 @@ def test_records_that_end_in_motion_say_what_they_lack():
         measured = estimate_transfer_functions(found, s)
         true = 1 / np.polyval(slow[::-1], np.exp(-s / RATE_HZ))
         errors.append(np.abs((measured.values[:, 0] - true) / true) ** 2)
-        common = np.sum(np.abs(measured.common[0]) ** 2, 1)
+        common = np.sum(np.abs(measured.shared_errors[0]) ** 2, 1)
         own = np.diagonal(measured.covariance[0]).real / np.abs(measured.values[:, 0]) ** 2
         stated.append(common + own)
     ratio = np.sqrt(np.mean(errors, 0) / np.mean(stated, 0))

@@ -83,7 +83,7 @@ def test_the_log_density_of_whitening_is_that_of_a_normal_distribution(nominal, 
     for floor in (1.0, 0.3):
         white = with_errors(few, bench.specimen.options, floor=floor).whitening
         roots = [np.linalg.inv(factor) for factor in white.factors]
-        force = (few.certain * few.common[0]).T.ravel()
+        force = (few.values_above_noise * few.shared_errors[0]).T.ravel()
         covariance = linalg.block_diag(*(root @ root.conj().T for root in roots)) + np.outer(force, force.conj())
         nats.append(white.log_density - 0.5 * np.sum(white(errors) ** 2))
         exact.append(log_normal(errors.T.ravel(), covariance))

@@ -1,1 +1,1 @@
-"""Transfer functions in the right half of the s-plane from blows or from FRFs, and how well they are known."""
+"""Transfer functions in the right half of the s-plane, from records or FRFs, with the covariance of their errors."""

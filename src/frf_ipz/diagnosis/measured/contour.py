@@ -1,10 +1,10 @@
-"""Where in the s-plane transfer functions are looked at.
+"""Where in the s-plane transfer functions are evaluated.
 
-A recording gives the transfer function at any s = sigma + i omega. The decay e^(-sigma t) that belongs to sigma takes
-noise away together with the end of the record, so each stretch of the band has a best sigma: about the decay rate of a
-mode at its resonance, where exp(-conj(p) t) is the matched filter of a mode with the pole p, and more and more with the
-distance from resonances, where the transfer function is smooth. A contour of that kind, with points about sigma apart,
-holds what the record holds with some hundred numbers.
+A recording gives the transfer function at any s = sigma + i omega. The window e^(-sigma t) that belongs to sigma
+removes noise together with the end of the record, so each part of the band has a best sigma: about the decay rate of a
+mode at its resonance, where exp(-conj(p) t) is the matched filter of a mode with the pole p, and more with the distance
+from resonances, where the transfer function is smooth. A contour of that kind, with points about sigma apart, holds
+what the record holds with some hundred numbers.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 
 SLOPE = 0.6  # of sigma over the distance to the next resonance
 STEP = 0.9  # from point to point, over sigma
-WIDEST = 0.02  # sigma over omega: lightly damped things that nobody knows of are not passed over
-MOST_POINTS = 260
+MAX_SIGMA_RATIO = 0.02  # sigma over omega: lightly damped modes that nobody knows of are not stepped over
+MAX_POINTS = 260
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distance:
-    """How far from the axis a contour lies.
+    """How far from the imaginary axis a contour lies.
 
     Parameters
     ----------
@@ -38,18 +38,18 @@ class Distance:
     step: float
 
 
-COARSE = Distance(width=0.06, step=0.8)  # for searching: no peak is missed
-MIDDLE = Distance(width=0.015, step=1.5)  # on the way from there to the axis
+COARSE = Distance(width=0.06, step=0.8)  # for the global scan: no peak is missed
+MIDDLE = Distance(width=0.015, step=1.5)  # between the global scan and the fine contour
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Resonances:
-    """Peaks of what was measured.
+    """Peaks of measured FRFs.
 
     Parameters
     ----------
     omega_rad_s : (n_peaks,) array
-        Where they are, ascending.
+        Their frequencies, ascending.
     decay_1_s : (n_peaks,) array
         Half their width: about the decay rate of the mode.
     """
@@ -61,7 +61,7 @@ class Resonances:
 def find_resonances(
     omega_rad_s: FloatArray, level: FloatArray, decay_1_s: float, *, at_ends: bool = False
 ) -> Resonances:
-    """Find peaks and their widths.
+    """Find peaks and their half-power widths.
 
     Parameters
     ----------
@@ -72,36 +72,36 @@ def find_resonances(
     decay_1_s : float
         sigma of the lines: it widens every peak.
     at_ends : bool
-        Count a peak of which one half lies beyond the lines.
+        Count a peak of which one half lies outside the lines.
 
     Returns
     -------
     Resonances
-        Peaks that stand out from what is beside them.
+        Peaks that are at least twice as high as the valleys beside them.
     """
     inner = np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:])) + 1
     peaks, decays = [], []
-    for place in inner.tolist():
-        sides = np.array([_half_power(omega_rad_s, level, place, step) for step in (-1, 1)])
+    for peak in inner.tolist():
+        sides = np.array([_half_power_frequency(omega_rad_s, level, peak, step) for step in (-1, 1)])
         sides = sides[~np.isnan(sides)] if at_ends else sides
         if not np.isfinite(sides).all() or not len(sides):
             continue
-        width = float(np.mean(np.abs(sides - omega_rad_s[place])))
-        peaks.append(omega_rad_s[place])
+        width = float(np.mean(np.abs(sides - omega_rad_s[peak])))
+        peaks.append(omega_rad_s[peak])
         decays.append(max(width - decay_1_s, 0.02 * width))
     return Resonances(omega_rad_s=np.array(peaks), decay_1_s=np.array(decays))
 
 
-def _half_power(omega: FloatArray, level: FloatArray, place: int, step: int) -> float:
-    """Where the level has fallen to a half, between lines; infinite where it rises again before, NaN beyond the end."""
-    at = place
-    while 0 < at < len(level) - 1:
-        at += step
-        if level[at] <= 0.5 * level[place]:
-            inside = at - step
-            part = (level[inside] - 0.5 * level[place]) / (level[inside] - level[at])
-            return float(omega[inside] + part * (omega[at] - omega[inside]))
-        if level[at] > level[place]:
+def _half_power_frequency(omega: FloatArray, level: FloatArray, peak: int, step: int) -> float:
+    """Interpolate where the level falls to a half; infinite where it rises again first, NaN outside the lines."""
+    line = peak
+    while 0 < line < len(level) - 1:
+        line += step
+        if level[line] <= 0.5 * level[peak]:
+            inside = line - step
+            part = (level[inside] - 0.5 * level[peak]) / (level[inside] - level[line])
+            return float(omega[inside] + part * (omega[line] - omega[inside]))
+        if level[line] > level[peak]:
             return np.inf
     return np.nan
 
@@ -112,11 +112,11 @@ def fine_contour(resonances: Resonances, band_hz: tuple[float, float], least_dec
     Parameters
     ----------
     resonances : Resonances
-        Where they are.
+        Their frequencies and widths.
     band_hz : pair of float
         Hz.
     least_decay_1_s : float
-        Least sigma: what records that were cut off need.
+        Least sigma: what records that end before they have decayed need.
 
     Returns
     -------
@@ -125,10 +125,10 @@ def fine_contour(resonances: Resonances, band_hz: tuple[float, float], least_dec
     """
     step = STEP
     while True:
-        found = _march(band_hz, step, lambda omega: _decay(omega, resonances, least_decay_1_s))
-        if len(found) <= MOST_POINTS:
-            return found
-        step *= 1.02 * len(found) / MOST_POINTS
+        contour = _lay_points(band_hz, step, lambda omega: _best_sigma(omega, resonances, least_decay_1_s))
+        if len(contour) <= MAX_POINTS:
+            return contour
+        step *= 1.02 * len(contour) / MAX_POINTS
 
 
 def wide_contour(band_hz: tuple[float, float], least_decay_1_s: float, distance: Distance) -> ComplexArray:
@@ -146,22 +146,22 @@ def wide_contour(band_hz: tuple[float, float], least_decay_1_s: float, distance:
     (n_points,) complex array
         rad/s, by ascending frequency.
     """
-    return _march(band_hz, distance.step, lambda omega: max(distance.width * omega, least_decay_1_s))
+    return _lay_points(band_hz, distance.step, lambda omega: max(distance.width * omega, least_decay_1_s))
 
 
-def _decay(omega: float, resonances: Resonances, least: float) -> float:
-    widest = WIDEST * omega
+def _best_sigma(omega: float, resonances: Resonances, least: float) -> float:
+    largest = MAX_SIGMA_RATIO * omega
     if len(resonances.omega_rad_s):
         away = SLOPE * np.abs(omega - resonances.omega_rad_s)
-        widest = min(widest, float(np.hypot(resonances.decay_1_s, away).min()))
-    return max(widest, least)
+        largest = min(largest, float(np.hypot(resonances.decay_1_s, away).min()))
+    return max(largest, least)
 
 
-def _march(band_hz: tuple[float, float], step: float, decay: Callable[[float], float]) -> ComplexArray:
+def _lay_points(band_hz: tuple[float, float], step: float, sigma_at: Callable[[float], float]) -> ComplexArray:
     omega, end = 2 * np.pi * band_hz[0], 2 * np.pi * band_hz[1]
     points = []
     while omega <= end:
-        sigma = decay(omega)
+        sigma = sigma_at(omega)
         points.append(complex(sigma, omega))
         omega += step * sigma
     return np.array(points)

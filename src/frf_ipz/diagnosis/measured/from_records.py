@@ -1,4 +1,4 @@
-"""Transfer functions and their errors from single blows."""
+"""Transfer functions and their errors from single records."""
 
 from __future__ import annotations
 
@@ -25,26 +25,27 @@ from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, spectra
 from frf_ipz.frf import FrfLabel
 
-ENOUGH = 8.0  # decays within a record: of a mode 3e-4 is left
-SURE_PART = 0.6  # of a decay rate that was read from the width of a peak
-LEAST_PART = 0.1  # of the decay that is enough by itself: keeps the transforms of noise finite
-UNREPEATED = 2e-3  # of the motion: noise that is supposed where no blow was repeated
-BEFORE = 32  # samples before a blow that tell the noise
-AHEAD = 100  # samples that records keep before a pulse: with as many the limits of the verdict were chosen
-MOST_BIAS = 0.5  # of the force's power that may be noise
-COMMON_PART = 1e-2  # of a line's own: independent parts of shared errors below are left out
+WINDOW_DECAYS = 8.0  # of the window within a record: 3e-4 of a mode remains at its end
+CERTAIN_PART = 0.6  # of a decay rate that was read from the width of a peak
+LEAST_PART = 0.1  # of the window's decay rate: keeps the transforms of noise finite
+UNREPEATED = 2e-3  # of the motion: noise that is assumed without repeated records
+MIN_LEAD = 32  # samples before an impact that show the noise
+LEAD = 100  # samples of a record before its pulse; the limits of the verdict were chosen with that many
+MAX_BIAS = 0.5  # of the force's power that may be noise
+COMPONENT_PART = 1e-2  # of a line's variance: weaker components of shared errors are left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordSurvey:
-    """What has to be known about recordings before a contour is laid.
+    """Records with their noise and resonances: what a contour and transfer functions on it need.
 
     Parameters
     ----------
     groups : tuple of tuple of ObservedRecord
-        Blows with the same place and the same sensors, from shortly before their pulses on, without noise around them.
+        Records with the same excited point and the same sensors; impacts from shortly before their pulses on, with no
+        force outside them.
     pulses : tuple of tuple of Pulse
-        The stretches of the forces that were kept; all of them for shakers.
+        The gates of their forces; whole records for shakers.
     force : Noise
         Of the force channel.
     responses : dict of str to Noise
@@ -69,27 +70,30 @@ def survey_records(observations: Observations) -> RecordSurvey:
     Parameters
     ----------
     observations : Observations
-        Blows or records.
+        Records from rest.
 
     Returns
     -------
     RecordSurvey
-        What `estimate_transfer_functions` needs.
+        For `estimate_transfer_functions`.
     """
     is_hammer = observations.kind == "hammer"
-    whole = _pulses(observations)
-    pulses = _from_pulses(whole, observations.kind)
+    whole = _pulses_by_group(observations)
+    pulses = _cut_leads(whole, observations.kind)
     groups = _records_of(pulses)
     decay = window_decay_1_s(record for group in groups for record in group)
-    line_sets = [transform_group(group, observations.band_hz, decay) for group in groups]
-    resonances = _resonances(line_sets, decay)
-    gone_on = [_gone_on_energy(resonances, lines, group) for lines, group in zip(line_sets, groups, strict=True)]
+    group_spectra = [transform_group(group, observations.band_hz, decay) for group in groups]
+    resonances = _find_resonances(group_spectra, decay)
+    truncation = [
+        _truncation_energy(resonances, spectra_of_group, group)
+        for spectra_of_group, group in zip(group_spectra, groups, strict=True)
+    ]
     if is_hammer:
-        flat = tuple(p for group in whole for p in group)
-        noise = estimate_force_noise(tuple(b for group in group_records(observations) for b in group), flat)
+        flat = tuple(pulse for group in whole for pulse in group)
+        noise = estimate_force_noise(tuple(record for group in group_records(observations) for record in group), flat)
     else:
-        noise = _noise_of_records(groups, line_sets, gone_on)
-    responses = _response_noise(whole, pulses, line_sets, noise, gone_on)
+        noise = _shaker_force_noise(groups, group_spectra, truncation)
+    responses = _response_noise(whole, pulses, group_spectra, noise, truncation)
     return RecordSurvey(
         groups=groups,
         pulses=pulses,
@@ -102,30 +106,30 @@ def survey_records(observations: Observations) -> RecordSurvey:
 
 def window_decay_1_s(records: Iterable[ObservedRecord]) -> float:
     """Give the sigma that makes the end of the shortest record vanish, 1/s."""
-    return ENOUGH / min(record.duration_s for record in records)
+    return WINDOW_DECAYS / min(record.duration_s for record in records)
 
 
-def with_records(found: RecordSurvey, observations: Observations) -> RecordSurvey:
-    """Give further blows the noise and the resonances of a survey.
+def with_records(survey: RecordSurvey, observations: Observations) -> RecordSurvey:
+    """Give further records the noise and the resonances of a survey.
 
     Parameters
     ----------
-    found : RecordSurvey
-        Of other blows of the same test.
+    survey : RecordSurvey
+        Of other records of the same test.
     observations : Observations
-        The further blows, at the same places.
+        The further records, with the same excited points and sensors.
 
     Returns
     -------
     RecordSurvey
         Of these.
     """
-    pulses = _from_pulses(_pulses(observations), observations.kind)
-    return replace(found, groups=_records_of(pulses), pulses=pulses)
+    pulses = _cut_leads(_pulses_by_group(observations), observations.kind)
+    return replace(survey, groups=_records_of(pulses), pulses=pulses)
 
 
-def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
-    """Pulses of the blows of each place; of a shaker, the whole records."""
+def _pulses_by_group(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
+    """Isolate the pulses of the impacts of each group; of a shaker, give whole records."""
     groups = group_records(observations)
     if observations.kind != "hammer":
         return tuple(
@@ -134,20 +138,20 @@ def _pulses(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
     return tuple(tuple(isolate_pulse(record) for record in group) for group in groups)
 
 
-def _from_pulses(pulses: tuple[tuple[Pulse, ...], ...], kind: str) -> tuple[tuple[Pulse, ...], ...]:
-    """Pulses in blows of a hammer that begin shortly before them; records of a shaker stay whole."""
+def _cut_leads(pulses: tuple[tuple[Pulse, ...], ...], kind: str) -> tuple[tuple[Pulse, ...], ...]:
+    """Cut what lies before the pulses of a hammer; records of a shaker stay whole."""
     if kind != "hammer":
         return pulses
-    return tuple(tuple(_from_pulse(pulse) for pulse in group) for group in pulses)
+    return tuple(tuple(_cut_lead(pulse) for pulse in group) for group in pulses)
 
 
 def _records_of(pulses: tuple[tuple[Pulse, ...], ...]) -> tuple[tuple[ObservedRecord, ...], ...]:
     return tuple(tuple(pulse.record for pulse in group) for group in pulses)
 
 
-def _from_pulse(pulse: Pulse) -> Pulse:
-    """Leave out what lies before a pulse: noise alone, which a transform beside the axis weighs most of all."""
-    begin, record = max(pulse.start - AHEAD, 0), pulse.record
+def _cut_lead(pulse: Pulse) -> Pulse:
+    """Cut what lies before a pulse: it is noise alone, and a transform beside the axis weighs it most of all."""
+    begin, record = max(pulse.start - LEAD, 0), pulse.record
     later = replace(
         record,
         force=record.force[begin:],
@@ -157,40 +161,41 @@ def _from_pulse(pulse: Pulse) -> Pulse:
     return Pulse(record=later, start=pulse.start - begin, stop=pulse.stop - begin)
 
 
-def _least_decay(enough_1_s: float, resonances: Resonances) -> float:
-    """Sigma that makes what is left of every mode vanish, together with the mode's own decay."""
+def _least_decay(window_decay: float, resonances: Resonances) -> float:
+    """Sigma that makes every mode vanish at the end of the records, together with the mode's own decay."""
     slowest = float(resonances.decay_1_s.min(initial=np.inf)) if len(resonances.decay_1_s) else 0.0
-    return max(enough_1_s - SURE_PART * slowest, LEAST_PART * enough_1_s)
+    return max(window_decay - CERTAIN_PART * slowest, LEAST_PART * window_decay)
 
 
 def _response_noise(
     whole: tuple[tuple[Pulse, ...], ...],
     pulses: tuple[tuple[Pulse, ...], ...],
-    line_sets: list[GroupSpectra],
-    noise: Noise,
-    gone_on: list[FloatArray],
+    group_spectra: list[GroupSpectra],
+    force_noise: Noise,
+    truncation: list[FloatArray],
 ) -> dict[str, Noise]:
-    found = {}
+    """Estimate the noise of each output channel from what repeated records do not share."""
+    noise = {}
     groups = _records_of(pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
-        for place, (group, lines) in enumerate(zip(groups, line_sets, strict=True)):
+        for index, (group, lines) in enumerate(zip(groups, group_spectra, strict=True)):
             names = [sensor.channel for sensor in group[0].sensors]
             if channel not in names or len(group) < 2:
                 continue
             sensor = names.index(channel)
             energy = lines.unexplained[:, sensor]
-            kept_s = np.mean([gate_variance(lines.s, pulse) for pulse in pulses[place]], axis=0)
-            known = np.abs(lines.values[:, sensor]) ** 2 * noise.density(lines.frequency_hz) * kept_s
-            known += gone_on[place][:, sensor]
-            stacks.append((lines.frequency_hz, energy, _gain(group, lines), known))
+            gate_s = np.mean([gate_variance(lines.s, pulse) for pulse in pulses[index]], axis=0)
+            known = np.abs(lines.values[:, sensor]) ** 2 * force_noise.density(lines.frequency_hz) * gate_s
+            known += truncation[index][:, sensor]
+            stacks.append((lines.frequency_hz, energy, _noise_gain(group, lines), known))
         if stacks:
             fitted = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
-            found[channel] = fitted.rounded(_signals(groups, channel), groups[0][0].step_s)
+            noise[channel] = fitted.rounded(_signals(groups, channel), groups[0][0].step_s)
         else:
-            found[channel] = _noise_of_single(groups, whole, line_sets, channel)
-    return found
+            noise[channel] = _unrepeated_noise(groups, whole, group_spectra, channel)
+    return noise
 
 
 def _signals(groups: tuple[tuple[ObservedRecord, ...], ...], channel: str) -> list[FloatArray]:
@@ -203,43 +208,43 @@ def _signals(groups: tuple[tuple[ObservedRecord, ...], ...], channel: str) -> li
     ]
 
 
-def _noise_of_records(
-    groups: tuple[tuple[ObservedRecord, ...], ...], line_sets: list[GroupSpectra], gone_on: list[FloatArray]
+def _shaker_force_noise(
+    groups: tuple[tuple[ObservedRecord, ...], ...], group_spectra: list[GroupSpectra], truncation: list[FloatArray]
 ) -> Noise:
-    """Read the noise of a shaker's force from what records at a place do not share; channels agree on it."""
-    found = []
-    for group, lines, known in zip(groups, line_sets, gone_on, strict=True):
+    """Estimate the noise of a shaker's force from what repeated records do not share; the median of all channels."""
+    estimates = []
+    for group, lines, known in zip(groups, group_spectra, truncation, strict=True):
         if len(group) > 1:
-            gain = _gain(group, lines)
-            each = zip(lines.unexplained.T, np.abs(lines.values.T) ** 2, known.T, strict=True)
-            found += [fit_force_noise(lines.frequency_hz, energy, gain, *others) for energy, *others in each]
-    white, pink = np.median([(one.white, one.pink) for one in found], axis=0) if found else (0.0, 0.0)
+            gain = _noise_gain(group, lines)
+            sensors = zip(lines.unexplained.T, np.abs(lines.values.T) ** 2, known.T, strict=True)
+            estimates += [fit_force_noise(lines.frequency_hz, energy, gain, *parts) for energy, *parts in sensors]
+    white, pink = np.median([(noise.white, noise.pink) for noise in estimates], axis=0) if estimates else (0.0, 0.0)
     return Noise(white=float(white), pink=float(pink))
 
 
-def _gain(group: tuple[ObservedRecord, ...], lines: GroupSpectra) -> FloatArray:
+def _noise_gain(group: tuple[ObservedRecord, ...], lines: GroupSpectra) -> FloatArray:
     """Energy on each line of noise of density 1 over the whole record."""
     rate = 2 * lines.s.real
     return np.asarray((1 - np.exp(-rate * _duration_s(group))) / rate)
 
 
-def _noise_of_single(
+def _unrepeated_noise(
     groups: tuple[tuple[ObservedRecord, ...], ...],
     whole: tuple[tuple[Pulse, ...], ...],
-    line_sets: list[GroupSpectra],
+    group_spectra: list[GroupSpectra],
     channel: str,
 ) -> Noise:
-    """Guess the noise where no blow was repeated, from before the blow: not less than a small part of the motion."""
+    """Estimate the noise without repeated records, from before the impact: not less than a small part of the motion."""
     white = 0.0
-    for place, (group, lines) in enumerate(zip(groups, line_sets, strict=True)):
+    for index, (group, lines) in enumerate(zip(groups, group_spectra, strict=True)):
         names = [sensor.channel for sensor in group[0].sensors]
         if channel not in names:
             continue
         sensor = names.index(channel)
-        energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / _gain(group, lines)
+        energy = np.abs(lines.responses[:, 0, sensor]) ** 2 / _noise_gain(group, lines)
         white = max(white, UNREPEATED**2 * float(np.median(energy)))
-        before = whole[place][0].record.responses[sensor, : whole[place][0].start]
-        if len(before) >= BEFORE:
+        before = whole[index][0].record.responses[sensor, : whole[index][0].start]
+        if len(before) >= MIN_LEAD:
             white = max(white, float(np.var(before)) * group[0].step_s)
     return Noise(white=white)
 
@@ -248,23 +253,23 @@ def _duration_s(group: tuple[ObservedRecord, ...]) -> float:
     return min(record.duration_s for record in group)
 
 
-def _resonances(line_sets: list[GroupSpectra], decay: float) -> Resonances:
-    lines = line_sets[0]
+def _find_resonances(group_spectra: list[GroupSpectra], decay: float) -> Resonances:
+    lines = group_spectra[0]
     level = np.zeros(len(lines.frequency_hz))
-    for one in line_sets:
-        size = np.abs(one.values) ** 2
+    for spectra_of_group in group_spectra:
+        size = np.abs(spectra_of_group.values) ** 2
         summed = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
-        level += np.interp(lines.frequency_hz, one.frequency_hz, summed)
+        level += np.interp(lines.frequency_hz, spectra_of_group.frequency_hz, summed)
     return find_resonances(2 * np.pi * lines.frequency_hz, level, decay)
 
 
-def estimate_transfer_functions(found: RecordSurvey, s: ComplexArray) -> TransferFunctions:
+def estimate_transfer_functions(survey: RecordSurvey, s: ComplexArray) -> TransferFunctions:
     """Evaluate transfer functions on a contour.
 
     Parameters
     ----------
-    found : RecordSurvey
-        Of the recordings.
+    survey : RecordSurvey
+        Of the records.
     s : (n_points,) complex array
         rad/s.
 
@@ -274,53 +279,53 @@ def estimate_transfer_functions(found: RecordSurvey, s: ComplexArray) -> Transfe
         With the covariance of their errors.
     """
     wide = np.asarray(np.maximum(s.real, COARSE.width * s.imag) + 1j * s.imag)
-    labels, values, sizes, covariances, input_of, common = [], [], [], [], [], []
-    for place, group in enumerate(found.groups):
-        points = _at(group, s)
-        too_small = _bias(found, place, points)
-        size = np.maximum(np.abs(points.values), np.abs(_at(group, wide).values))
+    labels, values, sizes, covariances, input_index, shared_errors = [], [], [], [], [], []
+    for index, group in enumerate(survey.groups):
+        points = _transform_to(group, s)
+        bias_factor = _bias_factor(survey, index, points)
+        size = np.maximum(np.abs(points.values), np.abs(_transform_to(group, wide).values))
         crossed = points.force.conj() @ points.force.T / np.outer(points.power, points.power)
-        units, left = _gone_on(found.resonances, points, group)
+        units, amplitudes = _truncated_motion(survey.resonances, points, group)
         units *= (points.force.conj() / points.power[:, None])[..., None]
-        common.append(_common(found, place, points))
+        shared_errors.append(_shared_errors(survey, index, points))
         for column, sensor in enumerate(group[0].sensors):
             labels.append(
                 FrfLabel(sensor.dof, group[0].input_dof, sensor.quantity, sensor.channel, group[0].input_channel)
             )
-            values.append(points.values[:, column] * too_small)
+            values.append(points.values[:, column] * bias_factor)
             sizes.append(size[:, column])
-            noise = crossed * _record_noise(found.responses[sensor.channel], s, _duration_s(group))
+            noise = crossed * _noise_covariance(survey.responses[sensor.channel], s, _duration_s(group))
             errors = np.column_stack(
                 [
-                    _constants(points, group, column),
-                    _cut_off(found, place, points, column),
-                    (units * left[..., column]).reshape(len(s), -1),
+                    _dc_offset_error(points, group, column),
+                    _missing_ringing_errors(survey, index, points, column),
+                    (units * amplitudes[..., column]).reshape(len(s), -1),
                 ]
             )
             covariances.append(noise + errors @ errors.conj().T)
-            input_of.append(place)
+            input_index.append(index)
     return TransferFunctions(
         s=s,
         labels=tuple(labels),
         values=np.stack(values, 1),
         size=np.stack(sizes, 1),
         covariance=np.array(covariances),
-        common=tuple(common),
-        input_of=np.array(input_of),
+        shared_errors=tuple(shared_errors),
+        input_index=np.array(input_index),
     )
 
 
-def _constants(points: GroupSpectra, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
-    """Error of an FRF, (n_points,), by one standard deviation of what may be left of a channel's constant."""
+def _dc_offset_error(points: GroupSpectra, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
+    """Error of an FRF, (n_points,), by one standard deviation of a channel's remaining dc offset."""
     durations = np.array([record.duration_s for record in group])
     units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
     stds = np.array([0.0 if record.constant_std is None else record.constant_std[column] for record in group])
     return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
 
 
-def _cut_off(found: RecordSurvey, place: int, points: GroupSpectra, column: int) -> ComplexArray:
-    """Errors of an FRF, as independent columns, by the ringing that records lack at their beginning."""
-    pulses, group = found.pulses[place], found.groups[place]
+def _missing_ringing_errors(survey: RecordSurvey, index: int, points: GroupSpectra, column: int) -> ComplexArray:
+    """Errors of an FRF, as independent columns, by filter ringing that is missing at the start of records."""
+    pulses, group = survey.pulses[index], survey.groups[index]
     sizes = np.array([missing_ringing(pulse, record.responses) for pulse, record in zip(pulses, group, strict=True)])
     if not sizes.any():
         return np.zeros((len(points.s), 0), np.complex128)
@@ -332,37 +337,37 @@ def _cut_off(found: RecordSurvey, place: int, points: GroupSpectra, column: int)
     return np.hstack([of_response, points.values[:, [column]] * of_force])
 
 
-def _gone_on(
+def _truncated_motion(
     resonances: Resonances, points: GroupSpectra, group: tuple[ObservedRecord, ...]
 ) -> tuple[ComplexArray, FloatArray]:
-    """Transform what resonances went on to do after records ended, and say with how much of it each record ended.
+    """Transform the motion of resonances that goes on after records have ended, and give its amplitudes.
 
-    Each is by itself and of unknown phase: (n_points, n_blows, n_peaks) for half an amplitude of 1, and these halves,
-    (n_blows, n_peaks, n_sensors).
+    Each is independent and of unknown phase: (n_points, n_records, n_peaks) for half an amplitude of 1, and these
+    halves, (n_records, n_peaks, n_sensors).
     """
-    decay = ENOUGH / _duration_s(group)
+    decay = WINDOW_DECAYS / _duration_s(group)
     backwards = [replace(record, force=record.force[::-1], responses=record.responses[:, ::-1]) for record in group]
     pairs = spectra(backwards, np.asarray(decay + 1j * resonances.omega_rad_s, np.complex128))
     poles = -resonances.decay_1_s + 1j * resonances.omega_rad_s
     ends = np.exp(-np.outer(points.s, [record.duration_s for record in group]))
-    return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([shown for _, shown in pairs])
+    return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([response for _, response in pairs])
 
 
-def _gone_on_energy(resonances: Resonances, lines: GroupSpectra, group: tuple[ObservedRecord, ...]) -> FloatArray:
-    """Energy, (n_lines, n_sensors), that blows do not share because of what went on after records ended."""
-    units, left = _gone_on(resonances, lines, group)
+def _truncation_energy(resonances: Resonances, lines: GroupSpectra, group: tuple[ObservedRecord, ...]) -> FloatArray:
+    """Energy, (n_lines, n_sensors), that records do not share because their motion goes on after they have ended."""
+    units, amplitudes = _truncated_motion(resonances, lines, group)
     part = (1 - np.abs(lines.force) ** 2 / lines.power[:, None]) / max(len(group) - 1, 1)
-    return np.asarray(np.einsum("pb,pbr,brs->ps", part, np.abs(units) ** 2, left**2, optimize=True))
+    return np.asarray(np.einsum("pb,pbr,brs->ps", part, np.abs(units) ** 2, amplitudes**2, optimize=True))
 
 
-def _bias(found: RecordSurvey, place: int, points: GroupSpectra) -> FloatArray:
-    """Undo what noise of the force takes off the FRFs: it adds to the force's power."""
-    noise = found.force.density(points.frequency_hz)
-    added = noise * np.sum([gate_variance(points.s, pulse) for pulse in found.pulses[place]], axis=0)
-    return np.asarray(1 / (1 - np.minimum(added / points.power, MOST_BIAS)))
+def _bias_factor(survey: RecordSurvey, index: int, points: GroupSpectra) -> FloatArray:
+    """Factor that corrects the bias of FRFs by noise of the force, which adds to the force's power."""
+    noise = survey.force.density(points.frequency_hz)
+    added = noise * np.sum([gate_variance(points.s, pulse) for pulse in survey.pulses[index]], axis=0)
+    return np.asarray(1 / (1 - np.minimum(added / points.power, MAX_BIAS)))
 
 
-def _at(group: tuple[ObservedRecord, ...], s: ComplexArray) -> GroupSpectra:
+def _transform_to(group: tuple[ObservedRecord, ...], s: ComplexArray) -> GroupSpectra:
     pairs = spectra(group, s)
     return GroupSpectra(
         s=s,
@@ -371,26 +376,26 @@ def _at(group: tuple[ObservedRecord, ...], s: ComplexArray) -> GroupSpectra:
     )
 
 
-def _record_noise(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexArray:
+def _noise_covariance(noise: Noise, s: ComplexArray, duration_s: float) -> ComplexArray:
     """Covariance of the transform of noise over a whole record."""
     rate = s[:, None] + s[None, :].conj()
     root = np.sqrt(noise.density(s.imag / (2 * np.pi)))
     return np.asarray(np.outer(root, root) * (1 - np.exp(-rate * duration_s)) / rate)
 
 
-def _common(found: RecordSurvey, place: int, points: GroupSpectra) -> ComplexArray:
-    """Errors that the force's noise puts on all FRFs of a place, as independent columns."""
+def _shared_errors(survey: RecordSurvey, index: int, points: GroupSpectra) -> ComplexArray:
+    """Errors that the force's noise puts on all FRFs of a group, as independent columns."""
     n = len(points.frequency_hz)
-    if found.force.white == 0:
+    if survey.force.white == 0:
         return np.zeros((n, 0), np.complex128)
     s = points.s
-    root = np.sqrt(found.force.density(points.frequency_hz))
+    root = np.sqrt(survey.force.density(points.frequency_hz))
     total = np.zeros((n, n), np.complex128)
-    for column, pulse in enumerate(found.pulses[place]):
+    for column, pulse in enumerate(survey.pulses[index]):
         force = points.force[:, column]
         total += np.outer(force.conj(), force) * gate_covariance(s, pulse)
     total *= np.outer(root, root) / np.outer(points.power, points.power)
-    own = np.sqrt(np.diag(total).real)  # lines that a shaker hardly drives err by far more than others
-    values, vectors = linalg.eigh(total / np.outer(own, own))
-    kept = values > COMMON_PART
-    return np.asarray(own[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
+    stds = np.sqrt(np.diag(total).real)  # lines that a shaker hardly drives err by far more than others
+    values, vectors = linalg.eigh(total / np.outer(stds, stds))
+    strong = values > COMPONENT_PART
+    return np.asarray(stds[:, None] * vectors[:, strong] * np.sqrt(values[strong]))

@@ -1,4 +1,4 @@
-"""Blows at one place with the same sensors, transformed on uniform lines beside the axis."""
+"""Records with the same excited point and the same sensors, transformed on uniform lines beside the imaginary axis."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
-FINER = 4  # lines between those of the record: peaks are seen at their tops
+FINER = 4  # lines for each one of the record: peaks are sampled at their tops
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GroupSpectra:
-    """Transforms of some blows at one place.
+    """Transforms of the records of one group.
 
     Parameters
     ----------
     s : (n_lines,) complex array
         rad/s.
-    force : (n_lines, n_blows) complex array
+    force : (n_lines, n_records) complex array
         N s.
-    responses : (n_lines, n_blows, n_sensors) complex array
+    responses : (n_lines, n_records, n_sensors) complex array
         SI.
     """
 
@@ -41,29 +41,29 @@ class GroupSpectra:
 
     @property
     def power(self) -> FloatArray:
-        """Energy of the force of all blows, (n_lines,)."""
+        """Energy of the force of all records, (n_lines,)."""
         return np.asarray((np.abs(self.force) ** 2).sum(1))
 
     @property
     def values(self) -> ComplexArray:
-        """FRFs of all blows together, (n_lines, n_sensors)."""
+        """H1 estimate of the FRFs from all records, (n_lines, n_sensors)."""
         crossed = (self.responses * self.force.conj()[:, :, None]).sum(1)
         return np.asarray(crossed / self.power[:, None])
 
     @property
     def unexplained(self) -> FloatArray:
-        """Energy of each response, (n_lines, n_sensors), that the FRF of all blows does not explain."""
-        residual = self.responses - self.values[:, None, :] * self.force[:, :, None]
-        return np.asarray((np.abs(residual) ** 2).sum(1) / (self.force.shape[1] - 1))
+        """Energy of each response, (n_lines, n_sensors), that the FRF of all records does not explain."""
+        misfit = self.responses - self.values[:, None, :] * self.force[:, :, None]
+        return np.asarray((np.abs(misfit) ** 2).sum(1) / (self.force.shape[1] - 1))
 
 
 def transform_group(group: tuple[ObservedRecord, ...], band_hz: tuple[float, float], decay_1_s: float) -> GroupSpectra:
-    """Transform blows to uniform lines of a band by FFT.
+    """Transform the records of a group to uniform lines of a band by FFT.
 
     Parameters
     ----------
     group : tuple of ObservedRecord
-        At one place, with the same sensors; where they differ in length, the shortest counts.
+        With one excited point and the same sensors; where they differ in length, the shortest counts.
     band_hz : pair of float
         Hz.
     decay_1_s : float
@@ -72,7 +72,7 @@ def transform_group(group: tuple[ObservedRecord, ...], band_hz: tuple[float, flo
     Returns
     -------
     GroupSpectra
-        `FINER` times as many as the shortest record has.
+        On `FINER` times as many lines as the shortest record has.
     """
     n, step = min(record.n_samples for record in group), group[0].step_s
     window = np.exp(-decay_1_s * step * np.arange(n)) * step
@@ -86,17 +86,17 @@ def transform_group(group: tuple[ObservedRecord, ...], band_hz: tuple[float, flo
 
 
 def group_records(observations: Observations) -> tuple[tuple[ObservedRecord, ...], ...]:
-    """Gather the blows with the same place and the same sensors.
+    """Group the records with the same excited point and the same sensors.
 
     Parameters
     ----------
     observations : Observations
-        Blows or records.
+        Of a hammer or a shaker.
 
     Returns
     -------
     tuple of tuple of ObservedRecord
-        The strongest of each place first.
+        The highest force of each group first.
     """
     keys = dict.fromkeys(
         (record.input_dof, tuple((sensor.channel, sensor.dof) for sensor in record.sensors))

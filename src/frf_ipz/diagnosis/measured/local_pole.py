@@ -12,9 +12,9 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, IntArray
 from frf_ipz.numerics.least_squares import scale_columns, solve_scaled_columns
 
-WIDTH = 3.0  # half-widths of a resonance on each side of it that are looked at
+WIDTH = 3.0  # half-widths of a resonance on each side of it whose lines are fitted
 ROUNDS = 4  # of weights
-UNSURE = 0.01  # relative standard deviation of a frequency: of what drowns in noise nothing is said
+MAX_RELATIVE_STD = 0.01  # of a frequency: a pole that is known less well drowns in noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class LocalPole:
 
 
 def lines_around_pole(s: ComplexArray, pole: complex) -> IntArray:
-    """Choose the lines that tell a pole.
+    """Choose the lines that determine a pole.
 
     Parameters
     ----------
@@ -70,19 +70,21 @@ def fit_local_pole(s: ComplexArray, values: ComplexArray, start: complex) -> Loc
     """
     pole = start
     middle, scale = s.mean(), np.ptp(s.imag)
-    away = (s - middle) / scale
-    deviation = 0.0
+    offset = (s - middle) / scale
+    std = 0.0
     for _ in range(ROUNDS):
         weight = 1 / np.abs(s - pole)
-        columns = np.asarray(np.column_stack([values, np.ones_like(s), away, away**2]) * weight[:, None], np.complex128)
-        found = solve_scaled_columns(columns, np.asarray(s * values * weight, np.complex128))
-        left = s * values * weight - columns @ found
-        variance = float(np.vdot(left, left).real) / (len(s) - columns.shape[1])
+        columns = np.asarray(
+            np.column_stack([values, np.ones_like(s), offset, offset**2]) * weight[:, None], np.complex128
+        )
+        coefficients = solve_scaled_columns(columns, np.asarray(s * values * weight, np.complex128))
+        misfit = s * values * weight - columns @ coefficients
+        variance = float(np.vdot(misfit, misfit).real) / (len(s) - columns.shape[1])
         scaled, sizes = scale_columns(columns)
         covariance = np.linalg.pinv(scaled.conj().T @ scaled)[0, 0].real * variance
-        pole, deviation = complex(found[0]), float(np.sqrt(max(covariance, 0.0) / 2) / sizes[0])
+        pole, std = complex(coefficients[0]), float(np.sqrt(max(covariance, 0.0) / 2) / sizes[0])
     size = abs(pole)
-    is_near = np.abs(pole.imag - middle.imag) < scale / 2
-    if not np.isfinite(size) or not is_near or pole.real >= 0 or deviation > UNSURE * size:
+    is_inside = np.abs(pole.imag - middle.imag) < scale / 2
+    if not np.isfinite(size) or not is_inside or pole.real >= 0 or std > MAX_RELATIVE_STD * size:
         return None
-    return LocalPole(pole=pole, std_rad_s=deviation)
+    return LocalPole(pole=pole, std_rad_s=std)

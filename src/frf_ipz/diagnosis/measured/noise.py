@@ -1,8 +1,8 @@
-"""Noise of the channels: a white and a 1/f part each, from what blows at the same place do not share.
+"""Noise of the channels: a white and a 1/f part each, from what repeated records do not have in common.
 
-The residual of a blow against the FRF of all blows is noise of the response and noise of the force times the FRF. The
-force's noise is read from the force itself, where nothing touches; the response's is what is left. Lines at which the
-residual stands out of that model (resonances of something nonlinear) do not count.
+The misfit of a record against the FRF of all records of its group is noise of the response and noise of the force times
+the FRF. The force's noise is read from the force itself, where nothing touches; the response's is the rest. Lines at
+which the misfit stands out of that model (resonances of something nonlinear) do not count.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SMALLEST = 1e-12  # of the largest: keeps weights finite
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """Two-sided power spectral density of one channel.
+    """Two-sided power spectral density of one channel's noise.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Noise:
     pink: float = 0.0
 
     def density(self, frequency_hz: FloatArray) -> FloatArray:
-        """Give the density.
+        """Evaluate the density.
 
         Parameters
         ----------
@@ -51,7 +51,7 @@ class Noise:
         return self.white + self.pink / np.maximum(frequency_hz, 1e-9)
 
     def rounded(self, signals: Iterable[FloatArray], step_s: float) -> Noise:
-        """Give what a recorder's steps leave: a channel that stays on one step seems to have no noise.
+        """Add the quantisation noise of a recorder: a channel that stays on one step seems to have no noise.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, kn
     frequency_hz : (n,) array
         Hz, above 0.
     energy : (n,) array
-        Mean squared moduli of residuals.
+        Mean squared moduli of misfits.
     gain : (n,) array
         Energy that a density of 1 gives on each line.
     known : (n,) array
@@ -88,15 +88,15 @@ def fit_noise(frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, kn
     Noise
         Not negative; at least a trace of white noise.
     """
-    found = _fit(np.stack([gain, gain / frequency_hz], 1), energy, known)
-    white = max(float(found[0]), SMALLEST * float(np.median(energy / gain)))
-    return Noise(white=white, pink=float(found[1]))
+    parts = _fit_parts(np.stack([gain, gain / frequency_hz], 1), energy, known)
+    white = max(float(parts[0]), SMALLEST * float(np.median(energy / gain)))
+    return Noise(white=white, pink=float(parts[1]))
 
 
 def fit_force_noise(
     frequency_hz: FloatArray, energy: FloatArray, gain: FloatArray, squared_frf: FloatArray, known: FloatArray
 ) -> Noise:
-    """Fit noise of the force that residuals of a response show through its FRF.
+    """Fit noise of the force that misfits of a response show through its FRF.
 
     Parameters
     ----------
@@ -112,27 +112,28 @@ def fit_force_noise(
     Noise
         Of the force, white and 1/f.
     """
-    own = np.stack([gain, gain / frequency_hz], 1)
-    found = _fit(np.hstack([own, own * squared_frf[:, None]]), energy, known)
-    return Noise(white=float(found[2]), pink=float(found[3]))
+    of_response = np.stack([gain, gain / frequency_hz], 1)
+    parts = _fit_parts(np.hstack([of_response, of_response * squared_frf[:, None]]), energy, known)
+    return Noise(white=float(parts[2]), pink=float(parts[3]))
 
 
-def _fit(shape: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray:
+def _fit_parts(shapes: FloatArray, energy: FloatArray, known: FloatArray) -> FloatArray:
+    """Fit energies by non-negative parts of shapes, (n_shapes,), weighted by the model and without outliers."""
     largest = float(energy.max(initial=0.0))
     if largest <= 0:
-        return np.zeros(shape.shape[1])
+        return np.zeros(shapes.shape[1])
     energy, known = energy / largest, known / largest
-    left = np.maximum(energy - known, 0.0)
-    model = np.full(len(energy), max(float(np.median(left)), SMALLEST * float(energy.max(initial=1e-300))))
-    found = np.zeros(shape.shape[1])
-    found[0] = float(np.median(left / shape[:, 0]))
+    unknown = np.maximum(energy - known, 0.0)
+    model = np.full(len(energy), max(float(np.median(unknown)), SMALLEST * float(energy.max(initial=1e-300))))
+    parts = np.zeros(shapes.shape[1])
+    parts[0] = float(np.median(unknown / shapes[:, 0]))
     for _ in range(ROUNDS):
         total = model + known
         use = energy < OUTLIER * total
         if use.sum() < max(10, len(energy) // 10):
             break
         weight = 1 / total[use]
-        scale = shape[use].max(0)
-        found = nnls(shape[use] / scale * weight[:, None], (energy - known)[use] * weight)[0] / scale
-        model = np.maximum(shape @ found, SMALLEST)
-    return found * largest
+        scale = shapes[use].max(0)
+        parts = nnls(shapes[use] / scale * weight[:, None], (energy - known)[use] * weight)[0] / scale
+        model = np.maximum(shapes @ parts, SMALLEST)
+    return parts * largest

@@ -12,12 +12,12 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.frf import FrfLabel
 
 SMOOTH_PART = 0.5  # of the model's tolerance: relative error of its FRFs that varies slowly along the band
-SMOOTH_LENGTH = 0.05  # of the logarithm of frequency: how slowly
-ROUGH_PART = 0.15  # of the tolerance: the same from point to point
-NOISY = 25.0  # points whose noise is a fifth of the FRF tell nothing of gains
+SMOOTH_LENGTH = 0.05  # correlation length of that error, in the logarithm of frequency
+ROUGH_PART = 0.15  # of the tolerance: relative error that is independent from point to point
+NOISY = 25.0  # points whose noise is a fifth of the FRF say nothing about gains
 FAINT = 0.01  # of the largest FRF of a quantity: transverse sensitivity and asymmetry make smaller ones
-ALWAYS = 0.9  # of the points: an FRF that is faint at so many tells nothing
-NEGLIGIBLE = 0.05  # of a whitened error that is shared: what it changes is far below one standard deviation
+FAINT_POINTS = 0.9  # of the points: an FRF that is faint at so many says nothing
+NEGLIGIBLE = 0.05  # of a whitened error that is shared: its effect is far below one standard deviation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,14 +33,14 @@ class TransferFunctions:
     values : (n_points, n_frfs) complex array
         SI.
     size : (n_points, n_frfs) array
-        How large the FRF is without its zeros: what relative errors of a model refer to.
+        How large the FRF is without its zeros: relative errors of a model refer to it.
     covariance : (n_frfs, n_points, n_points) complex array
         Of the noise.
-    common : tuple of (n_points, n_shared) complex array
+    shared_errors : tuple of (n_points, n_shared) complex array
         For each input, errors that all its FRFs share as a factor, from the noise of the force; each column is one
         standard deviation.
-    input_of : (n_frfs,) int array
-        Which entry of `common` belongs to an FRF.
+    input_index : (n_frfs,) int array
+        Which entry of `shared_errors` belongs to an FRF.
     """
 
     s: ComplexArray
@@ -48,12 +48,12 @@ class TransferFunctions:
     values: ComplexArray
     size: FloatArray
     covariance: ComplexArray
-    common: tuple[ComplexArray, ...]
-    input_of: IntArray
+    shared_errors: tuple[ComplexArray, ...]
+    input_index: IntArray
 
     @property
-    def certain(self) -> ComplexArray:
-        """The values without what may be noise: what multiplies relative errors, or these would follow the noise."""
+    def values_above_noise(self) -> ComplexArray:
+        """(n_points, n_frfs) values less what may be noise; relative errors of noisy values would follow the noise."""
         noise = np.array([np.diag(covariance).real for covariance in self.covariance]).T
         return np.asarray(
             self.values * np.maximum(1 - NOISY * noise / np.maximum(self.size**2, np.finfo(float).tiny), 0.0)
@@ -65,36 +65,37 @@ class TransferFunctions:
         return np.asarray(self.s.imag / (2 * np.pi))
 
 
-def select_points(measured: TransferFunctions, kept: IntArray) -> TransferFunctions:
-    """Keep some points of a contour.
+def select_points(measured: TransferFunctions, points: IntArray) -> TransferFunctions:
+    """Select points of a contour.
 
     Parameters
     ----------
     measured : TransferFunctions
         Transfer functions.
-    kept : (n,) int array
-        Which points.
+    points : (n,) int array
+        Their indices.
 
     Returns
     -------
     TransferFunctions
-        Those points.
+        At those points.
     """
-    s: ComplexArray = measured.s[kept]
+    s: ComplexArray = measured.s[points]
     return replace(
         measured,
         s=s,
-        values=measured.values[kept],
-        size=measured.size[kept],
-        covariance=measured.covariance[:, kept[:, None], kept],
-        common=tuple(shared[kept] for shared in measured.common),
+        values=measured.values[points],
+        size=measured.size[points],
+        covariance=measured.covariance[:, points[:, None], points],
+        shared_errors=tuple(shared[points] for shared in measured.shared_errors),
     )
 
 
 def raise_faint_sizes(measured: TransferFunctions) -> TransferFunctions:
-    """Let errors of a model refer to FRFs that are large enough to be known.
+    """Let relative errors of a model refer to FRFs that are large enough to be predictable.
 
-    A sensor on a node line of all modes sees what nobody knows: how it is turned, and how asymmetric the structure is.
+    A sensor on a node line of all modes measures its own misalignment and the asymmetry of the structure, which no
+    model knows.
 
     Parameters
     ----------
@@ -104,13 +105,13 @@ def raise_faint_sizes(measured: TransferFunctions) -> TransferFunctions:
     Returns
     -------
     TransferFunctions
-        The same, with sizes that are not far below that of the largest FRF of the same quantity and blow.
+        The same, with sizes that are not far below that of the largest FRF of the same quantity and excited point.
     """
     return replace(measured, size=np.maximum(measured.size, FAINT * _largest(measured)))
 
 
 def find_faint_frfs(measured: TransferFunctions) -> tuple[FrfLabel, ...]:
-    """Find the FRFs that are too faint to be known over nearly all of the band.
+    """Find the FRFs that are too faint to be predictable over nearly all of the band.
 
     Parameters
     ----------
@@ -120,19 +121,19 @@ def find_faint_frfs(measured: TransferFunctions) -> tuple[FrfLabel, ...]:
     Returns
     -------
     tuple of FrfLabel
-        What changes the model there is not seen in them.
+        They do not show changes of the model at their sensors.
     """
-    faint = np.mean(np.abs(measured.values) < FAINT * _largest(measured), axis=0) > ALWAYS
+    faint = np.mean(np.abs(measured.values) < FAINT * _largest(measured), axis=0) > FAINT_POINTS
     return tuple(label for label, is_faint in zip(measured.labels, faint, strict=True) if is_faint)
 
 
 def _largest(measured: TransferFunctions) -> FloatArray:
-    """Give the size of the largest FRF of the same quantity and blow, (n_points, n_frfs) array."""
+    """Give the size of the largest FRF of the same quantity and excited point, (n_points, n_frfs) array."""
     largest = np.zeros_like(measured.size)
     quantities = np.array([label.quantity.power for label in measured.labels])
     for quantity in np.unique(quantities):
-        for place in np.unique(measured.input_of):
-            frfs = np.flatnonzero((quantities == quantity) & (measured.input_of == place))
+        for index in np.unique(measured.input_index):
+            frfs = np.flatnonzero((quantities == quantity) & (measured.input_index == index))
             if len(frfs):
                 largest[:, frfs] = measured.size[:, frfs].max(axis=1, keepdims=True)
     return largest
@@ -140,14 +141,14 @@ def _largest(measured: TransferFunctions) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Whitening:
-    """What turns errors of all FRFs into independent ones of variance 1.
+    """Linear map that turns errors of all FRFs into independent ones of variance 1.
 
     Parameters
     ----------
     factors : (n_frfs, n_points, n_points) complex array
         Inverses of the lower Cholesky factors of each FRF's covariance.
     blocks : tuple of (FRFs, Q, shrink)
-        Errors that several FRFs share: orthonormal directions in whitened space, and the part to take off each.
+        Errors that several FRFs share: orthonormal directions in whitened space, and the part to remove from each.
     """
 
     factors: ComplexArray
@@ -155,9 +156,9 @@ class Whitening:
 
     @property
     def log_density(self) -> float:
-        """Logarithm of the likelihood of no error at all, nats: the smaller the expected errors, the larger."""
-        own = float(np.sum(np.log(np.abs(np.diagonal(self.factors, axis1=1, axis2=2)))))
-        return 2 * own + sum(float(np.sum(np.log1p(-shrink))) for *_, shrink in self.blocks)
+        """Log likelihood of zero error, less its constant: the smaller the expected errors, the larger."""
+        separate = float(np.sum(np.log(np.abs(np.diagonal(self.factors, axis1=1, axis2=2)))))
+        return 2 * separate + sum(float(np.sum(np.log1p(-shrink))) for *_, shrink in self.blocks)
 
     def __call__(self, errors: ComplexArray) -> FloatArray:
         """Whiten.
@@ -173,7 +174,7 @@ class Whitening:
             Real and imaginary parts, each of variance 1.
         """
         n_points, n_frfs, *rest = errors.shape
-        white = _separately(self.factors, errors).reshape(n_frfs, 2 * n_points, -1)
+        white = _whiten_separately(self.factors, errors).reshape(n_frfs, 2 * n_points, -1)
         for frfs, directions, shrink in self.blocks:
             part = white[frfs].reshape(len(frfs) * 2 * n_points, -1)
             part -= directions @ (shrink[:, None] * (directions.T @ part))
@@ -181,29 +182,29 @@ class Whitening:
         return np.ascontiguousarray(white.reshape(n_frfs * 2 * n_points, *rest))
 
 
-def _separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
+def _whiten_separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     """Whiten each FRF by itself, (n_frfs, 2 n_points, n) array."""
-    moved = errors.reshape(*errors.shape[:2], -1)
-    n_points, n_frfs, n = moved.shape
+    columns = errors.reshape(*errors.shape[:2], -1)
+    n_points, n_frfs, n = columns.shape
     white = np.empty((n_frfs, 2 * n_points, n))
     for frf, factor in enumerate(factors):
-        own = np.sqrt(2.0) * moved[:, frf]
-        part = blas.ztrmm(1.0, factor.T, own, lower=0, trans_a=1) if n > 1 else factor @ own  # half the work, for many
+        raw = np.sqrt(2.0) * columns[:, frf]
+        part = blas.ztrmm(1.0, factor.T, raw, lower=0, trans_a=1) if n > 1 else factor @ raw  # half the work, for many
         white[frf, :n_points], white[frf, n_points:] = part.real, part.imag
     return white
 
 
 def make_whitening(measured: TransferFunctions, *, tolerance: float, floor: float = 1.0) -> Whitening:
-    """Prepare whitening, with what is wrong with any nominal model and test added to the noise.
+    """Prepare whitening by the noise and by the errors of any nominal model that no parameter stands for.
 
     Parameters
     ----------
     measured : TransferFunctions
         The data.
     tolerance : float
-        Relative tolerance of the model: its FRFs are off by a part of it that no parameter stands for.
+        Relative tolerance of the model: a part of it is the error of its FRFs that no parameter stands for.
     floor : float
-        Factor of the model's errors: large ones let a search see past narrow peaks.
+        Factor of the model's errors: large ones smooth narrow peaks for a search.
 
     Returns
     -------
@@ -220,31 +221,31 @@ def make_whitening(measured: TransferFunctions, *, tolerance: float, floor: floa
         lower = linalg.cholesky(measured.covariance[frf] + model, lower=True, check_finite=False)
         inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True, check_finite=False)
         factors.append(np.asarray(inverse, np.complex128))
-    found = np.array(factors, np.complex128)
-    return Whitening(factors=found, blocks=tuple(_blocks(measured, found)))
+    inverses = np.array(factors, np.complex128)
+    return Whitening(factors=inverses, blocks=tuple(_shared_blocks(measured, inverses)))
 
 
-def _blocks(measured: TransferFunctions, factors: ComplexArray) -> list[tuple[IntArray, FloatArray, FloatArray]]:
-    """Noise of the force for each blow's place."""
+def _shared_blocks(measured: TransferFunctions, factors: ComplexArray) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+    """Blocks by the noise of the force at each excited point."""
     blocks = []
-    for place, shared in enumerate(measured.common):
-        frfs = np.flatnonzero(measured.input_of == place)
+    for index, shared in enumerate(measured.shared_errors):
+        frfs = np.flatnonzero(measured.input_index == index)
         if shared.shape[1]:
-            blocks.append(_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
+            blocks.append(_shared_block(measured, factors, frfs, np.hstack([shared, 1j * shared]) / np.sqrt(2.0)))
     return blocks
 
 
-def _block(
+def _shared_block(
     measured: TransferFunctions, factors: ComplexArray, frfs: IntArray, shared: ComplexArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    errors = measured.certain[:, frfs, None] * shared[:, None, :]
-    columns = _separately(factors[frfs], errors).reshape(-1, shared.shape[1])
+    errors = measured.values_above_noise[:, frfs, None] * shared[:, None, :]
+    columns = _whiten_separately(factors[frfs], errors).reshape(-1, shared.shape[1])
     strong = np.sum(columns**2, 0) > NEGLIGIBLE
-    return (frfs, *_directions(columns[:, strong]))
+    return (frfs, *_shared_directions(columns[:, strong]))
 
 
-def _directions(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Directions of shared errors, and the part of them that is more than variance 1 allows."""
+def _shared_directions(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Directions of shared errors, and the part of them that exceeds variance 1."""
     directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     strong = sizes**2 > NEGLIGIBLE
     return np.ascontiguousarray(directions[:, strong]), 1 - 1 / np.sqrt(1 + sizes[strong] ** 2)

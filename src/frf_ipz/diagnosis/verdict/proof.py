@@ -88,7 +88,7 @@ def expected(data: Data, options: DiagnoseOptions) -> FloatArray:
     """
     measured = data.measured
     noise = np.array([np.diag(covariance).real for covariance in measured.covariance]).T
-    shared = np.stack([np.sum(np.abs(measured.common[place]) ** 2, 1) for place in measured.input_of], 1)
+    shared = np.stack([np.sum(np.abs(measured.shared_errors[index]) ** 2, 1) for index in measured.input_index], 1)
     model = (np.hypot(SMOOTH_PART, ROUGH_PART) * options.stiffness_tolerance) ** 2
     return np.asarray(np.sqrt(noise + shared * np.abs(measured.values) ** 2 + model * measured.size**2))
 

@@ -82,7 +82,7 @@ def test_the_model_that_goes_on_has_spring_and_damper(tmp_path, place):
         before=nothing,
         updated=nothing,
         after=nothing,
-        held="blows",
+        held="records",
         linearised=law,
     )
     changed = apply_to_model(model, found)
