@@ -46,7 +46,7 @@ def synthetic_folder(*, without=(), diagnosed=False):
         results["levels"] = synthetic_levels(results["fit"].labels, results["fit"].band_hz)
         results["diagnose"] = synthetic_diagnosis(results["fit"].labels, results["model"].geometry.nodes.tolist())
     stages = {name: {"key": f"{place:064x}", "seconds": 0.1 * place} for place, name in enumerate(results)}
-    record = {
+    manifest = {
         "frf_ipz": "0.1.0",
         "python": "3.11.7",
         "packages": {"numpy": np.__version__},
@@ -57,7 +57,7 @@ def synthetic_folder(*, without=(), diagnosed=False):
         "inputs": {"test.toml": "0" * 64},
         "stages": stages,
     }
-    return Folder(results=results, record=record, stale=())
+    return Folder(results=results, manifest=manifest, stale=())
 
 
 def synthetic_results():

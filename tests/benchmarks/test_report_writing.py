@@ -8,7 +8,7 @@ from synthetic_run import Folder, many_frfs
 
 @pytest.mark.benchmark(group="report")
 def test_a_page_of_100_frfs_with_50_000_lines(benchmark, tmp_path):
-    folder = Folder(results={"ingest": many_frfs(100, 50_000)}, record={"stages": {}}, stale=())
+    folder = Folder(results={"ingest": many_frfs(100, 50_000)}, manifest={"stages": {}}, stale=())
     path = tmp_path / "report.html"
     benchmark.pedantic(write_report, args=(folder, path), rounds=3)
     benchmark.extra_info["megabytes"] = path.stat().st_size / 1e6

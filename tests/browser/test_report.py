@@ -196,7 +196,7 @@ def test_no_picture_is_wider_than_the_paper_when_printed(page):
 
 def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
     path = tmp_path / "big.html"
-    write_report(Folder(results={"ingest": many_frfs(100, 50_000)}, record={"stages": {}}, stale=()), path)
+    write_report(Folder(results={"ingest": many_frfs(100, 50_000)}, manifest={"stages": {}}, stale=()), path)
     page = open_page(browser, path)
     assert page.find_element("id", "shown").text == "6 of 100"
     assert errors(page) == []

@@ -73,5 +73,5 @@ def test_check_draws_the_set_up_and_writes_nothing(campaign, monkeypatch, capsys
     drawing = capsys.readouterr().out
     assert "21:+z" in drawing
     assert drawing.splitlines()[2].startswith("#")
-    assert {"S", "B", "*"} <= set(drawing.splitlines()[2])
+    assert {"S", "F", "*"} <= set(drawing.splitlines()[2])
     assert sorted(campaign.rglob("*")) == before

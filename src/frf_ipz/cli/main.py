@@ -55,8 +55,8 @@ HELP = {
 }
 
 
-def _version(wanted: bool) -> None:  # noqa: FBT001  the signature of a typer callback
-    if wanted:
+def _version(is_given: bool) -> None:  # noqa: FBT001  the signature of a typer callback
+    if is_given:
         print(f"frf-ipz {__version__}")
         raise typer.Exit
 

@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
 
 
-def chain(job: PipelineInputs, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress) -> Iterator[str]:
+def chain(
+    inputs: PipelineInputs, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress
+) -> Iterator[str]:
     """Run the stages one after another.
 
     Parameters
     ----------
-    job : PipelineInputs
+    inputs : PipelineInputs
         What to work on.
     folder : RunFolder
         Where results are kept.
@@ -35,41 +37,41 @@ def chain(job: PipelineInputs, folder: RunFolder, *, until: str, diagnosing: boo
     diagnosing : bool
         Look for what the model left out.
     progress : Progress
-        Told how far the work is.
+        Called with the fraction done and what is being done.
 
     Yields
     ------
     str
         The name of each stage when it is done.
     """
-    desk = StageRunner(job=job, folder=folder, progress=progress)
-    recordings = measurement.ingest(desk)
+    runner = StageRunner(inputs=inputs, folder=folder, progress=progress)
+    recordings = measurement.ingest(runner)
     yield "ingest"
-    frfs, model = recordings.frfs, job.model
-    options = job.pipeline.file.diagnose
+    frfs, model = recordings.frfs, inputs.model
+    options = inputs.pipeline.file.diagnose
     diagnosis = None
     if model is not None and diagnosing and options is not None and options.apply:
-        diagnosis = mismatch.diagnose(desk, model, frfs)
-        model, frfs = mismatch.apply_diagnosis(desk, model, frfs, diagnosis)
-    fit = measurement.fit(desk, frfs, corrected_by=diagnosis)
+        diagnosis = mismatch.diagnose(runner, model, frfs)
+        model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
+    fit = measurement.fit(runner, frfs, corrected_by=diagnosis)
     yield "fit"
     if model is not None:
-        modelling.outline(desk, model, corrected_by=diagnosis)
+        modelling.outline(runner, model, corrected_by=diagnosis)
         if diagnosing:
             if diagnosis is None:
-                mismatch.diagnose(desk, model, frfs)
-            mismatch.levels(desk, fit, recordings.frfs)
+                mismatch.diagnose(runner, model, frfs)
+            mismatch.levels(runner, fit, recordings.frfs)
             if until == "diagnose":
-                results.report(desk)
+                results.report(runner)
             yield "diagnose"
-        reduced = modelling.reduce(desk, model, fit, corrected_by=diagnosis)
-        pairs = modelling.pair(desk, fit, reduced)
+        reduced = modelling.reduce(runner, model, fit, corrected_by=diagnosis)
+        pairs = modelling.pair(runner, fit, reduced)
         yield "pair"
-        updated = modelling.update(desk, model, reduced, fit, pairs, corrected_by=diagnosis)
+        updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
         yield "update"
-        results.predict(desk, updated, fit, frfs)
+        results.predict(runner, updated, fit, frfs)
         yield "predict"
-        results.export(desk, updated, fit, corrected_by=diagnosis)
+        results.export(runner, updated, fit, corrected_by=diagnosis)
         yield "export"
-    results.report(desk)
+    results.report(runner)
     yield "report"

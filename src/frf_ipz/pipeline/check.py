@@ -16,47 +16,47 @@ if TYPE_CHECKING:
 
 WIDTH = 72
 HEIGHT = 18
-MARKS = {"node": "-", "support": "#", "sensor": "S", "blow": "B", "both": "X", "point": "*"}
+MARKS = {"node": "-", "support": "#", "sensor": "S", "input": "F", "both": "X", "point": "*"}
 FLAT = 1e-6  # of the largest extent: a structure thinner than this is a line
 
 
-def describe_setup(job: PipelineInputs) -> str:
+def describe_setup(inputs: PipelineInputs) -> str:
     """Describe what a pipeline would work on.
 
     Parameters
     ----------
-    job : PipelineInputs
+    inputs : PipelineInputs
         The pipeline with its test and model.
 
     Returns
     -------
     str
-        A drawing of the structure with sensors, blows and points of interest, and what was read.
+        A drawing of the structure with sensors, inputs and points of interest, and what was read.
     """
-    test = job.test
-    lines = [job.pipeline.name, ""]
-    if job.model is not None:
-        lines += [*draw(job.model.geometry, test.output_dofs, test.input_dofs, job.points), ""]
-        lines.append(f"model       {job.model.name} ({job.model.kind}), {len(job.model.dofs)} free DOFs")
+    test = inputs.test
+    lines = [inputs.pipeline.name, ""]
+    if inputs.model is not None:
+        lines += [*draw(inputs.model.geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
+        lines.append(f"model       {inputs.model.name} ({inputs.model.kind}), {len(inputs.model.dofs)} free DOFs")
     lines += [
         f"test        {test.name} ({test.kind}), {len(test.files)} files",
         f"sensors  S  {_names(test.output_dofs)}",
-        f"blows    B  {_names(test.input_dofs)}",
-        f"points   *  {_names(job.points)}",
+        f"inputs   F  {_names(test.input_dofs)}",
+        f"points   *  {_names(inputs.points)}",
         "",
         "Everything fits together. Nothing was run.",
     ]
     return "\n".join(lines)
 
 
-def draw(geometry: Geometry, sensors: Iterable[Dof], records: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
+def draw(geometry: Geometry, sensors: Iterable[Dof], inputs: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
     """Draw a structure in characters.
 
     Parameters
     ----------
     geometry : Geometry
         Where the nodes are.
-    sensors, blows, points : iterable of Dof
+    sensors, inputs, points : iterable of Dof
         What to mark.
 
     Returns
@@ -67,13 +67,13 @@ def draw(geometry: Geometry, sensors: Iterable[Dof], records: Iterable[Dof], poi
     columns, rows = _places(geometry.coordinates_m)
     canvas = [[" "] * WIDTH for _ in range(int(rows.max()) + 1)]
     place = {int(node): index for index, node in enumerate(geometry.nodes)}
-    struck, sensed = {dof.node for dof in records}, {dof.node for dof in sensors}
+    excited, sensed = {dof.node for dof in inputs}, {dof.node for dof in sensors}
     marks = dict.fromkeys(place, MARKS["node"]) | {
         node: MARKS["support"] for node in geometry.supports if node in place
     }
     marks |= {dof.node: MARKS["point"] for dof in points}
-    marks |= {node: MARKS["both" if node in sensed else "blow"] for node in struck}
-    marks |= dict.fromkeys(sensed - struck, MARKS["sensor"])
+    marks |= {node: MARKS["both" if node in sensed else "input"] for node in excited}
+    marks |= dict.fromkeys(sensed - excited, MARKS["sensor"])
     for node in sorted(marks, key=lambda node: marks[node] != MARKS["node"]):
         if node in place:
             canvas[rows[place[node]]][columns[place[node]]] = marks[node]

@@ -54,7 +54,7 @@ def write_starting_files(folder: Path) -> dict[Path, bool]:
         raise InputError(f"{folder}: there is no such folder; give the one that holds the recordings")
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".csv" and not _is_hidden(path, folder))
     if not files:
-        raise InputError(f"{folder}: holds no .csv; put the recordings there, one file a blow, then run init again")
+        raise InputError(f"{folder}: holds no .csv; put the recordings there, one file an impact, then run init again")
     header = _header(files[0])
     is_frf = set(FRF_COLUMNS) <= set(header)
     test = _frf_test(folder, files) if is_frf else _hammer_test(folder, files, _columns(files, header))
@@ -118,7 +118,7 @@ def _hammer_test(folder: Path, files: Sequence[Path], columns: Sequence[_Column]
     for name, pattern in _groups(folder, files).items():
         numbers = NODE.findall(name)
         node = numbers[-1] if numbers else "1"
-        lines += ["", "[[hit]]", _checked(f'dof = "{int(node)}:+z"', "where these blows hit")]
+        lines += ["", "[[hit]]", _checked(f'dof = "{int(node)}:+z"', "where these impacts hit")]
         lines.append(f"files = [{_quoted(pattern)}]")
     return "\n".join(lines) + "\n"
 
@@ -135,7 +135,7 @@ def _channel(column: _Column, *, is_input: bool) -> list[str]:
 
 
 def _groups(folder: Path, files: Iterable[Path]) -> dict[str, str]:
-    """Files whose names differ in the last number only are blows at one DOF: name of the group and its glob."""
+    """Files whose names differ in the last number only are impacts at one DOF: name of the group and its glob."""
     groups: dict[str, str] = {}
     for path in files:
         relative = path.relative_to(folder)

@@ -38,7 +38,7 @@ class PipelineInputs:
         The FE model with the sensors' known masses; None where the run ends with the fit.
     points : tuple of Dof
         Points of interest.
-    inputs : mapping of str to str
+    digests : mapping of str to str
         Digest of every file that the user handed in.
     model_files : tuple of Path
         Those that the model was read from.
@@ -50,14 +50,14 @@ class PipelineInputs:
     test: VibrationTest
     model: StructuralModel | None
     points: tuple[Dof, ...]
-    inputs: Mapping[str, str]
+    digests: Mapping[str, str]
     model_files: tuple[Path, ...] = ()
     reference: FrfSet | None = None
 
     @property
     def model_key(self) -> list[object]:
         """What the FE model was made from."""
-        files = [self.inputs[str(file)] for file in self.model_files]
+        files = [self.digests[str(file)] for file in self.model_files]
         return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
 
 
@@ -98,7 +98,7 @@ def read_inputs(path: Path) -> PipelineInputs:
         test=test,
         model=model,
         points=points,
-        inputs={str(file): digest_file(file) for file in dict.fromkeys(files)},
+        digests={str(file): digest_file(file) for file in dict.fromkeys(files)},
         model_files=of_model,
         reference=reference,
     )

@@ -37,7 +37,7 @@ def run_pipeline(
     diagnosing : bool, optional
         Look for what the model left out; where it is left out, if the file has a section ``[diagnose]``.
     progress : Progress
-        Told how far the work is.
+        Called with the fraction done and what is being done.
 
     Returns
     -------
@@ -51,26 +51,26 @@ def run_pipeline(
     """
     if until not in STAGES:
         raise InputError(f"there is no stage '{until}'; {did_you_mean(until, STAGES)}")
-    job = read_inputs(path)
-    wanted = job.pipeline.file.diagnose is not None if diagnosing is None else diagnosing
-    if job.model is None and until not in {"ingest", "fit", "report"}:
+    inputs = read_inputs(path)
+    is_diagnosing = inputs.pipeline.file.diagnose is not None if diagnosing is None else diagnosing
+    if inputs.model is None and until not in {"ingest", "fit", "report"}:
         raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
     with open_run(out) as folder:
-        folder.record.update(_provenance(job))
-        for stage in chain(job, folder, until=until, diagnosing=wanted, progress=progress):
+        folder.manifest.update(_provenance(inputs))
+        for stage in chain(inputs, folder, until=until, diagnosing=is_diagnosing, progress=progress):
             if stage == until:
                 break
     return read_run(out)
 
 
-def _provenance(job: PipelineInputs) -> dict[str, Any]:
+def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
     return {
         "frf_ipz": __version__,
         "python": platform.python_version(),
         "packages": {name: version(name) for name in PACKAGES},
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
-        "pipeline": str(job.pipeline.path),
-        "name": job.pipeline.name,
-        "configuration": plain(job.pipeline.file),
-        "inputs": dict(job.inputs),
+        "pipeline": str(inputs.pipeline.path),
+        "name": inputs.pipeline.name,
+        "configuration": plain(inputs.pipeline.file),
+        "inputs": dict(inputs.digests),
     }

@@ -30,7 +30,7 @@ def unweighed_sensors(test: VibrationTest, labels: Sequence[FrfLabel]) -> tuple[
     Returns
     -------
     tuple of Dof
-        Unsigned, each node once. Where sensors roved, none: their mass was in another place for each blow.
+        Unsigned, each node once. Where sensors roved, none: their mass was at another point for each record.
     """
     inputs = {label.input_dof for label in labels}
     measured = {(label.output_dof, label.input_dof) for label in labels}

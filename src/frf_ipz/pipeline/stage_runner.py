@@ -1,4 +1,4 @@
-"""What every stage of the chain works with: the job, the run's folder, and the keys of the stages before it."""
+"""What every stage of the chain works with: the inputs, the run's folder, and the keys of the stages before it."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ NEEDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StageRunner:
-    """What every stage needs: the job, the folder, and the keys of the stages before it.
+    """What every stage needs: the inputs, the folder, and the keys of the stages before it.
 
     Parameters
     ----------
-    job : PipelineInputs
+    inputs : PipelineInputs
         What to work on.
     folder : RunFolder
         Where results are kept.
     progress : Progress
-        Told how far the work is.
+        Called with the fraction done and what is being done.
     keys : dict of str to str
         Key of each stage that is done.
     """
 
-    job: PipelineInputs
+    inputs: PipelineInputs
     folder: RunFolder
     progress: Progress
     keys: dict[str, str] = field(default_factory=dict)
@@ -76,13 +76,13 @@ class StageRunner:
         object
             The result.
         """
-        key = self.sign(name, depends)
-        result = self.folder.stage(name, key, lambda: compute(self.listener(name)), files)
+        key = self.make_key(name, depends)
+        result = self.folder.stage(name, key, lambda: compute(self.stage_progress(name)), files)
         if name in self.folder.computed:
             self.folder.mark_stale(dependents(name))
         return result
 
-    def sign(self, name: str, depends: Mapping[str, object]) -> str:
+    def make_key(self, name: str, depends: Mapping[str, object]) -> str:
         """Make the key of a stage, and keep it for the stages after it.
 
         Parameters
@@ -100,7 +100,7 @@ class StageRunner:
         self.keys[name] = digest({"stage": name, "version": __version__, **depends})
         return self.keys[name]
 
-    def listener(self, name: str) -> Progress:
+    def stage_progress(self, name: str) -> Progress:
         """Give the progress of one stage, with its name before what it says.
 
         Parameters
@@ -114,11 +114,11 @@ class StageRunner:
             To hand to the stage.
         """
 
-        def tell(fraction: float, text: str) -> None:
+        def report_stage(fraction: float, text: str) -> None:
             self.progress(fraction, f"{name}: {text}" if text else name)
 
-        tell(0.0, "")
-        return tell
+        report_stage(0.0, "")
+        return report_stage
 
     def after(self, *names: str) -> list[str]:
         """Give the keys of earlier stages.
@@ -154,8 +154,8 @@ def dependents(name: str) -> list[str]:
     >>> dependents("update")
     ['predict', 'export']
     """
-    found = {name}
+    stale = {name}
     for stage, needs in NEEDS.items():
-        if found & set(needs):
-            found.add(stage)
-    return [stage for stage in NEEDS if stage in found - {name}]
+        if stale & set(needs):
+            stale.add(stage)
+    return [stage for stage in NEEDS if stage in stale - {name}]

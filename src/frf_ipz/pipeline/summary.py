@@ -38,7 +38,7 @@ def summarise(run: RunFolder) -> str:
         At most a screen of text.
     """
     writers: dict[str, Callable[[Any], list[tuple[str, str]]]] = {
-        "ingest": recordings_lines,
+        "ingest": estimate_lines,
         "fit": fit_lines,
         "diagnose": diagnosis_lines,
         "reduce": reduced_lines,
@@ -46,25 +46,25 @@ def summarise(run: RunFolder) -> str:
         "update": update_lines,
         "predict": prediction_lines,
     }
-    lines = [f"{run.record.get('name', '')}"]
+    lines = [f"{run.manifest.get('name', '')}"]
     for stage, write in writers.items():
-        result = run.load(stage) if stage in run.record.get("stages", {}) else None
+        result = run.load(stage) if stage in run.manifest.get("stages", {}) else None
         if result is not None:
             stale = " (stale: made before the last change; run it again)" if run.is_stale(stage) else ""
             lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
-    seconds = sum(entry.get("seconds", 0.0) for entry in run.record.get("stages", {}).values())
+    seconds = sum(entry.get("seconds", 0.0) for entry in run.manifest.get("stages", {}).values())
     lines.append(f"{'results':<12}{run.path}  ({seconds:.1f} s of computing)")
-    if "report" in run.record.get("stages", {}) and not run.is_stale("report"):
+    if "report" in run.manifest.get("stages", {}) and not run.is_stale("report"):
         lines.append(f"{'page':<12}{run.path / 'report.html'}")
     return "\n".join(lines)
 
 
-def recordings_lines(recordings: FrfEstimate) -> list[tuple[str, str]]:
+def estimate_lines(estimate: FrfEstimate) -> list[tuple[str, str]]:
     """Sum up recordings and FRFs.
 
     Parameters
     ----------
-    recordings : FrfEstimate
+    estimate : FrfEstimate
         The result of ingest.
 
     Returns
@@ -72,17 +72,17 @@ def recordings_lines(recordings: FrfEstimate) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    records, frfs = recordings.records, recordings.frfs
+    records, frfs = estimate.records, estimate.frfs
     lines = []
     if len(records):
         left_out = records[~records["used"].astype(bool)]
-        text = f"{len(records)} blows or records, {len(records) - len(left_out)} used"
+        text = f"{len(records)} records, {len(records) - len(left_out)} used"
         lines.append(("recordings", text))
         lines += [("", f"left out: {row.record} ({row.marks})") for row in left_out.itertuples()]
     coherence = frfs.coherence[np.isfinite(frfs.coherence)]
     quality = f", median coherence {np.median(coherence):.4f}" if coherence.size else ""
     span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz{quality}"
-    return [*lines, ("FRFs", span), *_warnings(recordings.warnings)]
+    return [*lines, ("FRFs", span), *_warnings(estimate.warnings)]
 
 
 def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
@@ -99,11 +99,11 @@ def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
         Title and text of each line.
     """
     frequencies = natural_frequency_hz(fit.model.poles[: fit.n_modes])
-    shown = ", ".join(f"{value:.6g}" for value in frequencies[:MOST_MODES])
-    more = f" and {fit.n_modes - MOST_MODES} more" if fit.n_modes > MOST_MODES else ""
+    values = ", ".join(f"{value:.6g}" for value in frequencies[:MOST_MODES])
+    rest = f" and {fit.n_modes - MOST_MODES} more" if fit.n_modes > MOST_MODES else ""
     zeros = int(np.count_nonzero(fit.zeros.identifiable))
     return [
-        ("fit", f"{fit.n_modes} modes: {shown}{more} Hz"),
+        ("fit", f"{fit.n_modes} modes: {values}{rest} Hz"),
         ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
         *_warnings(fit.warnings),
     ]
@@ -122,10 +122,10 @@ def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    said = diagnosis.statement
-    findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in said]
-    alike = [("", one.statement) for one in diagnosis.ambiguity]
-    return [("diagnosis", said), *findings, *alike, *_warnings(diagnosis.warnings)]
+    statement = diagnosis.statement
+    findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in statement]
+    ambiguities = [("", ambiguity.statement) for ambiguity in diagnosis.ambiguity]
+    return [("diagnosis", statement), *findings, *ambiguities, *_warnings(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:

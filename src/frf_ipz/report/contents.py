@@ -38,7 +38,7 @@ class RunContents:
 
     Parameters
     ----------
-    record : mapping
+    manifest : mapping
         What `run.json` says.
     recordings, fit, reduced, pairs, updated, prediction, state_space : results of stages
         As the stages gave them.
@@ -54,7 +54,7 @@ class RunContents:
         Stages whose result was made before the last change.
     """
 
-    record: Mapping[str, Any]
+    manifest: Mapping[str, Any]
     recordings: FrfEstimate | None = None
     fit: ModalFit | None = None
     reduced: ReducedModel | None = None
@@ -171,11 +171,11 @@ def read_contents(folder: RunFolder) -> RunContents:
     FileFormatError
         If a file is damaged.
     """
-    stages = folder.record.get("stages", {})
+    stages = folder.manifest.get("stages", {})
     has_model = "reduce" in stages
     model = folder.load("model") if "model" in stages else None
     return RunContents(
-        record=folder.record,
+        manifest=folder.manifest,
         recordings=folder.load("ingest"),
         fit=folder.load("fit"),
         reduced=folder.load("reduce") if has_model else None,

@@ -100,7 +100,7 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
     str
         HTML.
     """
-    name = str(run.record.get("name", "")) or "run"
+    name = str(run.manifest.get("name", "")) or "run"
     links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
     body = "\n".join(render_section(section) for section in sections)
     return "\n".join(
@@ -112,8 +112,8 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
             f'<div class="bar"><nav aria-label="Sections">{links}</nav>',
             f'<div class="tools">{page_tools(run)}</div></div>',
             f'<header class="head"><h1>{escape(name)}</h1></header><main>{body}</main>',
-            f"<footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to go "
-            "back; with the keyboard: Tab, then arrow keys, + and −, 0; Enter on a name of the legend.</footer>",
+            f"<footer>frf_ipz {escape(str(run.manifest.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to "
+            "go back; with the keyboard: Tab, then arrow keys, + and −, 0; Enter on a name of the legend.</footer>",
             f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
             f"<script>{get_plotlyjs()}</script><script>{_asset('page.js')}</script></body></html>",
         ]

@@ -22,7 +22,7 @@ from frf_ipz.runs.codec import load_result, save_result
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-RECORD = "run.json"
+MANIFEST = "run.json"
 STAGES = "stages"
 STAGING = ".partial-"
 
@@ -40,7 +40,7 @@ class RunFolder:
         The folder.
     staging : Path
         Where files are written until the command has succeeded.
-    record : dict
+    manifest : dict
         What `run.json` says.
     computed : list of str
         Stages that the command has computed.
@@ -50,7 +50,7 @@ class RunFolder:
 
     path: Path
     staging: Path
-    record: dict[str, Any]
+    manifest: dict[str, Any]
     computed: list[str] = field(default_factory=list)
     abandoned: set[str] = field(default_factory=set)
 
@@ -73,14 +73,14 @@ class RunFolder:
         object
             The result.
         """
-        kept = self.path / STAGES / f"{name}.npz"
-        if self._is_current(name, key) and kept.is_file():
+        stored = self.path / STAGES / f"{name}.npz"
+        if self._is_current(name, key) and stored.is_file():
             try:
-                result: Result = load_result(kept)
+                result: Result = load_result(stored)
             except FileFormatError:
                 pass
             else:
-                self.record["stages"][name].pop("stale", None)
+                self.manifest["stages"][name].pop("stale", None)
                 return result
         started = time.perf_counter()
         result = compute()
@@ -160,8 +160,8 @@ class RunFolder:
             The stages; those that never ran are passed over.
         """
         for name in names:
-            if name in self.record.get("stages", {}):
-                self.record["stages"][name]["stale"] = True
+            if name in self.manifest.get("stages", {}):
+                self.manifest["stages"][name]["stale"] = True
 
     def is_stale(self, name: str) -> bool:
         """Tell whether a stage's result was made from something else than what the folder holds now.
@@ -176,7 +176,7 @@ class RunFolder:
         bool
             True if an earlier stage has been run anew since.
         """
-        return bool(self.record.get("stages", {}).get(name, {}).get("stale", False))
+        return bool(self.manifest.get("stages", {}).get(name, {}).get("stale", False))
 
     def load(self, name: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
         """Give a stage's result as it stands in the folder, whatever it was made from.
@@ -196,12 +196,12 @@ class RunFolder:
         FileFormatError
             If the file is damaged.
         """
-        staged, kept = (folder / STAGES / f"{name}.npz" for folder in (self.staging, self.path))
-        place = staged if staged.is_file() else kept
+        staged, stored = (folder / STAGES / f"{name}.npz" for folder in (self.staging, self.path))
+        place = staged if staged.is_file() else stored
         return load_result(place) if place.is_file() else None
 
     def _is_current(self, name: str, key: str) -> bool:
-        stage = self.record.get("stages", {}).get(name, {})
+        stage = self.manifest.get("stages", {}).get(name, {})
         return bool(stage.get("key") == key and all(self._has(file) for file in stage.get("files", [])))
 
     def _has(self, file: str) -> bool:
@@ -215,7 +215,7 @@ class RunFolder:
     def _note(self, name: str, key: str, started: float, files: Iterable[str]) -> None:
         self.computed.append(name)
         seconds = round(time.perf_counter() - started, 3)
-        stages = self.record.setdefault("stages", {})
+        stages = self.manifest.setdefault("stages", {})
         self.abandoned.update(stages.get(name, {}).get("files", []))
         stages[name] = {"key": key, "seconds": seconds, "files": sorted(files)}
 
@@ -227,9 +227,9 @@ class RunFolder:
         InputError
             If a file cannot be moved.
         """
-        self.write_text(RECORD, json.dumps(self.record, indent=1, ensure_ascii=False) + "\n")
+        self.write_text(MANIFEST, json.dumps(self.manifest, indent=1, ensure_ascii=False) + "\n")
         files = sorted(file for file in self.staging.rglob("*") if file.is_file())
-        files.sort(key=lambda file: file.name == RECORD)
+        files.sort(key=lambda file: file.name == MANIFEST)
         for file in files:
             with file.open("rb") as stream:
                 os.fsync(stream.fileno())
@@ -240,7 +240,7 @@ class RunFolder:
                 file.replace(target)
             except OSError as error:
                 raise _cannot_write(target, error) from None
-        written = {file for stage in self.record.get("stages", {}).values() for file in stage.get("files", [])}
+        written = {file for stage in self.manifest.get("stages", {}).values() for file in stage.get("files", [])}
         for name in self.abandoned - written:  # a file that its stage no longer writes would tell of an older result
             (self.path / Path(name).name).unlink(missing_ok=True)
 
@@ -264,7 +264,7 @@ def open_run(path: Path) -> Iterator[RunFolder]:
     InputError
         If the folder cannot be made or written to.
     """
-    made = not path.exists()
+    is_new = not path.exists()
     staging = path / f"{STAGING}{os.getpid()}"
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -274,12 +274,12 @@ def open_run(path: Path) -> Iterator[RunFolder]:
         raise _cannot_write(path, error) from None
     succeeded = False
     try:
-        folder = RunFolder(path=path, staging=staging, record=read_record(path))
+        folder = RunFolder(path=path, staging=staging, manifest=read_manifest(path))
         yield folder
         folder.commit()
         succeeded = True
     finally:
-        shutil.rmtree(path if made and not succeeded else staging, ignore_errors=True)
+        shutil.rmtree(path if is_new and not succeeded else staging, ignore_errors=True)
 
 
 def read_run(path: Path) -> RunFolder:
@@ -300,14 +300,14 @@ def read_run(path: Path) -> RunFolder:
     InputError
         If no run has been made there.
     """
-    if not (path / RECORD).is_file():
+    if not (path / MANIFEST).is_file():
         raise InputError(
-            f"{path}: there is no run here (no {RECORD}); make one with 'frf-ipz run PIPELINE --out {path}'"
+            f"{path}: there is no run here (no {MANIFEST}); make one with 'frf-ipz run PIPELINE --out {path}'"
         )
-    return RunFolder(path=path, staging=path / STAGING, record=read_record(path))
+    return RunFolder(path=path, staging=path / STAGING, manifest=read_manifest(path))
 
 
-def read_record(path: Path) -> dict[str, Any]:
+def read_manifest(path: Path) -> dict[str, Any]:
     """Read `run.json`.
 
     Parameters
@@ -321,18 +321,18 @@ def read_record(path: Path) -> dict[str, Any]:
         What it says; empty where there is none or it is damaged, so that everything is computed anew.
     """
     try:
-        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
+        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return record if isinstance(record, dict) else {}
+    return manifest if isinstance(manifest, dict) else {}
 
 
 def _sweep(path: Path) -> None:
     """Remove what commands that were killed have left."""
-    for left in path.glob(f"{STAGING}*"):
-        owner = left.name.removeprefix(STAGING)
+    for leftover in path.glob(f"{STAGING}*"):
+        owner = leftover.name.removeprefix(STAGING)
         if not owner.isdigit() or int(owner) == os.getpid() or not _is_running(int(owner)):
-            shutil.rmtree(left, ignore_errors=True)
+            shutil.rmtree(leftover, ignore_errors=True)
 
 
 def _is_running(process: int) -> bool:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.runs.folder import RECORD, read_record
+from frf_ipz.runs.folder import MANIFEST, read_manifest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,14 +59,14 @@ def find_places(folder: Path) -> tuple[Place, ...]:
     folder = folder.resolve()
     runs, pipelines = [], []
     for here in _folders(folder):
-        runs += [_run_in(here)] if (here / RECORD).is_file() else []
+        runs += [_run_in(here)] if (here / MANIFEST).is_file() else []
         pipelines += [file for file in sorted(here.glob("*.toml")) if _is_pipeline(file)]
     ran = {run.pipeline for run in runs}
     new = [Place(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
     if not runs and not new:
         raise InputError(
-            f"{folder}: there is no run here (no {RECORD}) and no pipeline; write one with 'frf-ipz init {folder}', or "
-            f"make a run with 'frf-ipz run PIPELINE --out {folder}'"
+            f"{folder}: there is no run here (no {MANIFEST}) and no pipeline; write one with 'frf-ipz init {folder}', "
+            f"or make a run with 'frf-ipz run PIPELINE --out {folder}'"
         )
     return tuple(sorted((*runs, *new), key=lambda place: (str(place.pipeline), str(place.folder))))
 
@@ -75,14 +75,14 @@ def _folders(folder: Path) -> Iterator[Path]:
     """Give the folders that may hold a run or a pipeline, from the top; what lies inside a run is its own affair."""
     for path, below, _ in os.walk(folder):
         here = Path(path)
-        is_run, depth = (here / RECORD).is_file(), len(here.relative_to(folder).parts)
+        is_run, depth = (here / MANIFEST).is_file(), len(here.relative_to(folder).parts)
         kept = [] if is_run or depth >= DEEPEST else [name for name in sorted(below) if not name.startswith(".")]
         below[:] = kept
         yield here
 
 
 def _run_in(folder: Path) -> Place:
-    return Place(folder=folder, pipeline=Path(str(read_record(folder).get("pipeline", ""))))
+    return Place(folder=folder, pipeline=Path(str(read_manifest(folder).get("pipeline", ""))))
 
 
 def _is_pipeline(file: Path) -> bool:

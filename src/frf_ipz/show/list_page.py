@@ -49,11 +49,11 @@ def render_list(benches: Sequence[Workbench]) -> str:
 
 
 def _row(number: int, bench: Workbench, top: Path) -> str:
-    record = bench.record
-    name = str(record.get("name", "")) or _name_in_file(bench)
-    when = str(record.get("when", ""))[:16].replace("T", " ")
+    manifest = bench.manifest
+    name = str(manifest.get("name", "")) or _name_in_file(bench)
+    when = str(manifest.get("when", ""))[:16].replace("T", " ")
     computed = f"{when} UTC" if when else "at work" if bench.status.running else "not yet"
-    said = _verdict(bench.folder) if record else ""
+    said = _verdict(bench.folder) if manifest else ""
     cells = [_below(bench.pipeline, top), _below(bench.folder, top), computed, said]
     return (
         f'<tr><th scope="row"><a href="{number}/">{escape(name)}</a></th>'

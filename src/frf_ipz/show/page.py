@@ -70,7 +70,7 @@ def render_page(bench: Workbench, *, home: str = "") -> str:
     else:
         run, setup = read_setup(bench.pipeline, bench.read)
         sections = [setup if choices is None or not setup.blocks else _pickable(setup, run, choices)]
-    name = escape(str(run.record.get("name", "")) or "run")
+    name = escape(str(run.manifest.get("name", "")) or "run")
     links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
     body = "\n".join(render_section(section) for section in sections)
     back = f'<a href="{home}">All runs</a> ' if home else ""
@@ -81,7 +81,7 @@ def render_page(bench: Workbench, *, home: str = "") -> str:
             f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div>',
             f"{STATUS}</div>",
             f'<header class="head"><h1>{back}{name}</h1><div id="choices">{render_choices(bench)}</div></header>',
-            f"<main>{body}</main><footer>frf_ipz {escape(str(run.record.get('frf_ipz', '')))}, ",
+            f"<main>{body}</main><footer>frf_ipz {escape(str(run.manifest.get('frf_ipz', '')))}, ",
             f"{escape(str(bench.folder))}.{report}</footer>",
             f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
             SCRIPTS,

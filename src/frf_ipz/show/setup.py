@@ -27,7 +27,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     pipeline : Path
         The pipeline file.
     read : callable
-        Reads it and all that it names, as `pipeline.job.read_job` does.
+        Reads it and all that it names, as `pipeline.inputs.read_inputs` does.
 
     Returns
     -------
@@ -38,22 +38,24 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     """
     title, anchor = "Set-up", "overview"
     try:
-        job = read(pipeline)
+        inputs = read(pipeline)
     except InputError as error:
         notes = (str(error), "Correct the file, then load this page again.")
         lead = "This pipeline cannot be run as it stands."
-        empty = RunContents(record={"name": pipeline.stem})
+        empty = RunContents(manifest={"name": pipeline.stem})
         return empty, Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
-    run = RunContents(record={"name": job.pipeline.name}, geometry=None if job.model is None else job.model.geometry)
-    marks = Marks(sensors=job.test.output_dofs, records=job.test.input_dofs, points=job.points)
+    run = RunContents(
+        manifest={"name": inputs.pipeline.name}, geometry=None if inputs.model is None else inputs.model.geometry
+    )
+    marks = Marks(sensors=inputs.test.output_dofs, records=inputs.test.input_dofs, points=inputs.points)
     drawing = draw_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
-    blocks: list[Block] = [_what_was_read(job)] if drawing is None else [drawing, _what_was_read(job)]
+    blocks: list[Block] = [_what_was_read(inputs)] if drawing is None else [drawing, _what_was_read(inputs)]
     return run, Section(anchor=anchor, title=title, lead=lead, blocks=tuple(blocks))
 
 
-def _what_was_read(job: PipelineInputs) -> Table:
-    test, model = job.test, job.model
+def _what_was_read(inputs: PipelineInputs) -> Table:
+    test, model = inputs.test, inputs.model
     found = "none: the run ends with the fit"
     if model is not None:
         found = f"{model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}"
@@ -62,7 +64,7 @@ def _what_was_read(job: PipelineInputs) -> Table:
         ["model", found],
         ["sensors", _names(test.output_dofs)],
         ["blows", _names(test.input_dofs)],
-        ["points of interest", _names(job.points)],
+        ["points of interest", _names(inputs.points)],
     ]
     return Table(caption="What was read", columns=("", "in the files"), rows=rows)
 

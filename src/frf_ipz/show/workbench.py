@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.contents import RunContents, read_contents
-from frf_ipz.runs.folder import RECORD, RunFolder, read_record, read_run
+from frf_ipz.runs.folder import MANIFEST, RunFolder, read_manifest, read_run
 from frf_ipz.show.changes.registry import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
@@ -61,7 +61,7 @@ class Workbench:
     run : Run
         Runs a pipeline.
     read : callable
-        Reads a pipeline file and all that it names, as `pipeline.job.read_job` does.
+        Reads a pipeline file and all that it names, as `pipeline.inputs.read_inputs` does.
     """
 
     def __init__(self, place: Place, run: Run, read: Callable[[Path], PipelineInputs]) -> None:
@@ -84,14 +84,14 @@ class Workbench:
     def stamp(self) -> str:
         """Another one whenever the folder holds other results; empty before the first run."""
         try:
-            return str((self.folder / RECORD).stat().st_mtime_ns)
+            return str((self.folder / MANIFEST).stat().st_mtime_ns)
         except OSError:
             return ""
 
     @property
-    def record(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         """What ``run.json`` says; empty before the first run."""
-        return read_record(self.folder)
+        return read_manifest(self.folder)
 
     def contents(self) -> RunContents:
         """Read what the folder holds, once until it holds something else.

@@ -57,7 +57,7 @@ def test_a_missing_stage_is_named(name):
 def test_a_run_with_one_level_has_no_picture_of_levels(folder):
     one = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
     with pytest.raises(InputError, match="no place was struck at several levels"):
-        draw("levels", Folder(results={"levels": one}, record={}, stale=()))
+        draw("levels", Folder(results={"levels": one}, manifest={}, stale=()))
 
 
 def test_a_run_without_a_law_has_no_picture_of_one():
@@ -67,7 +67,7 @@ def test_a_run_without_a_law_has_no_picture_of_one():
 
 def test_the_force_of_a_law_is_drawn_where_no_blow_was_simulated(folder):
     force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), record=""))
-    figure = draw("law", Folder(results={"diagnose": force_alone}, record={}, stale=()))
+    figure = draw("law", Folder(results={"diagnose": force_alone}, manifest={}, stale=()))
     assert figure.axes[0].get_ylabel() == "Force of the law, N"
 
 

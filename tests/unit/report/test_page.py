@@ -140,7 +140,7 @@ def test_recordings_alone_make_a_page(tmp_path):
 
 
 def test_an_empty_run_makes_a_page(tmp_path):
-    text = page_of(Folder(results={}, record={}, stale=()), tmp_path)
+    text = page_of(Folder(results={}, manifest={}, stale=()), tmp_path)
     assert "holds no results yet" in text
 
 
@@ -152,7 +152,7 @@ def test_results_made_before_the_last_change_are_named(tmp_path):
 
 def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
     recordings = many_frfs(100, 50_000)
-    text = page_of(Folder(results={"ingest": recordings}, record={"stages": {}}, stale=()), tmp_path)
+    text = page_of(Folder(results={"ingest": recordings}, manifest={"stages": {}}, stale=()), tmp_path)
     assert len(text.encode()) < MOST_BYTES
     data = data_of(text)
     drawn = [trace for trace in data["pictures"]["frf"]["data"] if "yaxis" not in trace and "fill" not in trace]

@@ -9,7 +9,7 @@ import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.runs.digests import digest, digest_file
-from frf_ipz.runs.folder import STAGING, open_run, read_record, read_run
+from frf_ipz.runs.folder import STAGING, open_run, read_manifest, read_run
 
 
 def write_text(text):
@@ -125,9 +125,9 @@ def test_a_folder_without_a_run_is_said(tmp_path):
         read_run(tmp_path)
 
 
-def test_a_damaged_record_means_computing_anew(tmp_path):
+def test_a_damaged_manifest_means_computing_anew(tmp_path):
     (tmp_path / "run.json").write_text("{half")
-    assert read_record(tmp_path) == {}
+    assert read_manifest(tmp_path) == {}
 
 
 def test_files_of_a_page_are_written_again_when_they_are_gone(tmp_path):

@@ -32,8 +32,8 @@ def write_pipeline(folder, name="pipeline", test="test.toml"):
 
 def pretend_run(folder, pipeline):
     folder.mkdir(parents=True)
-    record = {"pipeline": str(pipeline), "name": folder.name, "when": "2026-01-01T10:00:00+00:00", "stages": {}}
-    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    manifest = {"pipeline": str(pipeline), "name": folder.name, "when": "2026-01-01T10:00:00+00:00", "stages": {}}
+    (folder / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_pipeline_without_a_run_has_its_results_beside_it(campaign):
     assert (place.pipeline, place.folder) == (campaign / "pipeline.toml", campaign / "results" / "pipeline")
 
 
-def test_a_pipeline_is_known_by_its_section_and_its_runs_by_their_record(campaign):
+def test_a_pipeline_is_known_by_its_section_and_its_runs_by_their_manifest(campaign):
     other = write_pipeline(campaign, "other")
     pretend_run(campaign / "results" / "a", other)
     pretend_run(campaign / "results" / "b", other)

@@ -22,41 +22,41 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.stage_runner import StageRunner
 
 
-def ingest(desk: StageRunner) -> FrfEstimate:
+def ingest(runner: StageRunner) -> FrfEstimate:
     """Turn recordings into FRFs.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
 
     Returns
     -------
     FrfEstimate
-        FRFs and the table of blows.
+        FRFs and the table of records.
     """
-    options = desk.job.pipeline.file.ingest
-    files = {name: value for name, value in desk.job.inputs.items() if name in map(str, desk.job.test.files)}
-    return desk.stage(
+    options = runner.inputs.pipeline.file.ingest
+    files = {name: value for name, value in runner.inputs.digests.items() if name in map(str, runner.inputs.test.files)}
+    return runner.stage(
         "ingest",
-        {"options": asdict(options), "test": repr(desk.job.test), "files": files},
-        lambda progress: estimate_frfs(desk.job.test, options, progress=progress),
+        {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
+        lambda progress: estimate_frfs(runner.inputs.test, options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
             "records.parquet": partial(
-                write_table, tables.frame_table(result.records, {}, meaning="quality of a blow")
+                write_table, tables.frame_table(result.records, {}, meaning="quality of a record")
             ),
         },
     )
 
 
-def fit(desk: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
+def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
     """Turn FRFs into poles, residues and zeros.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     frfs : FrfSet
         The measured FRFs.
     corrected_by : Diagnosis, optional
@@ -67,10 +67,10 @@ def fit(desk: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = Non
     ModalFit
         The fitted model.
     """
-    options = desk.job.pipeline.file.fit
-    return desk.stage(
+    options = runner.inputs.pipeline.file.fit
+    return runner.stage(
         "fit",
-        {"options": asdict(options), "after": desk.after("ingest"), "corrected": corrections(corrected_by)},
+        {"options": asdict(options), "after": runner.after("ingest"), "corrected": corrections(corrected_by)},
         lambda progress: fit_modes(frfs, options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 
-def diagnose(desk: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
+def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
     """Say what the model left out.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     model : StructuralModel
         The FE model.
     frfs : FrfSet
@@ -44,30 +44,30 @@ def diagnose(desk: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagnos
     Diagnosis
         The verdict and what it rests on.
     """
-    job = desk.job
-    options = job.pipeline.file.diagnose or DiagnoseOptions()
-    ingest_options = job.pipeline.file.ingest
-    band = {"fit": [job.pipeline.file.fit.band_hz, job.pipeline.file.fit.exclude_hz]}
+    inputs = runner.inputs
+    options = inputs.pipeline.file.diagnose or DiagnoseOptions()
+    ingest_options = inputs.pipeline.file.ingest
+    band = {"fit": [inputs.pipeline.file.fit.band_hz, inputs.pipeline.file.fit.exclude_hz]}
 
     def compute(progress: Progress) -> Diagnosis:
-        seen = observe(job.test, ingest_options, frfs, fit=job.pipeline.file.fit)
-        return find_mismatch(model, seen, options, folder=job.pipeline.path.parent, progress=progress)
+        observations = observe(inputs.test, ingest_options, frfs, fit=inputs.pipeline.file.fit)
+        return find_mismatch(model, observations, options, folder=inputs.pipeline.path.parent, progress=progress)
 
-    return desk.stage(
+    return runner.stage(
         "diagnose",
-        {"options": asdict(options), "model": job.model_key, "after": desk.after("ingest"), **band},
+        {"options": asdict(options), "model": inputs.model_key, "after": runner.after("ingest"), **band},
         compute,
         lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
     )
 
 
-def levels(desk: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
-    """Compare weak blows with strong ones.
+def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
+    """Compare weak records with strong ones.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     fit : ModalFit
         The fitted model.
     frfs : FrfSet
@@ -78,23 +78,23 @@ def levels(desk: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     LevelDependence
         Empty where there is one level only.
     """
-    file = desk.job.pipeline.file
-    return desk.stage(
+    file = runner.inputs.pipeline.file
+    return runner.stage(
         "levels",
-        {"after": desk.after("ingest", "fit")},
-        lambda _: compare_levels(observe(desk.job.test, file.ingest, frfs, fit=file.fit), fit),
+        {"after": runner.after("ingest", "fit")},
+        lambda _: compare_levels(observe(runner.inputs.test, file.ingest, frfs, fit=file.fit), fit),
     )
 
 
 def apply_diagnosis(
-    desk: StageRunner, model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis
+    runner: StageRunner, model: StructuralModel, frfs: FrfSet, diagnosis: Diagnosis
 ) -> tuple[StructuralModel, FrfSet]:
     """Put what was found missing into the model, and take what was wrong in the measuring chain off the FRFs.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     model : StructuralModel
         The FE model.
     frfs : FrfSet
@@ -109,24 +109,24 @@ def apply_diagnosis(
     frfs : FrfSet
         The corrected FRFs.
     """
-    effects = effects_of(desk)
+    effects = effects_of(runner)
     return apply_to_model(model, diagnosis, effects), apply_to_frfs(frfs, diagnosis, effects)
 
 
-def effects_of(desk: StageRunner) -> dict[str, Effect]:
+def effects_of(runner: StageRunner) -> dict[str, Effect]:
     """Give the effects that were looked for, users' own among them.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
 
     Returns
     -------
     dict of str to Effect
         By name.
     """
-    pipeline = desk.job.pipeline
+    pipeline = runner.inputs.pipeline
     return chosen_effects(pipeline.file.diagnose or DiagnoseOptions(), pipeline.path.parent)
 
 

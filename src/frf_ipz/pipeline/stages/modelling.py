@@ -35,31 +35,31 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
-def outline(desk: StageRunner, model: StructuralModel, *, corrected_by: Diagnosis | None = None) -> None:
+def outline(runner: StageRunner, model: StructuralModel, *, corrected_by: Diagnosis | None = None) -> None:
     """Keep where the nodes are, and what joins them: pictures of the structure need no more of a model.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     model : StructuralModel
         The FE model.
     corrected_by : Diagnosis, optional
         What the model was corrected by, if it was.
     """
-    key = {"model": desk.job.model_key, "corrected": corrections(corrected_by)}
-    desk.stage("model", key, lambda _: model.geometry)
+    key = {"model": runner.inputs.model_key, "corrected": corrections(corrected_by)}
+    runner.stage("model", key, lambda _: model.geometry)
 
 
 def reduce(
-    desk: StageRunner, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+    runner: StageRunner, model: StructuralModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
 ) -> ReducedModel:
     """Turn the FE model into a reduced model in physical DOFs.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     model : StructuralModel
         The FE model.
     modal_fit : ModalFit
@@ -72,35 +72,35 @@ def reduce(
     ReducedModel
         The reduced model.
     """
-    job = desk.job
-    options = job.pipeline.file.reduce
-    return desk.stage(
+    inputs = runner.inputs
+    options = inputs.pipeline.file.reduce
+    return runner.stage(
         "reduce",
         {
             "options": asdict(options),
-            "model": job.model_key,
+            "model": inputs.model_key,
             "corrected": corrections(corrected_by),
-            "after": desk.after("fit"),
-            "points": repr(job.points),
+            "after": runner.after("fit"),
+            "points": repr(inputs.points),
         },
         lambda _: reduce_model(
             model,
             options,
             actuators=_once(label.input_dof for label in modal_fit.labels),
             sensors=_once(label.output_dof for label in modal_fit.labels),
-            points=job.points,
+            points=inputs.points,
             band_hz=modal_fit.band_hz,
         ),
     )
 
 
-def pair(desk: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
+def pair(runner: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
     """Set measured poles and zeros against those of the model.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     modal_fit : ModalFit
         The fitted model.
     reduced : ReducedModel
@@ -111,9 +111,9 @@ def pair(desk: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs
     Pairs
         Who belongs to whom, and why.
     """
-    return desk.stage(
+    return runner.stage(
         "pair",
-        {"after": desk.after("fit", "reduce")},
+        {"after": runner.after("fit", "reduce")},
         lambda _: pair_roots(modal_fit, reduced),
         lambda result: {
             "pairs.parquet": partial(
@@ -124,7 +124,7 @@ def pair(desk: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs
 
 
 def update(
-    desk: StageRunner,
+    runner: StageRunner,
     model: StructuralModel,
     reduced: ReducedModel,
     modal_fit: ModalFit,
@@ -136,8 +136,8 @@ def update(
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     model : StructuralModel
         The FE model, whose parts may be softer or stiffer than they should be.
     reduced : ReducedModel
@@ -159,19 +159,19 @@ def update(
     InputError
         If the parameters are to be those of a diagnosis that is not applied.
     """
-    options, stated = desk.job.pipeline.file.update, desk.job.pipeline.file.diagnose
+    options, stated = runner.inputs.pipeline.file.update, runner.inputs.pipeline.file.diagnose
     tolerance = stated.position_tolerance_m_per_m if stated and corrected_by else 0.0
-    sensors = unweighed_sensors(desk.job.test, modal_fit.labels)
-    nominal = desk.job.model
+    sensors = unweighed_sensors(runner.inputs.test, modal_fit.labels)
+    nominal = runner.inputs.model
     if options.parameters == "diagnosis" and corrected_by is None:
         raise InputError(
-            f"{desk.job.pipeline.path}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
+            f"{runner.inputs.pipeline.path}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
             "[diagnose] apply = true, or leave parameters out"
         )
 
     def compute(progress: Progress) -> UpdatedModel:
         if options.parameters == "diagnosis" and corrected_by and nominal is not None and model is not nominal:
-            basis = diagnosed_basis(nominal, corrected_by, reduced, effects_of(desk))
+            basis = diagnosed_basis(nominal, corrected_by, reduced, effects_of(runner))
         else:
             basis = structural_basis(model, reduced, mass=options.mass, sensors=sensors)
         return update_model(
@@ -184,9 +184,9 @@ def update(
             progress=progress,
         )
 
-    return desk.stage(
+    return runner.stage(
         "update",
-        {"options": asdict(options), "sensors": repr(sensors), "tolerance": tolerance, "after": desk.after("pair")},
+        {"options": asdict(options), "sensors": repr(sensors), "tolerance": tolerance, "after": runner.after("pair")},
         compute,
         lambda result: {
             "pairs.parquet": partial(write_table, tables.pair_table(pairs, modal_fit.labels, result.after)),

@@ -34,13 +34,13 @@ if TYPE_CHECKING:
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
 
 
-def predict(desk: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
+def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frfs: FrfSet) -> Prediction:
     """Predict FRFs at the points of interest, on the measured lines of the band.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     updated : UpdatedModel
         The updated model.
     modal_fit : ModalFit
@@ -53,27 +53,29 @@ def predict(desk: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frfs:
     Prediction
         With bands.
     """
-    job = desk.job
-    if job.reference is not None:
-        desk.stage("reference", {"file": job.inputs[str(job.pipeline.reference_path)]}, lambda _: job.reference)
+    inputs = runner.inputs
+    if inputs.reference is not None:
+        runner.stage(
+            "reference", {"file": inputs.digests[str(inputs.pipeline.reference_path)]}, lambda _: inputs.reference
+        )
     lines = frfs.frequency_hz[frfs.in_band(modal_fit.band_hz)]
-    return desk.stage(
+    return runner.stage(
         "predict",
-        {"points": repr(job.points), "after": desk.after("update")},
-        lambda _: predict_frfs(updated, job.points, modal_fit.labels, lines),
+        {"points": repr(inputs.points), "after": runner.after("update")},
+        lambda _: predict_frfs(updated, inputs.points, modal_fit.labels, lines),
         lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
     )
 
 
 def export(
-    desk: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
+    runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, *, corrected_by: Diagnosis | None = None
 ) -> StateSpaceModel:
     """Turn the updated model into a state space; and, for robust design, into members of its posterior.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     updated : UpdatedModel
         The updated model.
     modal_fit : ModalFit
@@ -86,31 +88,33 @@ def export(
     StateSpaceModel
         With named inputs and outputs.
     """
-    job = desk.job
-    options = job.pipeline.file.export
+    inputs = runner.inputs
+    options = inputs.pipeline.file.export
     delays = known_delays(modal_fit, corrected_by)
-    return desk.stage(
+    return runner.stage(
         "export",
-        {"options": asdict(options), "points": repr(job.points), "after": desk.after("update"), "delays": delays},
-        lambda _: to_state_space(updated, modal_fit.labels, job.points, options, delays_s=delays),
+        {"options": asdict(options), "points": repr(inputs.points), "after": runner.after("update"), "delays": delays},
+        lambda _: to_state_space(updated, modal_fit.labels, inputs.points, options, delays_s=delays),
         lambda model: {
             **{name: partial(save_state_space, model) for name in ("statespace.json", "statespace.mat")},
-            **(_design_files(updated, modal_fit, job.points, options, delays) if options.ensemble else {}),
+            **(_design_files(updated, modal_fit, inputs.points, options, delays) if options.ensemble else {}),
         },
     )
 
 
-def report(desk: StageRunner) -> None:
+def report(runner: StageRunner) -> None:
     """Put everything that the folder holds on one page.
 
     Parameters
     ----------
-    desk : StageRunner
-        The work.
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
     """
-    key = desk.sign("report", {"after": sorted(desk.keys.values())})
-    tell = desk.listener("report")
-    desk.folder.page("report", key, {"report.html": lambda path: write_report(desk.folder, path, progress=tell)})
+    key = runner.make_key("report", {"after": sorted(runner.keys.values())})
+    progress = runner.stage_progress("report")
+    runner.folder.page(
+        "report", key, {"report.html": lambda path: write_report(runner.folder, path, progress=progress)}
+    )
 
 
 def _design_files(

@@ -29,10 +29,14 @@ def build(run: RunContents) -> Section:
     Section
         The section.
     """
-    record = run.record
-    versions = {"frf_ipz": record.get("frf_ipz", ""), "Python": record.get("python", ""), **record.get("packages", {})}
-    lead = f"Pipeline {record.get('pipeline', '')}" + (f", run on {record['when']}." if "when" in record else ".")
-    options = json.dumps(record.get("configuration", {}), indent=1, ensure_ascii=False)
+    manifest = run.manifest
+    versions = {
+        "frf_ipz": manifest.get("frf_ipz", ""),
+        "Python": manifest.get("python", ""),
+        **manifest.get("packages", {}),
+    }
+    lead = f"Pipeline {manifest.get('pipeline', '')}" + (f", run on {manifest['when']}." if "when" in manifest else ".")
+    options = json.dumps(manifest.get("configuration", {}), indent=1, ensure_ascii=False)
     blocks = (
         Table(
             caption="Versions",
@@ -45,7 +49,7 @@ def build(run: RunContents) -> Section:
         Table(
             caption="Input files",
             columns=("file", "SHA-256"),
-            rows=[[name, digest[:SHOWN_DIGITS] + "…"] for name, digest in record.get("inputs", {}).items()],
+            rows=[[name, digest[:SHOWN_DIGITS] + "…"] for name, digest in manifest.get("inputs", {}).items()],
             file="run.json",
         ),
         Markup(html=f"<details><summary>All options, as resolved</summary><pre>{escape(options)}</pre></details>"),
@@ -61,5 +65,5 @@ def _stages(run: RunContents) -> list[list[str]]:
             "stale" if name in run.stale else "current",
             str(entry.get("key", ""))[:SHOWN_DIGITS] + "…",
         ]
-        for name, entry in run.record.get("stages", {}).items()
+        for name, entry in run.manifest.get("stages", {}).items()
     ]
