@@ -1,1 +1,1 @@
-"""Recordings without what is not the answer of the machine to the force in them."""
+"""Records without what is not the structure's response to the measured force."""

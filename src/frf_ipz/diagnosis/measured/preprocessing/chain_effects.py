@@ -1,4 +1,4 @@
-"""Recordings as a faultless measuring chain would have made them."""
+"""Records as a faultless measuring chain would have made them."""
 
 from __future__ import annotations
 
@@ -15,51 +15,53 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 
-LEAST_SHOWN = 0.05  # of what a channel shows at other frequencies: what it shows less of is left as it is
+MIN_GAIN = 0.05  # of a channel's largest gain: where it has less, the record stays as it is
 
 
 def undo_chain_effects(observations: Observations, change: Change) -> Observations:
-    """Take out of recordings what a change of the measuring chain has done to them.
+    """Undo the effect of a change of the measuring chain on records.
 
     Parameters
     ----------
     observations : Observations
-        Blows or records that start at rest.
+        Records that start at rest.
     change : Change
         Its channels and moved sensors count, nothing else.
 
     Returns
     -------
     Observations
-        The same where the measuring chain is as it should be.
+        As the nominal measuring chain would have recorded them.
     """
     if not (change.channels or change.moved):
         return observations
-    return replace(observations, records=tuple(_restored(record, change) for record in observations.records))
+    return replace(observations, records=tuple(_undo_in_record(record, change) for record in observations.records))
 
 
-def _restored(record: ObservedRecord, change: Change) -> ObservedRecord:
+def _undo_in_record(record: ObservedRecord, change: Change) -> ObservedRecord:
     channels = [sensor.channel for sensor in record.sensors]
-    shown = [_unfiltered(record, values, name, change) for values, name in zip(record.responses, channels, strict=True)]
+    responses = [
+        _filter_inversely(record, values, name, change) for values, name in zip(record.responses, channels, strict=True)
+    ]
     return replace(
         record,
-        force=_unfiltered(record, record.force, record.input_channel, change),
-        responses=np.stack(shown),
-        sensors=tuple(_where_it_is(sensor, change) for sensor in record.sensors),
+        force=_filter_inversely(record, record.force, record.input_channel, change),
+        responses=np.stack(responses),
+        sensors=tuple(_sensor_at_true_node(sensor, change) for sensor in record.sensors),
     )
 
 
-def _unfiltered(record: ObservedRecord, values: FloatArray, channel: str, change: Change) -> FloatArray:
+def _filter_inversely(record: ObservedRecord, values: FloatArray, channel: str, change: Change) -> FloatArray:
     if channel not in change.channels:
         return values
-    padded = next_fast_len(2 * len(values), real=True)  # zeros beyond the end: nothing comes round to the start
+    padded = next_fast_len(2 * len(values), real=True)  # zeros after the end: no circular convolution
     s = np.asarray(2j * np.pi * np.fft.rfftfreq(padded, record.step_s), np.complex128)
-    shown = change.channels[channel](s)
-    faint = np.abs(shown) < LEAST_SHOWN * np.abs(shown).max()
-    spectrum = np.fft.rfft(values, padded) / np.where(faint, 1.0, shown)
+    gain = change.channels[channel](s)
+    faint = np.abs(gain) < MIN_GAIN * np.abs(gain).max()
+    spectrum = np.fft.rfft(values, padded) / np.where(faint, 1.0, gain)
     return np.asarray(np.fft.irfft(spectrum, padded)[: len(values)])
 
 
-def _where_it_is(sensor: Sensor, change: Change) -> Sensor:
+def _sensor_at_true_node(sensor: Sensor, change: Change) -> Sensor:
     node = change.moved.get(sensor.channel)
     return sensor if node is None else replace(sensor, dof=Dof(node, sensor.dof.direction, sensor.dof.sign))

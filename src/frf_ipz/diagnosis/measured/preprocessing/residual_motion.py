@@ -1,12 +1,12 @@
-"""What recordings of blows hold besides the response to the blow: constants of channels, and motion left from before.
+"""Residual motion in records: dc offsets of channels, and what earlier impacts have left of the structure's motion.
 
-Near the axis a constant c looks like c / s, which is largest at the bottom of the band, and the few samples before a
-blow do not tell it. What a blow before in the same recording has left decays at the poles of the structure, each mode
-with as much as the forces before have left it times one residue; what moves far below the band is as good as another
-constant. Where a recording begins within the ringing of the converter's filter before a blow, its first samples stand
-for what it lacks in the band. None of it grows with the blow, as all that a linear structure does in answer to it. On
-each line the FRF is left free, and what no FRF explains gives it, for all blows at once. What the blows do not tell,
-since they are of one level, stays in the recordings; how uncertain the constants are goes on with the blows.
+Near the axis an offset c looks like c / s, which is largest at the bottom of the band, and the few samples before an
+impact do not determine it. What an earlier impact in the same recording has left decays at the poles of the structure,
+each mode with as much as the earlier forces have left it times one residue; motion far below the band is as good as
+another offset. Where a recording begins within the ringing of the converter's filter before an impact, its first
+samples stand for the missing ones. None of it is proportional to the force, as every linear response to it is. On each
+line the FRF is free, and what no FRF explains determines the residual motion of all records at once. What records do
+not determine, since they are of one level, stays in them; the remaining uncertainty of the offsets goes on with them.
 """
 
 from __future__ import annotations
@@ -28,25 +28,28 @@ from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lin
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
-DECAYS = 8.0  # sigma times the shortest record
-LARGEST = 0.05  # of a channel's highest value: a larger constant has been taken off already
-WANDERS = 3.0  # times the noise: how far a constant wanders from blow to blow
-LEFT = 3.0  # times the motion just before a blow: what each mode may have of it
-ASTRAY = 0.01  # of what a mode has left: blows do not fall on one place, and poles are not known
-MISSED = 0.003  # of a response: what sampling and the places of blows leave
-AROUND = 11  # lines over which what no FRF explains is averaged
-ROUNDS = 3  # of weights: at first leftovers count as noise
-AKIN = 0.1  # of a sample's variance: noise that the samples before a blow have in common
-LEAST_RECORDS = 2  # of a shaker at a place: one alone tells no constant
-SHAKEN = 0.02  # of a shaker's largest force: with more it has started
-INSTEAD = 3  # first samples that stand for the ringing that a recording lacks
-LEAST_BEFORE = 4  # samples before a blow that tell what is left
-FAINTEST = 1e-7  # of a channel's highest value: noise below what 24 bits resolve, where blows at a place show nothing
+WINDOW_DECAYS = 8.0  # sigma times the shortest record
+LARGEST_OFFSET = 0.05  # of a channel's highest value: a larger offset has been removed already
+OFFSET_DRIFT = 3.0  # times the noise: how far an offset drifts from record to record
+MODAL_MOTION = 3.0  # times the motion just before an impact: standard deviation of each mode's residual motion
+STATE_ERROR = 0.01  # of a mode's residual motion: impacts do not hit one exact point, and poles are not exact
+MODEL_ERROR = 0.003  # of a response: misfit by sampling and by the positions of impacts
+SMOOTHED_LINES = 11  # over which the energy that no FRF explains is averaged
+ROUNDS = 3  # of weights: in the first one residual motion counts as noise
+CORRELATED_NOISE = 0.1  # of a sample's variance: noise that the samples before an impact have in common
+MIN_RECORDS = 2  # of a shaker in a group: a single one determines no offset
+STARTED = 0.02  # of a shaker's largest force: with more it has started
+FIRST_SAMPLES = 3  # that stand for the missing ringing
+MIN_SAMPLES_BEFORE = 4  # an impact, that show the residual motion
+LEAST_NOISE = 1e-7  # of a channel's highest value: below the resolution of 24 bits, for channels that show nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """Blows at one place, and what may be in each: a constant, first samples and, after another, decaying modes."""
+    """Records of a group, and the terms of the residual motion in each.
+
+    The terms are an offset, first samples, and, where another impact came before, cosines and sines of decaying modes.
+    """
 
     records: tuple[ObservedRecord, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
@@ -54,96 +57,102 @@ class _Group:
     poles: ComplexArray
     pole_stds: FloatArray  # rad/s
     residues: FloatArray  # (n_poles, n_sensors), at most
-    lacking: FloatArray  # (n_blows, n_sensors), of the ringing before a blow: standard deviation of a sample instead
+    missing_samples: FloatArray  # (n_records, n_sensors), standard deviation of a first sample for the missing ones
 
     @property
     def n_samples(self) -> int:
         """Samples that are transformed."""
         return min(record.n_samples for record in self.records)
 
-    def count(self, record: ObservedRecord) -> int:
-        """Count what may be left in a blow: a constant, first samples; after another one also cosines and sines."""
-        return 1 + INSTEAD + (2 * len(self.poles) if record.follows else 0)
+    def n_terms(self, record: ObservedRecord) -> int:
+        """Count the terms of the residual motion in a record."""
+        return 1 + FIRST_SAMPLES + (2 * len(self.poles) if record.follows else 0)
 
-    def shapes(self, record: ObservedRecord) -> ComplexArray:
-        """Transform unit leftovers, (n_lines / FINER, count)."""
+    def unit_spectra(self, record: ObservedRecord) -> ComplexArray:
+        """Transform terms of amplitude 1, (n_lines / FINER, n_terms)."""
         step, s, n = record.step_s, self.lines.s[::FINER, None], self.n_samples
 
         def transformed(rates: ComplexArray) -> ComplexArray:
             turn = np.exp((rates - s) * step)
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
-        first = np.hstack([transformed(np.zeros(1, complex)), step * np.exp(-s * step * np.arange(INSTEAD))])
+        first = np.hstack([transformed(np.zeros(1, complex)), step * np.exp(-s * step * np.arange(FIRST_SAMPLES))])
         if not record.follows:
             return first
         up, down = transformed(self.poles), transformed(self.poles.conj())
         return np.hstack([first, (up + down) / 2, (up - down) / 2j])
 
     def unit_signals(self, record: ObservedRecord) -> FloatArray:
-        """Give unit leftovers in time, (count, n_samples); first samples stay: FRFs allow for what they lack."""
-        first = np.vstack([np.ones(record.n_samples), np.zeros((INSTEAD, record.n_samples))])
+        """Terms of amplitude 1 in time, (n_terms, n_samples); 0 for first samples, which FRFs allow for."""
+        first = np.vstack([np.ones(record.n_samples), np.zeros((FIRST_SAMPLES, record.n_samples))])
         if not record.follows:
             return first
         turning = np.exp(np.outer(self.poles, record.step_s * np.arange(record.n_samples)))
         return np.concatenate([first, turning.real, turning.imag])
 
-    def kicks(self, record: ObservedRecord) -> tuple[ComplexArray, FloatArray] | None:
-        """Give what unit residues leave at the first sample, (n_poles,), and its error; None if a force is unknown."""
+    def initial_state(self, record: ObservedRecord) -> tuple[ComplexArray, FloatArray] | None:
+        """Compute the state of each mode at the first sample, for residues of 1, by the earlier forces.
+
+        Returns
+        -------
+        tuple of (n_poles,) complex array and (n_poles,) array, or None
+            States and their standard deviations; None if nothing came before, or one of the forces is unknown.
+        """
         if not record.follows:
             return None
-        before = [
-            (one, pulse.record.force)
-            for one, pulse in zip(self.records, self.pulses, strict=True)
-            if one.recording == record.recording and one.number < record.number
+        earlier = [
+            (previous, pulse.record.force)
+            for previous, pulse in zip(self.records, self.pulses, strict=True)
+            if previous.recording == record.recording and previous.number < record.number
         ]
-        if len(before) != record.number - 1:
+        if len(earlier) != record.number - 1:
             return None
-        left, by_pole = np.zeros((2, len(self.poles)), complex)
-        for one, force in before:
+        state, state_by_pole = np.zeros((2, len(self.poles)), complex)
+        for previous, force in earlier:
             touched = np.flatnonzero(force)
-            later = record.start_s - one.start_s - record.step_s * touched
+            later = record.start_s - previous.start_s - record.step_s * touched
             decaying = record.step_s * np.exp(np.outer(self.poles, later))
-            left += decaying @ force[touched]
-            by_pole += decaying @ (later * force[touched])
-        return left, np.hypot(ASTRAY * np.abs(left), self.pole_stds * np.abs(by_pole))
+            state += decaying @ force[touched]
+            state_by_pole += decaying @ (later * force[touched])
+        return state, np.hypot(STATE_ERROR * np.abs(state), self.pole_stds * np.abs(state_by_pole))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Told:
-    """What blows at one place tell of the leftovers in one channel, blow after blow, each with its constant first."""
+class _NormalEquations:
+    """Normal equations of the amplitudes in one channel of a group, record after record, each with its offset first."""
 
-    counts: tuple[int, ...]
+    n_terms: tuple[int, ...]
     noise: float
     curvature: FloatArray
     slope: FloatArray
 
     @property
-    def constants(self) -> IntArray:
-        """Where the constants stand."""
-        return np.cumsum((0, *self.counts[:-1]))
+    def offset_rows(self) -> IntArray:
+        """Rows of the offsets."""
+        return np.cumsum((0, *self.n_terms[:-1]))
 
 
 def remove_residual_motion(observations: Observations) -> Observations:
-    """Take off what no linear system answers to a blow with: constants, and motion left from a blow before.
+    """Subtract what is no linear response to the force: dc offsets, and motion by an earlier impact.
 
     Parameters
     ----------
     observations : Observations
-        Blows, or records from rest; others are given back as they are.
+        Records from rest; others are returned unchanged.
 
     Returns
     -------
     Observations
-        The same without leftovers, and with what constants are still uncertain by.
+        The same without residual motion, and with the uncertainty of their offsets.
     """
     if not observations.are_from_rest:
         return observations
-    places = group_records(observations)
-    if observations.kind != "hammer" and min(len(records) for records in places) < LEAST_RECORDS:
+    record_groups = group_records(observations)
+    if observations.kind != "hammer" and min(len(records) for records in record_groups) < MIN_RECORDS:
         return observations
-    decay = DECAYS / min(record.duration_s for record in observations.records)
-    groups = [_group(records, observations, decay) for records in places]
-    found: dict[tuple[str, str], tuple[FloatArray, float]] = {}
+    decay = WINDOW_DECAYS / min(record.duration_s for record in observations.records)
+    groups = [_prepare_group(records, observations, decay) for records in record_groups]
+    residual: dict[tuple[str, str], tuple[FloatArray, float]] = {}
     for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.records[0].sensors):
         rows = [
             (group, row)
@@ -151,176 +160,194 @@ def remove_residual_motion(observations: Observations) -> Observations:
             for row, sensor in enumerate(group.records[0].sensors)
             if sensor.channel == channel
         ]
-        found |= {(name, channel): left for name, left in _leftovers(rows).items()}
-    return replace(observations, records=tuple(_without(record, found) for record in observations.records))
+        residual |= {(name, channel): signal for name, signal in _estimate_channel(rows).items()}
+    return replace(observations, records=tuple(_subtract(record, residual) for record in observations.records))
 
 
-def _group(records: tuple[ObservedRecord, ...], observations: Observations, decay: float) -> _Group:
+def _prepare_group(records: tuple[ObservedRecord, ...], observations: Observations, decay: float) -> _Group:
     is_hammer = observations.kind == "hammer"
-    pulses = tuple(isolate_pulse(record) if is_hammer else _whole(record) for record in records)
+    pulses = tuple(isolate_pulse(record) if is_hammer else _gate_from_start(record) for record in records)
     transformed = tuple(pulse.record for pulse in pulses)
     lines = transform_group(transformed, observations.band_hz, decay)
-    found: list[LocalPole] = []
+    poles: list[LocalPole] = []
     residues = np.zeros((0, len(records[0].sensors)))
     if any(record.follows for record in records):
         from_rest = tuple(record for record in transformed if not record.follows)
-        told = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
-        found = _poles(told, decay)
-        nearest = [int(np.argmin(np.abs(told.s - one.pole))) for one in found]
-        away = np.array([np.abs(told.s[line] - one.pole) for line, one in zip(nearest, found, strict=True)])
-        residues = np.abs(told.values[nearest]) * away[:, None]
+        lines_from_rest = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
+        poles = _find_poles(lines_from_rest, decay)
+        peaks = [int(np.argmin(np.abs(lines_from_rest.s - pole.pole))) for pole in poles]
+        distance = np.array(
+            [np.abs(lines_from_rest.s[line] - pole.pole) for line, pole in zip(peaks, poles, strict=True)]
+        )
+        residues = np.abs(lines_from_rest.values[peaks]) * distance[:, None]
     return _Group(
         records=records,
         pulses=pulses,
         lines=lines,
-        poles=np.array([one.pole for one in found], complex),
-        pole_stds=np.array([one.std_rad_s for one in found]),
+        poles=np.array([pole.pole for pole in poles], complex),
+        pole_stds=np.array([pole.std_rad_s for pole in poles]),
         residues=residues,
-        lacking=np.array([missing_ringing(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
+        missing_samples=np.array([missing_ringing(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
         * np.sqrt(MISSING_SAMPLES),
     )
 
 
-def _whole(record: ObservedRecord) -> Pulse:
-    """Give a shaker's record, which begins where its force does: the structure moves from there on."""
+def _gate_from_start(record: ObservedRecord) -> Pulse:
+    """Gate a shaker's record from where its force starts: the structure moves from there on."""
     size = np.abs(record.force)
     return Pulse(
-        record=record, start=max(int(np.argmax(size > SHAKEN * size.max())) - RINGING, 0), stop=record.n_samples
+        record=record, start=max(int(np.argmax(size > STARTED * size.max())) - RINGING, 0), stop=record.n_samples
     )
 
 
-def _without(record: ObservedRecord, found: dict[tuple[str, str], tuple[FloatArray, float]]) -> ObservedRecord:
-    left, stds = zip(*(found[record.name, sensor.channel] for sensor in record.sensors), strict=True)
-    return replace(record, responses=record.responses - np.array(left), constant_std=np.array(stds))
+def _subtract(record: ObservedRecord, residual: dict[tuple[str, str], tuple[FloatArray, float]]) -> ObservedRecord:
+    signals, stds = zip(*(residual[record.name, sensor.channel] for sensor in record.sensors), strict=True)
+    return replace(record, responses=record.responses - np.array(signals), constant_std=np.array(stds))
 
 
-def _poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
+def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
     """Poles of the structure, as far as they stand out."""
     size = np.abs(lines.values) ** 2
     level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
     peaks = find_resonances(2 * np.pi * lines.frequency_hz, level, decay, at_ends=True)
-    found = []
-    for omega, own in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
-        start = complex(-own, omega)
-        near = lines_around_pole(lines.s, start)
-        sensor = int(np.argmax(size[near].sum(0) / size.sum(0)))
-        pole = fit_local_pole(lines.s[near], lines.values[near, sensor], start)
-        found += [] if pole is None else [pole]
-    return found
+    poles = []
+    for omega, decay_rate in zip(peaks.omega_rad_s, peaks.decay_1_s, strict=True):
+        start = complex(-decay_rate, omega)
+        nearest = lines_around_pole(lines.s, start)
+        sensor = int(np.argmax(size[nearest].sum(0) / size.sum(0)))
+        pole = fit_local_pole(lines.s[nearest], lines.values[nearest, sensor], start)
+        poles += [] if pole is None else [pole]
+    return poles
 
 
-def _leftovers(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
-    """Give the leftovers of all blows in one channel, as signals, and the standard deviations of the constants."""
+def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
+    """Give the residual motion of all records in one channel, as signals, and standard deviations of the offsets."""
     largest = max(float(np.abs(record.responses[row]).max()) for group, row in rows for record in group.records)
-    faintest = FAINTEST * (largest or 1.0)  # of a channel that shows nothing at all, nothing is taken off
-    sizes = [[np.zeros(group.count(record)) for record in group.records] for group, _ in rows]
-    priors = [_prior(group, row) for group, row in rows]
+    least_noise = LEAST_NOISE * (largest or 1.0)  # of a channel that shows nothing at all, nothing is subtracted
+    amplitudes = [[np.zeros(group.n_terms(record)) for record in group.records] for group, _ in rows]
+    priors = [_prior_root(group, row) for group, row in rows]
     stds = np.zeros(0)
     for _ in range(ROUNDS):
-        told = [_told(group, row, own, faintest) for (group, row), own in zip(rows, sizes, strict=True)]
-        before = np.cumsum([0, *(len(one.slope) for one in told)])
-        constants = np.concatenate([start + one.constants for start, one in zip(before, told, strict=False)])
-        wandering = [
-            WANDERS * one.noise * _unlike_levels(group.records) for (group, _), one in zip(rows, told, strict=True)
+        equations = [
+            _normal_equations(group, row, of_group, least_noise)
+            for (group, row), of_group in zip(rows, amplitudes, strict=True)
         ]
-        of_constants = np.zeros((before[-1], 1 + len(constants)))
-        of_constants[constants] = np.hstack([np.full((len(constants), 1), LARGEST * largest), block_diag(*wandering)])
-        spread = np.hstack([block_diag(*priors), of_constants])
-        known = spread.T @ block_diag(*(one.curvature for one in told)) @ spread
-        covariance = spread @ np.linalg.solve(np.eye(len(known)) + known, spread.T)
-        found = covariance @ np.concatenate([one.slope for one in told])
-        sizes = [
-            np.split(part, one.constants[1:]) for part, one in zip(np.split(found, before[1:-1]), told, strict=True)
+        before = np.cumsum([0, *(len(normal.slope) for normal in equations)])
+        offsets = np.concatenate([start + normal.offset_rows for start, normal in zip(before, equations, strict=False)])
+        drift = [
+            OFFSET_DRIFT * normal.noise * _project_out_levels(group.records)
+            for (group, _), normal in zip(rows, equations, strict=True)
         ]
-        stds = np.sqrt(np.maximum(np.diag(covariance)[constants], 0.0))
+        of_offsets = np.zeros((before[-1], 1 + len(offsets)))
+        of_offsets[offsets] = np.hstack([np.full((len(offsets), 1), LARGEST_OFFSET * largest), block_diag(*drift)])
+        spread = np.hstack([block_diag(*priors), of_offsets])
+        information = spread.T @ block_diag(*(normal.curvature for normal in equations)) @ spread
+        covariance = spread @ np.linalg.solve(np.eye(len(information)) + information, spread.T)
+        estimate = covariance @ np.concatenate([normal.slope for normal in equations])
+        amplitudes = [
+            np.split(part, normal.offset_rows[1:])
+            for part, normal in zip(np.split(estimate, before[1:-1]), equations, strict=True)
+        ]
+        stds = np.sqrt(np.maximum(np.diag(covariance)[offsets], 0.0))
     records = [(group, record) for group, _ in rows for record in group.records]
     return {
-        record.name: (size @ group.unit_signals(record), float(std))
-        for (group, record), size, std in zip(records, chain.from_iterable(sizes), stds, strict=True)
+        record.name: (of_record @ group.unit_signals(record), float(std))
+        for (group, record), of_record, std in zip(records, chain.from_iterable(amplitudes), stds, strict=True)
     }
 
 
-def _told(group: _Group, row: int, sizes: list[FloatArray], faintest: float) -> _Told:
-    shapes = [group.shapes(record) for record in group.records]
+def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: float) -> _NormalEquations:
+    units = [group.unit_spectra(record) for record in group.records]
     response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
-    left = response - np.stack([shape @ size for shape, size in zip(shapes, sizes, strict=True)], 1)
+    rest = response - np.stack([unit @ size for unit, size in zip(units, amplitudes, strict=True)], 1)
     per_square = 2 * group.lines.s.real[0] / group.records[0].step_s
-    energy = _unshared(force, left) + faintest**2 / per_square
+    energy = _unexplained_energy(force, rest) + least_noise**2 / per_square
     noise = float(np.sqrt(np.median(energy) * per_square))
-    weight = 1 / (energy[:, None] + (MISSED * np.abs(left)) ** 2)
+    weight = 1 / (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2)
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
-    across = np.hstack([column[:, None].conj() * shape for column, shape in zip(shared.T, shapes, strict=True)])
+    across = np.hstack([column[:, None].conj() * unit for column, unit in zip(shared.T, units, strict=True)])
     along = np.sum(shared.conj() * response, 1)
-    own = [(shape.conj() * part[:, None]).T for shape, part in zip(shapes, weight.T, strict=True)]
+    weighted = [(unit.conj() * part[:, None]).T for unit, part in zip(units, weight.T, strict=True)]
     before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
-    quiet = [_quiet(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)]
-    straight = [(one @ shape).real + more for one, shape, (more, _) in zip(own, shapes, quiet, strict=True)]
-    slopes = [(one @ values).real + more for one, values, (_, more) in zip(own, response.T, quiet, strict=True)]
-    return _Told(
-        counts=tuple(shape.shape[1] for shape in shapes),
+    quiet = [
+        _equations_before(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)
+    ]
+    curvatures = [(part @ unit).real + added for part, unit, (added, _) in zip(weighted, units, quiet, strict=True)]
+    slopes = [
+        (part @ values).real + added for part, values, (_, added) in zip(weighted, response.T, quiet, strict=True)
+    ]
+    return _NormalEquations(
+        n_terms=tuple(unit.shape[1] for unit in units),
         noise=noise,
-        curvature=block_diag(*straight) - (across.conj().T @ across).real,
+        curvature=block_diag(*curvatures) - (across.conj().T @ across).real,
         slope=np.concatenate(slopes) - (across.conj().T @ along).real,
     )
 
 
-def _quiet(group: _Group, record: ObservedRecord, before: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
-    """Give the curvature and slope that the samples before the blow add."""
+def _equations_before(
+    group: _Group, record: ObservedRecord, before: FloatArray, noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """Curvature and slope by the samples before the impact."""
     n = len(before)
-    shapes = group.unit_signals(record)[:, :n]
-    variance = noise**2 * (1 + AKIN * n)
-    return np.asarray(shapes @ shapes.T / variance), np.asarray(shapes @ before / variance)
+    units = group.unit_signals(record)[:, :n]
+    variance = noise**2 * (1 + CORRELATED_NOISE * n)
+    return np.asarray(units @ units.T / variance), np.asarray(units @ before / variance)
 
 
-def _prior(group: _Group, row: int) -> FloatArray:
-    """Give a square root of the covariance of leftovers, (n, any), but for constants in common and their wandering."""
-    kicks = [group.kicks(record) for record in group.records]
+def _prior_root(group: _Group, row: int) -> FloatArray:
+    """Square root of the prior covariance of amplitudes, (n, any), but for the offsets' common part and their drift."""
+    states = [group.initial_state(record) for record in group.records]
     motions = [
-        LEFT * float(np.sqrt(2 * np.mean(record.responses[row, : max(pulse.start, LEAST_BEFORE)] ** 2)))
+        MODAL_MOTION * float(np.sqrt(2 * np.mean(record.responses[row, : max(pulse.start, MIN_SAMPLES_BEFORE)] ** 2)))
         for record, pulse in zip(group.records, group.pulses, strict=True)
     ]
-    residues = LEFT * group.residues[:, row]
-    for kick, motion in zip(kicks, motions, strict=True):
-        if kick is not None:  # no mode has left more than moves
-            residues = np.fmin(residues, motion / np.maximum(np.abs(kick[0]), np.finfo(float).tiny))
+    residues = MODAL_MOTION * group.residues[:, row]
+    for state, motion in zip(states, motions, strict=True):
+        if state is not None:  # no mode moves more than the structure
+            residues = np.fmin(residues, motion / np.maximum(np.abs(state[0]), np.finfo(float).tiny))
     parts = [
-        _parts(record, kick, residues, motion, lacking)
-        for record, kick, motion, lacking in zip(group.records, kicks, motions, group.lacking[:, row], strict=True)
+        _prior_of_record(record, state, residues, motion, missing)
+        for record, state, motion, missing in zip(
+            group.records, states, motions, group.missing_samples[:, row], strict=True
+        )
     ]
-    shared = np.concatenate([of_residues for _, of_residues in parts])
-    return np.hstack([np.diag(np.concatenate([own for own, _ in parts])), shared])
+    shared = np.concatenate([by_residues for _, by_residues in parts])
+    return np.hstack([np.diag(np.concatenate([stds for stds, _ in parts])), shared])
 
 
-def _parts(
+def _prior_of_record(
     record: ObservedRecord,
-    kick: tuple[ComplexArray, FloatArray] | None,
+    state: tuple[ComplexArray, FloatArray] | None,
     residues: FloatArray,
     motion: float,
-    lacking: float,
+    missing: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Give deviations of a blow's own leftovers, (count,), and what residues leave, (count, 2 n_poles)."""
+    """Give standard deviations of a record's independent amplitudes, (n_terms,), and their part by residues.
+
+    The latter, (n_terms, 2 n_poles), is shared with the other records of the group.
+    """
     n = len(residues)
     if not record.follows:
-        return np.array([0.0, *[lacking] * INSTEAD]), np.zeros((1 + INSTEAD, 2 * n))
-    if kick is None:
-        own = np.array([motion, *[lacking] * INSTEAD, *[motion] * 2 * n])
-        return own, np.zeros((len(own), 2 * n))
-    left, error = kick[0] * residues, kick[1] * residues
-    real, imaginary = np.diag(left.real), np.diag(left.imag)
-    shared = np.block([[np.zeros((1 + INSTEAD, 2 * n))], [real, -imaginary], [-imaginary, -real]])
-    return np.concatenate([[motion, *[lacking] * INSTEAD], error, error]), shared
+        return np.array([0.0, *[missing] * FIRST_SAMPLES]), np.zeros((1 + FIRST_SAMPLES, 2 * n))
+    if state is None:
+        stds = np.array([motion, *[missing] * FIRST_SAMPLES, *[motion] * 2 * n])
+        return stds, np.zeros((len(stds), 2 * n))
+    amplitude, error = state[0] * residues, state[1] * residues
+    real, imaginary = np.diag(amplitude.real), np.diag(amplitude.imag)
+    shared = np.block([[np.zeros((1 + FIRST_SAMPLES, 2 * n))], [real, -imaginary], [-imaginary, -real]])
+    return np.concatenate([[motion, *[missing] * FIRST_SAMPLES], error, error]), shared
 
 
-def _unlike_levels(records: tuple[ObservedRecord, ...]) -> FloatArray:
-    """Project on what differs from the levels of blows: what is like them may as well be their response."""
+def _project_out_levels(records: tuple[ObservedRecord, ...]) -> FloatArray:
+    """Projector, (n_records, n_records), on what is not proportional to the levels, as a response would be."""
     levels = np.array([record.level for record in records])
     return np.asarray(np.eye(len(records)) - np.outer(levels, levels) / np.sum(levels**2))
 
 
-def _unshared(force: ComplexArray, response: ComplexArray) -> FloatArray:
+def _unexplained_energy(force: ComplexArray, response: ComplexArray) -> FloatArray:
     """Energy, (n_lines,), that one FRF does not explain, averaged over neighbouring lines."""
     power = np.sum(np.abs(force) ** 2, 1)
     values = np.sum(response * force.conj(), 1) / power
-    left = np.sum(np.abs(response - values[:, None] * force) ** 2, 1) / max(force.shape[1] - 1, 1)
+    energy = np.sum(np.abs(response - values[:, None] * force) ** 2, 1) / max(force.shape[1] - 1, 1)
     floor = np.finfo(float).tiny + 1e-12 * float(np.mean(np.abs(response) ** 2))
-    return np.asarray(uniform_filter1d(left, AROUND, mode="nearest") + floor)
+    return np.asarray(uniform_filter1d(energy, SMOOTHED_LINES, mode="nearest") + floor)

@@ -1,4 +1,4 @@
-"""Noise of recordings, as blows show it."""
+"""Noise of records, and the errors of transfer functions by it."""
 
 from dataclasses import replace
 
@@ -19,16 +19,16 @@ LEAD = 100  # samples before a shaker begins
 AS_READ = 0.3  # of the noise's density, which is read from three records
 
 
-def impact(name, place, level, shown):
+def impact(name, dof, level, gain):
     """A short pulse and a motion that dies out, as a recorder with coarse steps shows it."""
     time = np.arange(SAMPLES) / RATE_HZ
     force = np.where((time > 0.1) & (time < 0.103), level, 0.0)
     after = np.maximum(time - 0.1, 0.0)
-    motion = shown * level * np.exp(-8 * after) * np.sin(2 * np.pi * 60 * after)
+    motion = gain * level * np.exp(-8 * after) * np.sin(2 * np.pi * 60 * after)
     return ObservedRecord(
         name=name,
         input_channel="force",
-        input_dof=parse_dof(place),
+        input_dof=parse_dof(dof),
         sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
         step_s=1 / RATE_HZ,
         force=force + 1e-3 * np.random.default_rng(len(name)).standard_normal(SAMPLES),
@@ -36,13 +36,13 @@ def impact(name, place, level, shown):
     )
 
 
-@pytest.mark.parametrize("shown", [0.0, 0.1])
-def test_a_recorder_has_at_least_the_noise_of_its_steps(shown):
-    """A channel on its node shows exact zeros for some blows: that is no measure of its noise."""
+@pytest.mark.parametrize("gain", [0.0, 0.1])
+def test_a_recorder_has_at_least_the_noise_of_its_steps(gain):
+    """A channel on its node shows exact zeros for some impacts: that is no measure of its noise."""
     records = [impact(f"a{'x' * n}", "5:+z", level, 0.1) for n, level in enumerate((10.0, 17.0))]
-    records += [impact(f"b{'y' * n}", "7:+z", level, shown) for n, level in enumerate((11.0, 23.0, 35.0))]
-    found = survey_records(Observations(kind="hammer", records=tuple(records), band_hz=(20.0, 200.0)))
-    assert found.responses["acc"].white >= STEP**2 / 12 / RATE_HZ * (1 - 1e-9)
+    records += [impact(f"b{'y' * n}", "7:+z", level, gain) for n, level in enumerate((11.0, 23.0, 35.0))]
+    survey = survey_records(Observations(kind="hammer", records=tuple(records), band_hz=(20.0, 200.0)))
+    assert survey.responses["acc"].white >= STEP**2 / 12 / RATE_HZ * (1 - 1e-9)
 
 
 def record(name, drawn, noise_n):
@@ -51,14 +51,14 @@ def record(name, drawn, noise_n):
     lines = np.fft.rfft(rng.standard_normal(SAMPLES))
     frequency = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
     force = np.fft.irfft(np.where(frequency < HALF_HZ, 1.0, HARDLY) * lines, SAMPLES)
-    shown = force + noise_n * rng.standard_normal(SAMPLES)
+    recorded_force = force + noise_n * rng.standard_normal(SAMPLES)
     return ObservedRecord(
         name=name,
         input_channel="force",
         input_dof=parse_dof("5:+z"),
         sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
         step_s=1 / RATE_HZ,
-        force=shown,
+        force=recorded_force,
         responses=lfilter([1.0], RESONANCE, force)[None],
     )
 
@@ -70,8 +70,8 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
     errors, stated = [], []
     for trial in range(trials):
         records = tuple(record(f"r{k}", (trial, k), noise_n) for k in range(3))
-        found = survey_records(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
-        measured = estimate_transfer_functions(found, s)
+        survey = survey_records(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
+        measured = estimate_transfer_functions(survey, s)
         errors.append(np.abs(measured.values[:, 0] * np.polyval(RESONANCE[::-1], np.exp(-s / RATE_HZ)) - 1) ** 2)
         stated.append(np.sum(np.abs(measured.shared_errors[0]) ** 2, 1))
     ratio = np.mean(errors, 0) / np.mean(stated, 0)
@@ -81,7 +81,7 @@ def test_noise_of_a_force_counts_on_strong_lines_as_on_weak_ones():
 
 def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of_the_band():
     """Two resonances, a decade apart; white noise alone would miss the lower one's by a factor of five."""
-    white, pink, found = 1e-9, 2e-7, []
+    white, pink, densities = 1e-9, 2e-7, []
     two = np.convolve(
         np.poly(0.995 * np.exp([0.12j, -0.12j])).real, np.poly(0.98 * np.exp([1.6j, -1.6j])).real
     )  # 19 and 255 Hz
@@ -91,62 +91,62 @@ def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of
         records = []
         for k in range(3):
             rng = np.random.default_rng((trial, k))
-            one = record(f"r{k}", (trial, k), 0.0)
+            base_record = record(f"r{k}", (trial, k), 0.0)
             noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(SAMPLES)) * np.sqrt(density * RATE_HZ), SAMPLES)
             force = np.random.default_rng((k, trial)).standard_normal(SAMPLES)
             force[:LEAD] = 0.0
-            shown = lfilter([1.0], two, force)[None]
-            shown += 1e-4 * np.abs(shown).max() * rng.standard_normal(shown.shape)
-            records.append(replace(one, force=force + noise, responses=shown))
-        survey_ = survey_records(Observations(kind="random", records=tuple(records), band_hz=(10.0, 390.0)))
-        found.append(survey_.force.density(np.array([19.0, 255.0])))
-    ratio = np.median(found, axis=0) / (white + pink / np.array([19.0, 255.0]))
+            responses = lfilter([1.0], two, force)[None]
+            responses += 1e-4 * np.abs(responses).max() * rng.standard_normal(responses.shape)
+            records.append(replace(base_record, force=force + noise, responses=responses))
+        survey = survey_records(Observations(kind="random", records=tuple(records), band_hz=(10.0, 390.0)))
+        densities.append(survey.force.density(np.array([19.0, 255.0])))
+    ratio = np.median(densities, axis=0) / (white + pink / np.array([19.0, 255.0]))
     assert np.all((ratio > 0.5) & (ratio < 2.0))
 
 
-def test_records_that_end_in_motion_say_what_they_lack():
-    """A slow resonance is shaken up over the whole record: what a transform beside the axis lacks is its end."""
+def test_records_that_end_in_motion_have_the_error_of_what_is_missing():
+    """A slow resonance is excited over the whole record: a transform beside the axis misses its end."""
     slow = np.poly(0.9995 * np.exp([0.3j, -0.3j])).real  # 48 Hz, and its motion lasts for 2 s of 4
     s = 2.0 + 2j * np.pi * np.arange(30.0, 70.0, 2.5)
     errors, stated = [], []
     for trial in range(40):
         records = []
         for k in range(3):
-            one = record(f"r{k}", (trial, k), 0.0)
-            force = np.where(np.arange(SAMPLES) > LEAD, one.force, 0.0)
-            records.append(replace(one, force=force, responses=lfilter([1.0], slow, force)[None]))
-        found = survey_records(Observations(kind="random", records=tuple(records), band_hz=(20.0, 190.0)))
-        measured = estimate_transfer_functions(found, s)
+            base_record = record(f"r{k}", (trial, k), 0.0)
+            force = np.where(np.arange(SAMPLES) > LEAD, base_record.force, 0.0)
+            records.append(replace(base_record, force=force, responses=lfilter([1.0], slow, force)[None]))
+        survey = survey_records(Observations(kind="random", records=tuple(records), band_hz=(20.0, 190.0)))
+        measured = estimate_transfer_functions(survey, s)
         true = 1 / np.polyval(slow[::-1], np.exp(-s / RATE_HZ))
         errors.append(np.abs((measured.values[:, 0] - true) / true) ** 2)
-        common = np.sum(np.abs(measured.shared_errors[0]) ** 2, 1)
-        own = np.diagonal(measured.covariance[0]).real / np.abs(measured.values[:, 0]) ** 2
-        stated.append(common + own)
+        shared = np.sum(np.abs(measured.shared_errors[0]) ** 2, 1)
+        separate = np.diagonal(measured.covariance[0]).real / np.abs(measured.values[:, 0]) ** 2
+        stated.append(shared + separate)
     ratio = np.sqrt(np.mean(errors, 0) / np.mean(stated, 0))
     assert np.all((ratio > 0.3) & (ratio < 2.0)), ratio
 
 
 @pytest.mark.parametrize("lead_s", [0.05, 1.5])
-def test_what_lies_before_a_blow_does_not_blur_its_frfs(lead_s):
-    """A transform beside the axis weighs the first samples most: at 1.5 s the blow itself would count for nothing."""
-    place, shown, drawn = "5:+z", 0.1, np.random.default_rng(1)
+def test_the_time_before_an_impact_does_not_blur_its_frfs(lead_s):
+    """A transform beside the axis weighs the first samples most: at 1.5 s the impact itself would count for nothing."""
+    dof, gain, drawn = "5:+z", 0.1, np.random.default_rng(1)
 
     def late(name, level):
-        one = impact(name, place, level, shown)
+        base_record = impact(name, dof, level, gain)
         lead = round((lead_s - 0.05) * RATE_HZ)
         quiet = 1e-3 * drawn.standard_normal((1, lead))
         hum = 1e-4 * drawn.standard_normal((1, lead + SAMPLES - 50))
-        force = np.concatenate([1e-3 * drawn.standard_normal(lead), one.force[50:]])
-        responses = np.concatenate([quiet, shown * level * _decaying(SAMPLES - 50)[None]], axis=1) + hum
-        return replace(one, force=force, responses=responses)
+        force = np.concatenate([1e-3 * drawn.standard_normal(lead), base_record.force[50:]])
+        responses = np.concatenate([quiet, gain * level * _decaying(SAMPLES - 50)[None]], axis=1) + hum
+        return replace(base_record, force=force, responses=responses)
 
     records = tuple(late(f"a{'x' * n}", level) for n, level in enumerate((10.0, 17.0, 30.0)))
-    found = survey_records(Observations(kind="hammer", records=records, band_hz=(20.0, 200.0)))
+    survey = survey_records(Observations(kind="hammer", records=records, band_hz=(20.0, 200.0)))
     s = np.array([12.0 + 2j * np.pi * 120.0])
-    measured = estimate_transfer_functions(found, s)
+    measured = estimate_transfer_functions(survey, s)
     pulse = np.where((np.arange(SAMPLES) > 100) & (np.arange(SAMPLES) < 103), 1.0, 0.0)[50:]
     turned = np.exp(-s * np.arange(SAMPLES - 50) / RATE_HZ)
-    true = shown * (turned @ _decaying(SAMPLES - 50)) / (turned @ pulse)
+    true = gain * (turned @ _decaying(SAMPLES - 50)) / (turned @ pulse)
     assert abs(measured.values[0, 0] / true - 1) < 0.01
     assert np.sqrt(measured.covariance[0, 0, 0].real) < 0.01 * abs(true)
 

@@ -1,4 +1,4 @@
-"""Weak and strong blows: equal for a linear structure, apart for one whose frequency follows the level."""
+"""Weak and strong impacts: equal FRFs for a linear structure, different ones where frequencies follow the level."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from synthetic_campaign import HIT, Structure, hammer_campaign, impact, write_cs
 
 BAND = FitOptions(band_hz=(20.0, 220.0))
 HEIGHTS = (10.0, 30.0, 100.0, 200.0)
-SOFTENING = 0.02  # of the frequencies, from the weakest blow to the strongest
+SOFTENING = 0.02  # of the frequencies, from the weakest impact to the strongest
 QUOTIENT = 2e-4  # relative: what the neighbouring modes do within a resonance, beside (c0 + c1 s) / (s - p)
 DAMPING = 0.01  # relative, for the same reason
 
@@ -29,19 +29,19 @@ def observed(path):
     return observe(test, IngestOptions(), estimate_frfs(test, IngestOptions()).frfs, fit=BAND)
 
 
-def seen(path):
+def observed_and_fitted(path):
     observations = observed(path)
     return observations, fit_modes(observations.frfs, BAND)
 
 
 @pytest.fixture(scope="module")
 def linear(tmp_path_factory):
-    return seen(hammer_campaign(tmp_path_factory.mktemp("linear"), heights=HEIGHTS))
+    return observed_and_fitted(hammer_campaign(tmp_path_factory.mktemp("linear"), heights=HEIGHTS))
 
 
 @pytest.fixture(scope="module")
 def softening(tmp_path_factory, linear):
-    """Each blow sees a structure whose frequencies are those of its level; the fit is that of the linear one."""
+    """Each impact meets a structure whose frequencies are those of its level; the fit is that of the linear one."""
     folder = tmp_path_factory.mktemp("softening")
     true = Structure()
     for number, height in enumerate(HEIGHTS):
@@ -61,7 +61,7 @@ def test_a_linear_structure_has_one_frf_at_all_levels(linear):
     assert np.linalg.norm(levels.strong - exact) < 1e-3 * np.linalg.norm(exact)
 
 
-def test_single_blows_give_the_true_modes(linear):
+def test_single_impacts_give_the_true_modes(linear):
     modes = compare_levels(*linear).modes
     assert len(modes) == 3 * len(HEIGHTS)
     true = Structure()
@@ -70,7 +70,7 @@ def test_single_blows_give_the_true_modes(linear):
         np.testing.assert_allclose(rows["damping_ratio"], true.damping_ratio[mode], rtol=DAMPING)
 
 
-def test_frequencies_that_follow_the_level_are_followed(softening):
+def test_frequencies_that_follow_the_level_are_estimated(softening):
     levels = compare_levels(*softening)
     assert np.linalg.norm(levels.weak - levels.strong) > 0.1 * np.linalg.norm(levels.strong)
     for mode, rows in levels.modes.groupby("mode"):
@@ -80,8 +80,8 @@ def test_frequencies_that_follow_the_level_are_followed(softening):
         np.testing.assert_allclose(shift[1:], -SOFTENING * np.arange(1, 4) / 3, rtol=0.02)
 
 
-def test_one_level_says_nothing(tmp_path):
-    levels = compare_levels(*seen(hammer_campaign(tmp_path, heights=(100.0, 110.0, 120.0))))
+def test_a_single_level_gives_no_comparison(tmp_path):
+    levels = compare_levels(*observed_and_fitted(hammer_campaign(tmp_path, heights=(100.0, 110.0, 120.0))))
     assert (levels.labels, len(levels.modes), levels.weak.shape) == ((), 0, (0, 0))
 
 
@@ -92,8 +92,8 @@ def test_records_of_a_shaker_are_compared_too(linear):
     for number, size in enumerate((1.0, 5.0)):
         force = size * rng.standard_normal(8 * 4096)
         signals = impact(Structure(), n_samples=len(force), force=force)
-        one = observations.records[0]
-        records.append(replace(one, name=f"r{number}", force=force, responses=signals[1:], rested=False))
+        first_record = observations.records[0]
+        records.append(replace(first_record, name=f"r{number}", force=force, responses=signals[1:], rested=False))
     levels = compare_levels(replace(observations, kind="random", records=tuple(records)), fit)
     assert levels.weak_N[0] < 0.3 * levels.strong_N[0]
     assert np.linalg.norm(levels.weak - levels.strong) < 1e-4 * np.linalg.norm(levels.strong)  # other forces

@@ -1,4 +1,4 @@
-"""FRFs off their lines: what lies beyond the band."""
+"""FRFs continued off their lines: errors by the unknown FRF outside the band."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity, FrfSet
 
 BAND_HZ = (4.0, 60.0)
-INSIDE_HZ, BEYOND_HZ = (11.0, 24.0, 41.0), (2.9, 71.0, 120.0)
+INSIDE_HZ, OUTSIDE_HZ = (11.0, 24.0, 41.0), (2.9, 71.0, 120.0)
 
 
-def modes(rng, mostly_beyond):
+def modes(rng, outside_size):
     """Poles and residues of a structure of which the band shows three modes."""
-    poles = 2 * np.pi * np.array(INSIDE_HZ + BEYOND_HZ) * (1j - 0.002)
-    sizes = np.array([1.0] * 3 + [mostly_beyond] * 3) * np.abs(poles)
+    poles = 2 * np.pi * np.array(INSIDE_HZ + OUTSIDE_HZ) * (1j - 0.002)
+    sizes = np.array([1.0] * 3 + [outside_size] * 3) * np.abs(poles)
     return poles, sizes * rng.choice([-1, 1], len(poles)) * rng.uniform(0.5, 1.5, len(poles))
 
 
@@ -41,16 +41,16 @@ def survey(structure):
     return survey_frfs(frfs, BAND_HZ)
 
 
-def seen(structure):
-    """The same, off their lines."""
-    found = survey(structure)
-    return continue_frfs(found, fine_contour(found.resonances, BAND_HZ, found.least_decay_1_s))
+def continued(structure):
+    """The same, continued off their lines."""
+    frf_survey = survey(structure)
+    return continue_frfs(frf_survey, fine_contour(frf_survey.resonances, BAND_HZ, frf_survey.least_decay_1_s))
 
 
-def measured_of(n, mostly_beyond):
+def measured_of(n, outside_size):
     """Structures with their FRFs."""
-    structures = [modes(np.random.default_rng(seed), mostly_beyond) for seed in range(n)]
-    return [(structure, seen(structure)) for structure in structures]
+    structures = [modes(np.random.default_rng(seed), outside_size) for seed in range(n)]
+    return [(structure, continued(structure)) for structure in structures]
 
 
 def error_of(structure, measured):
@@ -58,8 +58,8 @@ def error_of(structure, measured):
     return measured.values[:, 0] - exact(structure, measured.s)
 
 
-def test_an_frf_off_its_lines_goes_on_beyond_the_band_as_at_its_end():
-    """Were it taken to be there what it is in the band, three times as much would be missed."""
+def test_an_frf_is_taken_as_constant_outside_the_band():
+    """Were it taken to be there what it is in the band, errors would be three times as large."""
     missed = []
     for structure, measured in measured_of(5, 0.1):
         inner = np.abs(measured.frequency_hz - 30.0) < 18.0
@@ -67,8 +67,8 @@ def test_an_frf_off_its_lines_goes_on_beyond_the_band_as_at_its_end():
     assert np.median(missed) < 6e-5
 
 
-def test_what_is_missed_is_missed_by_all_points_together():
-    """The few numbers that nobody knows beyond the band explain it, and their sizes are as expected."""
+def test_errors_by_the_frf_outside_the_band_are_correlated():
+    """The few unknown numbers outside the band explain them, and their sizes are as expected."""
     for structure, measured in measured_of(8, 1.0):
         error, covariance = error_of(structure, measured), measured.covariance[0]
         variance = np.diag(covariance).real
@@ -77,11 +77,11 @@ def test_what_is_missed_is_missed_by_all_points_together():
         assert np.abs(covariance[20, 21]) > 0.9 * np.sqrt(variance[20] * variance[21])
 
 
-def test_a_search_takes_each_point_for_itself():
-    """An error that points share would make a model that is far off look wrong in its details alone."""
+def test_a_global_scan_takes_errors_as_independent():
+    """A correlated error would make a model that is far off look wrong in its details alone."""
     structure = modes(np.random.default_rng(0), 1.0)
-    found = survey(structure)
-    measured = continue_frfs_coarsely(found, wide_contour(BAND_HZ, found.least_decay_1_s, COARSE))
+    frf_survey = survey(structure)
+    measured = continue_frfs_coarsely(frf_survey, wide_contour(BAND_HZ, frf_survey.least_decay_1_s, COARSE))
     covariance = measured.covariance[0]
     variance = np.diag(covariance).real
     assert np.abs(covariance - np.diag(variance)).max() < 1e-6 * variance.max()
