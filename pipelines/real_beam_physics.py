@@ -86,13 +86,13 @@ def main(folder: Path, out: Path) -> None:
     test = frf_ipz.read_test(folder / "test.toml")
     model = frf_ipz.read_model(folder / "model.toml")
     frfs = replace(frf_ipz.estimate_frfs(test, frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
-    frfs = with_drift(frfs.lines(frfs.in_band(case.band_hz)), case.drift)
+    frfs = with_drift(frfs.select_lines(frfs.in_band(case.band_hz)), case.drift)
     kept = [place for place, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
-    fits, bench = causes_of(frfs.frfs(kept), model, case)
+    fits, bench = causes_of(frfs.select_frfs(kept), model, case)
     for fit in (fits[0], fits[-1]):
         print(where_it_is(bench, fit).to_string(float_format="{:.2f}".format))
     out.mkdir(parents=True, exist_ok=True)
-    draw(frfs.frfs(kept), bench, {"model": fits[0], "with what was found": fits[-1]}, out / f"{folder.name}.png")
+    draw(frfs.select_frfs(kept), bench, {"model": fits[0], "with what was found": fits[-1]}, out / f"{folder.name}.png")
     if case.left_out:
         for number, fit in enumerate(fits):  # one cause more each time: what helps the fit need not help here
             full = with_change(model, fit.hypothesis.change(fit.values))

@@ -36,13 +36,13 @@ def leave_out(frfs: frf_ipz.FrfSet, full: object, band_hz: tuple[float, float], 
     """Predict the FRFs of one node from all others: one row a model."""
     places = range(len(frfs.labels))
     out = [place for place in places if _node(frfs.labels[place], side) == node]
-    rest = frfs.frfs([place for place in places if place not in out])
+    rest = frfs.select_frfs([place for place in places if place not in out])
     fit = frf_ipz.fit_modes(rest, frf_ipz.FitOptions(band_hz=band_hz))
     ends = {"actuators": frfs.input_dofs, "sensors": frfs.output_dofs}
     reduced = frf_ipz.reduce_model(full, frf_ipz.ReduceOptions(), points=(), band_hz=fit.band_hz, **ends)
     pairs = frf_ipz.pair(fit, reduced)
     updated = frf_ipz.update_model(reduced, fit, pairs, basis=structural_basis(full, reduced))
-    left_out = frfs.frfs(out).lines(frfs.in_band(band_hz))
+    left_out = frfs.select_frfs(out).select_lines(frfs.in_band(band_hz))
     models = {
         "nominal": reduced,
         "measured poles, nominal shapes": frf_ipz.with_measured_poles(reduced, pairs),

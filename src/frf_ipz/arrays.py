@@ -44,7 +44,7 @@ def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
 
 
 def require_shape(name: str, array: npt.NDArray[Scalar], shape: Sequence[int | None]) -> None:
-    """Refuse an array that does not have the shape wanted.
+    """Refuse an array that does not have the required shape.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def require_shape(name: str, array: npt.NDArray[Scalar], shape: Sequence[int | N
     array : array
         The array to check.
     shape : sequence of int or None
-        The lengths wanted; None stands for any length.
+        The required lengths; None stands for any length.
 
     Raises
     ------
@@ -61,11 +61,11 @@ def require_shape(name: str, array: npt.NDArray[Scalar], shape: Sequence[int | N
         If the number of axes or a length differs.
     """
     fits = array.ndim == len(shape) and all(
-        wanted is None or wanted == length for wanted, length in zip(shape, array.shape, strict=False)
+        required is None or required == length for required, length in zip(shape, array.shape, strict=False)
     )
     if not fits:
-        wanted_text = ", ".join("any" if length is None else str(length) for length in shape)
-        raise ShapeError(f"{name} has the shape {array.shape}; needed is ({wanted_text})")
+        required_text = ", ".join("any" if length is None else str(length) for length in shape)
+        raise ShapeError(f"{name} has the shape {array.shape}; needed is ({required_text})")
 
 
 def require_finite(name: str, array: npt.NDArray[Scalar]) -> None:
@@ -81,9 +81,9 @@ def require_finite(name: str, array: npt.NDArray[Scalar]) -> None:
     Raises
     ------
     ShapeError
-        If a value is not finite; the message names the first place.
+        If a value is not finite; the message gives the index of the first.
     """
-    wrong = ~np.isfinite(array)
-    if wrong.any():
-        place = tuple(int(index) for index in np.argwhere(wrong)[0])
-        raise ShapeError(f"{name} holds {int(wrong.sum())} values that are not finite, the first at {place}")
+    is_bad = ~np.isfinite(array)
+    if is_bad.any():
+        first = tuple(int(index) for index in np.argwhere(is_bad)[0])
+        raise ShapeError(f"{name} holds {int(is_bad.sum())} values that are not finite, the first at {first}")

@@ -13,7 +13,7 @@ _LABEL = re.compile(r"^\s*(\d+)\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
 
 @dataclass(frozen=True, slots=True, order=True)
 class Dof:
-    """One direction of one node; the sign is that of the sensor or of the blow.
+    """One direction of one node; the sign is that of the sensor or of the excitation.
 
     Parameters
     ----------

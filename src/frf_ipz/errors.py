@@ -30,7 +30,7 @@ class FrfIpzError(Exception):
 
 
 class InputError(FrfIpzError, ValueError):
-    """The input is wrong: says which file, which place, what was expected, what to do."""
+    """The input is wrong: says which file, where in it, what was expected, what to do."""
 
 
 class ShapeError(InputError):
@@ -51,7 +51,7 @@ class FileFormatError(InputError):
     problem : str
         What is wrong, what was expected and what to do, as one sentence.
     where : str, optional
-        The place in the file: a line, a column or a key.
+        Where in the file: a line, a column or a key.
     """
 
     def __init__(self, path: Path | str, problem: str, *, where: str = "") -> None:
@@ -89,7 +89,7 @@ class IllConditionedError(NumericalError):
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Say which known words there are, the closest one first.
+    """Propose the known word that is closest to an unknown one.
 
     Parameters
     ----------
@@ -109,5 +109,5 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     "did you mean 'dofs'?"
     """
     choices = list(known)
-    close = get_close_matches(word, choices, n=1)
-    return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(choices) or 'none'}"
+    matches = get_close_matches(word, choices, n=1)
+    return f"did you mean '{matches[0]}'?" if matches else f"known are {', '.join(choices) or 'none'}"

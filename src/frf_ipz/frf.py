@@ -28,7 +28,7 @@ class FrfLabel:
     Parameters
     ----------
     output_dof, input_dof : Dof
-        Sensor and blow, with the signs of the test.
+        Sensor and excited DOF, with the signs of the test.
     quantity : FrfQuantity
         What was measured.
     output_channel, input_channel : str
@@ -51,7 +51,7 @@ class FrfLabel:
 
     @property
     def sign(self) -> int:
-        """Product of the signs of sensor and blow: the model's FRF times this is the measured one."""
+        """Product of the signs of sensor and excitation: the model's FRF times this is the measured one."""
         return self.output_dof.sign * self.input_dof.sign
 
 
@@ -59,8 +59,8 @@ class FrfLabel:
 class FrfSet:
     """Measured FRFs on common frequency lines.
 
-    Not every pair of sensor and blow need be measured (roving sensors), so FRFs stand in a row, not in a matrix;
-    `matrix` gives the block of those that are.
+    Not every pair of sensor and excited DOF need be measured (roving sensors), so FRFs stand in a row, not in a
+    matrix; `matrix` arranges those that are.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class FrfSet:
     coherence : (n_lines, n_frfs) array
         NaN where unknown.
     averages : (n_frfs,) int array
-        Blows or segments behind each FRF; 0 where unknown.
+        Records or segments averaged in each FRF; 0 where unknown.
     window_decay_1_s : float
         Rate sigma of an exponential window that force and response share. The values are then exactly the transfer
         function at s = sigma + i omega, and whoever fits evaluates the model there: that takes the added damping
@@ -133,18 +133,18 @@ class FrfSet:
 
     @property
     def input_dofs(self) -> tuple[Dof, ...]:
-        """The struck DOFs, each once, in the order of the labels."""
+        """The excited DOFs, each once, in the order of the labels."""
         return tuple(dict.fromkeys(label.input_dof for label in self.labels))
 
     def in_band(self, band_hz: tuple[float, float], exclude_hz: Sequence[tuple[float, float]] = ()) -> BoolArray:
-        """Tell which lines lie in a band.
+        """Mark the lines that lie in a band.
 
         Parameters
         ----------
         band_hz : pair of float
             Lowest and highest frequency, both included, Hz.
         exclude_hz : sequence of pairs of float
-            Stretches to leave out, Hz.
+            Bands to leave out, Hz.
 
         Returns
         -------
@@ -154,7 +154,7 @@ class FrfSet:
         Raises
         ------
         InputError
-            If no line is left.
+            If no line remains.
         """
         frequency = self.frequency_hz
         used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
@@ -162,18 +162,18 @@ class FrfSet:
             used &= (frequency < low) | (frequency > high)
         if not used.any():
             raise InputError(
-                f"no frequency line is left in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; the measured lines go "
+                f"no frequency line remains in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; the measured lines go "
                 f"from {frequency[0]:g} to {frequency[-1]:g} Hz, so set another [fit] band_hz"
             )
         return used
 
-    def lines(self, used: BoolArray) -> FrfSet:
-        """Keep some frequency lines.
+    def select_lines(self, used: BoolArray) -> FrfSet:
+        """Select frequency lines.
 
         Parameters
         ----------
         used : (n_lines,) bool array
-            True for those to keep.
+            True for the lines to select.
 
         Returns
         -------
@@ -183,26 +183,26 @@ class FrfSet:
         rows = ("values", "variance", "coherence")
         return replace(self, frequency_hz=self.frequency_hz[used], **{name: getattr(self, name)[used] for name in rows})
 
-    def frfs(self, indices: Sequence[int]) -> FrfSet:
-        """Keep some FRFs.
+    def select_frfs(self, indices: Sequence[int]) -> FrfSet:
+        """Select FRFs by their numbers.
 
         Parameters
         ----------
         indices : sequence of int
-            Which, in the order wanted.
+            Numbers of the FRFs, in the order of the result.
 
         Returns
         -------
         FrfSet
             Those FRFs on the same lines.
         """
-        chosen = list(indices)
+        selected = list(indices)
         columns = ("values", "variance", "coherence")
         return replace(
             self,
-            labels=tuple(self.labels[index] for index in chosen),
-            averages=self.averages[chosen],
-            **{name: getattr(self, name)[:, chosen] for name in columns},
+            labels=tuple(self.labels[index] for index in selected),
+            averages=self.averages[selected],
+            **{name: getattr(self, name)[:, selected] for name in columns},
         )
 
     def matrix(self) -> tuple[ComplexArray, BoolArray]:
@@ -220,7 +220,7 @@ class FrfSet:
         values = np.zeros((self.n_lines, len(rows), len(columns)), complex)
         measured = np.zeros((len(rows), len(columns)), bool)
         for index, label in enumerate(self.labels):
-            place = rows[label.output_dof], columns[label.input_dof]
-            values[:, *place] = self.values[:, index]
-            measured[place] = True
+            entry = rows[label.output_dof], columns[label.input_dof]
+            values[:, *entry] = self.values[:, index]
+            measured[entry] = True
         return values, measured

@@ -1,4 +1,4 @@
-"""How long work tells how far it is, without knowing who listens."""
+"""How long computations report their progress, without knowing who shows it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called now and then by long work."""
+    """Called now and then by a long computation."""
 
     def __call__(self, fraction: float, text: str) -> None:
-        """Take note.
+        """Report the progress.
 
         Parameters
         ----------
@@ -21,7 +21,7 @@ class Progress(Protocol):
 
 
 def silent(fraction: float, text: str) -> None:
-    """Listen to nothing.
+    """Ignore the progress.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ class PoleResidueModel:
     Parameters
     ----------
     poles : (n_poles,) complex array
-        rad/s, imaginary part >= 0; one without an imaginary part stands for itself alone.
+        rad/s, imaginary part >= 0; a real pole stands for itself alone.
     residues : (n_poles, n_frfs) complex array
         Unit of the FRF times rad/s; real for a real pole.
     powers : tuple of int
@@ -54,7 +54,7 @@ class PoleResidueModel:
         require_shape("the delays", self.delay_s, (n_frfs,))
 
     def __call__(self, s: ComplexArray) -> ComplexArray:
-        """Evaluate.
+        """Evaluate the FRFs.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ def without_window(frfs: FrfSet, model: PoleResidueModel) -> FrfSet:
     """Carry FRFs that were measured under an exponential window over to the imaginary axis.
 
     The windowed values are exact at s = sigma + i omega. What the fitted model changes between there and i omega is
-    added to them: noise and whatever the model left out stay as they were measured.
+    added to them: noise and whatever the model does not contain stay as they were measured.
 
     Parameters
     ----------
@@ -220,5 +220,5 @@ def without_window(frfs: FrfSet, model: PoleResidueModel) -> FrfSet:
     if not frfs.window_decay_1_s:
         return frfs
     s = np.where(frfs.frequency_hz > 0, 2j * np.pi * frfs.frequency_hz, 2j * np.pi * frfs.frequency_hz[1])
-    carried = np.where(frfs.frequency_hz[:, None] > 0, model(s) - model(frfs.s), 0.0)
-    return replace(frfs, values=frfs.values + carried, window_decay_1_s=0.0)
+    difference = np.where(frfs.frequency_hz[:, None] > 0, model(s) - model(frfs.s), 0.0)
+    return replace(frfs, values=frfs.values + difference, window_decay_1_s=0.0)

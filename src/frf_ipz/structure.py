@@ -22,7 +22,7 @@ Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """An additive part of a model that can be named: an element, a spring, a group, a point mass.
+    """An additive part of a model with a name: an element, a spring, a group, a point mass.
 
     Parameters
     ----------
@@ -60,23 +60,23 @@ class Geometry:
     lines : (n_lines, 2) int array
         Pairs of node numbers that are drawn as lines.
     supports : mapping of int to str
-        How a node is held: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
-    is_a_row : bool
-        Coordinates are no positions, but a row of masses.
+        How a node is supported: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
+    is_schematic : bool
+        Coordinates are no positions: the masses of a lumped model drawn in a row.
     """
 
     nodes: IntArray
     coordinates_m: FloatArray
     lines: IntArray
     supports: Mapping[int, str] = field(default_factory=dict)
-    is_a_row: bool = False
+    is_schematic: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StructuralModel:
     """A linear FE model ``M x'' + B x' + K x = f`` with modal damping besides B.
 
-    The matrices are those of all DOFs; the ones that are held (`fixed`) are kept, so that a support can be released.
+    The matrices are those of all DOFs, the held ones (`fixed`) included, so that a support can be released.
 
     Parameters
     ----------
@@ -97,11 +97,11 @@ class StructuralModel:
     geometry : Geometry
         Where the nodes are.
     parts : tuple of Part
-        What can be named.
+        Its elements, springs, groups and point masses.
     source : object
         The options it was built from (`fe.model_file`), for effects that build it anew; None for a model without.
-    places : mapping of Dof to int
-        Row of each DOF among all; made here.
+    full_indices : mapping of Dof to int
+        Row of each DOF in the matrices of all DOFs; made here.
 
     Raises
     ------
@@ -120,12 +120,12 @@ class StructuralModel:
     geometry: Geometry
     parts: tuple[Part, ...] = ()
     source: object = None
-    places: Mapping[Dof, int] = field(init=False, repr=False)
+    full_indices: Mapping[Dof, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         n_all = len(self.all_dofs)
-        object.__setattr__(self, "places", {dof: place for place, dof in enumerate(self.all_dofs)})
-        if len(self.places) < n_all:
+        object.__setattr__(self, "full_indices", {dof: index for index, dof in enumerate(self.all_dofs)})
+        if len(self.full_indices) < n_all:
             raise InputError(f"the model '{self.name}' names a DOF twice")
         for name in ("mass_all", "stiffness_all", "damping_all"):
             if getattr(self, name).shape != (n_all, n_all):
@@ -140,19 +140,19 @@ class StructuralModel:
     @property
     def mass(self) -> Matrix:
         """(n, n) mass matrix of the free DOFs."""
-        return self._free(self.mass_all)
+        return self._free_block(self.mass_all)
 
     @property
     def stiffness(self) -> Matrix:
         """(n, n) stiffness matrix of the free DOFs."""
-        return self._free(self.stiffness_all)
+        return self._free_block(self.stiffness_all)
 
     @property
     def damping(self) -> Matrix:
         """(n, n) viscous damping matrix of the free DOFs, without the modal damping."""
-        return self._free(self.damping_all)
+        return self._free_block(self.damping_all)
 
-    def place(self, dof: Dof) -> int:
+    def full_index(self, dof: Dof) -> int:
         """Row of a DOF among all, the held ones included.
 
         Parameters
@@ -171,9 +171,9 @@ class StructuralModel:
             If the model has no such DOF.
         """
         try:
-            return self.places[dof.unsigned]
+            return self.full_indices[dof.unsigned]
         except KeyError:
-            raise InputError(self._unknown(dof)) from None
+            raise InputError(self._missing_dof_message(dof)) from None
 
     def index(self, dof: Dof) -> int:
         """Row of a DOF among the free ones.
@@ -193,22 +193,22 @@ class StructuralModel:
         InputError
             If the model has no such DOF, or holds it.
         """
-        place = self.place(dof)
-        if self.fixed[place]:
+        index = self.full_index(dof)
+        if self.fixed[index]:
             raise InputError(
                 f"the DOF {dof.name} is held in the model '{self.name}', so nothing moves there: "
                 "use another DOF, or free that support in the model"
             )
-        return int(np.count_nonzero(~self.fixed[:place]))
+        return int(np.count_nonzero(~self.fixed[:index]))
 
-    def _free(self, matrix: Matrix) -> Matrix:
+    def _free_block(self, matrix: Matrix) -> Matrix:
         if not self.fixed.any():
             return matrix
-        keep = np.flatnonzero(~self.fixed)
-        return matrix[keep][:, keep]
+        free = np.flatnonzero(~self.fixed)
+        return matrix[free][:, free]
 
-    def _unknown(self, dof: Dof) -> str:
-        directions = [other.direction for other in self.all_dofs if other.node == dof.node]
+    def _missing_dof_message(self, dof: Dof) -> str:
+        directions = [known.direction for known in self.all_dofs if known.node == dof.node]
         if directions:
             return (
                 f"node {dof.node} of the model '{self.name}' has no DOF '{dof.direction}'; "
@@ -240,7 +240,7 @@ class ReducedModel:
     residual_dofs : tuple of Dof
         DOFs whose residual flexibility is in the basis.
     choices : tuple of str
-        What the program chose by itself, in words.
+        What the program chose by itself, as sentences.
     dashpots : (r, r) array
         The part of `damping` that the full model states as a matrix beside damping ratios of its modes; (0, 0) where it
         does not state both.
@@ -284,9 +284,9 @@ class ReducedModel:
             If the DOF is not among the expanded ones.
         """
         try:
-            place = self.expanded_dofs.index(dof.unsigned)
+            row = self.expanded_dofs.index(dof.unsigned)
         except ValueError:
             raise InputError(
                 f"the reduced model does not know the DOF {dof.name}; add it to [predict] points"
             ) from None
-        return np.asarray(dof.sign * self.expansion[place])
+        return np.asarray(dof.sign * self.expansion[row])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
 
 CLASS_NAME = re.compile(r"(?:[A-Z][a-z]+){2,}")  # a dataclass that is a branch of a union
-FIRST_TO_SAY = ("unexpected_keyword_argument", "missing")
+REPORTED_FIRST = ("unexpected_keyword_argument", "missing")
 
 Options = TypeVar("Options")
 
@@ -98,11 +98,11 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     Parameters
     ----------
     table : mapping
-        What was read.
+        Content of the file.
     options_type : type
         The dataclass.
     path : Path
-        Where it came from, for the message.
+        The file, for the message.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     Raises
     ------
     FileFormatError
-        On the first thing that does not fit.
+        On the first key or value that does not fit.
     """
     try:
         return TypeAdapter(options_type).validate_python(dict(table))
@@ -124,7 +124,7 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
 
 def _rank(error: Any) -> int:
     """Name an unknown key first: the key that is missing is most often the one that was meant."""
-    return FIRST_TO_SAY.index(error["type"]) if error["type"] in FIRST_TO_SAY else len(FIRST_TO_SAY)
+    return REPORTED_FIRST.index(error["type"]) if error["type"] in REPORTED_FIRST else len(REPORTED_FIRST)
 
 
 def _key_text(part: int | str) -> str:
@@ -145,8 +145,8 @@ def _explain(error: Any, options_type: type) -> str:
     if error["type"] in {"missing", "missing_argument", "missing_keyword_only_argument"}:
         return f"the key '{error['loc'][-1]}' is missing"
     message = str(error["msg"]).removeprefix("Value error, ")
-    given = error.get("input")
-    return f"{message[:1].lower()}{message[1:]}; given is {given!r}"
+    value = error.get("input")
+    return f"{message[:1].lower()}{message[1:]}; given is {value!r}"
 
 
 def _dataclass_at(options_type: Any, location: tuple[int | str, ...]) -> Any:
@@ -162,4 +162,4 @@ def _dataclass_at(options_type: Any, location: tuple[int | str, ...]) -> Any:
 def _inner_dataclass(hint: Any) -> Any:
     if is_dataclass(hint):
         return hint
-    return next((found for argument in get_args(hint) if (found := _inner_dataclass(argument))), None)
+    return next((inner for argument in get_args(hint) if (inner := _inner_dataclass(argument))), None)

@@ -57,7 +57,7 @@ def test_the_matrix_has_holes_where_nothing_was_measured():
 
 
 def test_lines_and_frfs_can_be_picked():
-    frfs = frf_set().lines(FREQUENCY > 2).frfs([2, 0])
+    frfs = frf_set().select_lines(FREQUENCY > 2).select_frfs([2, 0])
     assert frfs.n_lines == 3
     assert [label.input_dof.node for label in frfs.labels] == [9, 8]
     assert frfs.averages.tolist() == [4, 3]

@@ -36,9 +36,9 @@ def test_held_dofs_stay_in_the_matrices_of_all_dofs():
 
 def test_places_count_all_dofs_and_indices_the_free_ones():
     model = beam(elements=3, left="clamped", right="pinned")
-    assert model.place(Dof(4, "ry", -1)) == 7
+    assert model.full_index(Dof(4, "ry", -1)) == 7
     assert model.index(Dof(4, "ry", -1)) == 4
-    assert model.place(Dof(1, "z")) == 0
+    assert model.full_index(Dof(1, "z")) == 0
 
 
 @pytest.mark.parametrize(

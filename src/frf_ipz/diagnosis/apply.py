@@ -88,7 +88,7 @@ def corrector(
 
 def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
     """Put the spring and the damper that stand for a force law into a model."""
-    places = [model.place(end) for end in reversed(law.ends)]
+    places = [model.full_index(end) for end in reversed(law.ends)]
     signs = [1.0, -1.0][: len(places)]
     across = sparse.csr_array((signs, ([0] * len(places), places)), shape=(1, len(model.all_dofs)))
     pair = across.T @ across
@@ -102,7 +102,7 @@ def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
 def _specimen(model: StructuralModel, curves: Curves) -> ModelContext:
     """Gather what effects may know, as it was when they were searched for."""
     layout = lay_out(curves.labels)
-    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     highest = float(curves.s.imag.max())
     return ModelContext(
         basis=make_basis(model, highest, places),

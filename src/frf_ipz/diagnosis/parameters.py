@@ -76,7 +76,7 @@ def diagnosed_basis(
         stiffness=slopes[:, 2],
         logarithmic=np.zeros(len(moving), bool),
         terms=(PriorTerm(name="what was found", root=np.eye(len(moving)), std=PRIOR),),
-        chosen=True,
+        is_from_diagnosis=True,
     )
 
 

@@ -112,7 +112,7 @@ def with_springs(model: StructuralModel, stiffness: Mapping[Dof, float]) -> Stru
     InputError
         If the model lacks a DOF.
     """
-    places = np.array([model.place(dof) for dof in stiffness], dtype=np.int64)
+    places = np.array([model.full_index(dof) for dof in stiffness], dtype=np.int64)
     added = assemble([(places, np.diag(list(stiffness.values())))], len(model.all_dofs))
     return replace(model, stiffness_all=model.stiffness_all + added)
 
@@ -247,7 +247,7 @@ def _parts(model: StructuralModel, kind: str, names: Sequence[str]) -> list[Part
 def _point_mass(model: StructuralModel, node: int, mass_kg: float) -> Part:
     if mass_kg < 0:
         raise InputError(f"the mass at node {node} is {mass_kg:g} kg; give 0 or more")
-    places = [place for dof, place in model.places.items() if dof.node == node and dof.direction in TRANSLATIONS]
+    places = [place for dof, place in model.full_indices.items() if dof.node == node and dof.direction in TRANSLATIONS]
     if not places:
         nodes = model.geometry.nodes
         raise InputError(
@@ -265,7 +265,7 @@ def _point_mass(model: StructuralModel, node: int, mass_kg: float) -> Part:
 
 
 def _held_places(model: StructuralModel, dofs: Sequence[Dof]) -> IntArray:
-    places = np.array([model.place(dof) for dof in dofs], dtype=np.int64)
+    places = np.array([model.full_index(dof) for dof in dofs], dtype=np.int64)
     for dof, place in zip(dofs, places, strict=True):
         if not model.fixed[place]:
             raise InputError(f"the DOF {dof.name} of the model '{model.name}' is not held, so it cannot be released")

@@ -150,7 +150,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
             f"only {int(used.sum())} usable frequency lines are left in the band {band[0]:g} to {band[1]:g} Hz; "
             f"a fit needs {FEWEST_LINES}: set a wider [fit] band_hz or a finer frequency resolution"
         )
-    lines = frfs.lines(used)
+    lines = frfs.select_lines(used)
     powers = np.array([label.quantity.power for label in frfs.labels])
     if not known.all():  # once more in the band alone: what lies outside may be of another size
         noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])

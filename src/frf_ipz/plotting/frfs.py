@@ -25,7 +25,7 @@ def plot_frfs(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     frfs : FrfSet
-        The FRFs; ``frfs.frfs([0, 3])`` and ``frfs.lines(...)`` choose.
+        The FRFs; ``frfs.select_frfs([0, 3])`` and ``frfs.select_lines(...)`` choose.
     ax : Axes, optional
         Where to draw.
 
@@ -106,7 +106,7 @@ def plot_fit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     Axes
         With the picture.
     """
-    ax, used = axes_or_new(ax), frfs.lines(fit.used_lines)
+    ax, used = axes_or_new(ax), frfs.select_lines(fit.used_lines)
     fitted = np.abs(fit.model(used.s))
     for place, label in enumerate(used.labels):
         points = {"color": colour(place), "markersize": 2, "alpha": 0.5, "rasterized": used.n_lines > 20_000}
@@ -136,7 +136,7 @@ def plot_misfit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     Axes
         With the picture.
     """
-    ax, used = axes_or_new(ax), frfs.lines(fit.used_lines)
+    ax, used = axes_or_new(ax), frfs.select_lines(fit.used_lines)
     misfit, noise = np.abs(fit.model(used.s) - used.values), np.sqrt(used.variance)
     for place, label in enumerate(used.labels):
         ax.semilogy(used.frequency_hz, misfit[:, place], color=colour(place), linewidth=0.8, label=str(label))

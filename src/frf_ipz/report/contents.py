@@ -76,7 +76,7 @@ class RunContents:
     @property
     def is_lumped(self) -> bool:
         """The model is made of springs: its geometry is a row of masses, not positions."""
-        return self.geometry is not None and self.geometry.is_a_row
+        return self.geometry is not None and self.geometry.is_schematic
 
     @property
     def frfs(self) -> FrfSet | None:

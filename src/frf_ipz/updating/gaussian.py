@@ -193,12 +193,12 @@ def most_likely_scales(
     (t,) array
         Standard deviations; those without doubt as they were.
     """
-    free = np.array([term.doubt > 0 for term in terms])
+    free = np.array([term.scale_uncertainty > 0 for term in terms])
     if not free.any() or not len(data):
         return start
     covariances = np.array([part @ part.T for part in parts])
     believed = np.log([term.std for term in terms])
-    doubt = np.array([term.doubt for term in terms])
+    doubt = np.array([term.scale_uncertainty for term in terms])
 
     def cost(logs: FloatArray) -> tuple[float, FloatArray]:
         everything = np.log(start)

@@ -36,7 +36,7 @@ REST_STD = 0.005  # of a relative change that no part expresses, beside parts
 FREE_STD = 0.05  # of the same where the model has no parts
 SENSOR_KG = 2e-3  # of the mass of a sensor that the model knows nothing of: accelerometers weigh some grams
 MASS_STD = 0.02  # masses are known better than stiffness
-DOUBT = 1.0  # standard deviation of the logarithm of each of these: the data may ask for larger or smaller ones
+SCALE_UNCERTAINTY = 1.0  # standard deviation of the logarithm of each of these: the data may ask for others
 SAME_PLACE = 1e-9  # two parts at one place differ by this much of their variance, so that it has a root
 MAX_FREE_MODES = 24  # a change among higher modes hardly moves what was measured
 
@@ -53,14 +53,14 @@ class PriorTerm:
         Its covariance is ``std**2 root root^T``.
     std : float
         Standard deviation before the data are seen.
-    doubt : float
+    scale_uncertainty : float
         Standard deviation of the logarithm of `std`; 0 fixes it.
     """
 
     name: str
     root: FloatArray
     std: float
-    doubt: float = DOUBT
+    scale_uncertainty: float = SCALE_UNCERTAINTY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,7 +80,7 @@ class ParameterBasis:
         Their sum is the prior; its mean is 0.
     regions : tuple of Region
         Where parameters that belong to a place sit: those of the first `len(regions)` parameters.
-    chosen : bool
+    is_from_diagnosis : bool
         True where a diagnosis has named these very parameters; only then do methods with generic parameters of their
         own use them instead.
 
@@ -97,7 +97,7 @@ class ParameterBasis:
     logarithmic: BoolArray
     terms: tuple[PriorTerm, ...]
     regions: tuple[Region, ...] = ()
-    chosen: bool = False
+    is_from_diagnosis: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -236,7 +236,7 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
         logarithmic=np.concatenate([first.logarithmic, second.logarithmic]),
         terms=tuple(terms),
         regions=first.regions,
-        chosen=first.chosen or second.chosen,
+        is_from_diagnosis=first.is_from_diagnosis or second.is_from_diagnosis,
     )
 
 

@@ -89,7 +89,7 @@ def motion_of_all_dofs(full: StructuralModel, model: ReducedModel) -> tuple[Floa
     """
     motion = np.zeros((len(full.all_dofs), len(model.dofs)))
     known = full.fixed.copy()
-    places = np.array([full.place(dof) for dof in model.expanded_dofs], int)
+    places = np.array([full.full_index(dof) for dof in model.expanded_dofs], int)
     motion[places] = model.expansion
     known[places] = True
     return motion, known

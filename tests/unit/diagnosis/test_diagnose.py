@@ -181,7 +181,7 @@ def test_an_effect_that_is_not_known_is_refused(nominal):
 def test_a_sensor_that_the_model_lacks_is_refused(nominal):
     frfs = measured(nominal)
     elsewhere = tuple(FrfLabel(Dof(99, "z"), label.input_dof, label.quantity) for label in frfs.labels[:1])
-    bad = replace(frfs.frfs([0]), labels=elsewhere)
+    bad = replace(frfs.select_frfs([0]), labels=elsewhere)
     with pytest.raises(InputError, match="99"):
         diagnose(nominal, observed(bad), FEW)
 

@@ -37,7 +37,7 @@ DIFFERENCE = 0.03  # relative: that damping follows frequency is left out of the
 
 def specimen_of(model, names):
     layout = lay_out(names)
-    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     options = DiagnoseOptions()
     return ModelContext(
         basis=make_basis(model, 2 * np.pi * BAND_HZ[1], places),
@@ -86,7 +86,7 @@ def test_coupling_spring_on_a_frame(tmp_path):
     names = labels(("3:+x", "1:-x"), ("2:+x",))
     stiffness = 3e5
     wide = model.stiffness_all.toarray()
-    ends = [model.place(Dof(node, "x")) for node in (1, 3)]
+    ends = [model.full_index(Dof(node, "x")) for node in (1, 3)]
     wide[np.ix_(ends, ends)] += stiffness * np.array([[1, -1], [-1, 1]])
     expected = damped_frfs(model, wide, model.mass_all.toarray(), names)
     assert_same(changed_frfs(model, "coupling_spring", (1, 3, "x"), [stiffness], names), expected, REDUCED)

@@ -60,7 +60,7 @@ def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
     laws = Laws("explained")
     found = beside(nominal, frfs, ("added_mass",), laws)
     (given, _), (law, cause) = laws.given[0], found
-    place = nominal.place(Dof(12, "z"))
+    place = nominal.full_index(Dof(12, "z"))
     added = given.mass_all.toarray()[place, place] - nominal.mass_all.toarray()[place, place]
     assert added == pytest.approx(MASS_KG, rel=SEEN)
     assert law.verdict == "explained"

@@ -41,7 +41,7 @@ def model_of(folder, *, thickness_m=0.01, formulation="euler-bernoulli"):
 
 def nuisance_of(model, top_hz):
     label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(12, "z"), quantity=FrfQuantity.ACCELERANCE)
-    places = [model.place(label.output_dof), model.place(label.input_dof)]
+    places = [model.full_index(label.output_dof), model.full_index(label.input_dof)]
     basis = make_basis(model, 2 * np.pi * top_hz, places)
     return make_nuisance(basis, lay_out([label]), DiagnoseOptions())
 

@@ -27,7 +27,7 @@ ROUGHLY, EXACTLY = 0.05, 0.01  # relative: amplitudes of the first look are a fa
 def bench(tmp_path_factory):
     nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
     motion = np.zeros(len(nominal.all_dofs))
-    motion[[nominal.places[Dof(node, "z")] for node in ENDS]] = 1.0, -1.0
+    motion[[nominal.full_indices[Dof(node, "z")] for node in ENDS]] = 1.0, -1.0
     added = STIFFNESS_N_M * np.outer(motion, motion)
     true = replace(nominal, stiffness_all=sparse.csr_array(nominal.stiffness_all + added))
     return bench_of(nominal, measured(true, labels(outputs=("25:+z", "10:-z"))), ("coupling_spring",))

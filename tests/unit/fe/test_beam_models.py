@@ -113,7 +113,7 @@ def test_at_nodes_the_deflection_is_the_nodes_own(formulation):
     model = beam(elements=7, formulation=formulation)
     for node, x in zip(model.geometry.nodes, model.geometry.coordinates_m[:, 0], strict=True):
         expected = np.zeros(16)
-        expected[model.place(Dof(int(node), "z"))] = 1.0
+        expected[model.full_index(Dof(int(node), "z"))] = 1.0
         assert_allclose(deflection_row(model, float(x)), expected, rtol=0, atol=1e-9)
 
 

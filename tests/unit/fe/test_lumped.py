@@ -60,7 +60,7 @@ def test_masses_stand_in_a_row_and_springs_are_lines(tmp_path):
     assert geometry.nodes.tolist() == [0, 1, 9]
     assert geometry.coordinates_m[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert geometry.lines.tolist() == [[0, 1], [1, 9]]
-    assert geometry.is_a_row
+    assert geometry.is_schematic
 
 
 def test_rayleigh_damping_adds_to_the_dampers(tmp_path):

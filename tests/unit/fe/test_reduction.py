@@ -182,7 +182,7 @@ def test_viscous_damping_goes_through_the_same_basis(tmp_path):
 
 def test_a_strong_damper_bends_the_shapes():
     held = beam(left="clamped", elements=20, modal_ratio=0.005)
-    place = held.place(Dof(13, "z"))
+    place = held.full_index(Dof(13, "z"))
     damper = sparse.csr_array(([STRONG_NS_M], ([place], [place])), shape=held.damping_all.shape)
     damped = replace(held, damping_all=sparse.csr_array(held.damping_all + damper))
     found, whole = model_poles(reduce(damped)), model_poles(damped)

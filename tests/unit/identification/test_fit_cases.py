@@ -247,14 +247,14 @@ def test_residues_of_a_single_frf_with_poles_held():
     truth = random_modes(SPREAD, 0.002, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     drifted = replace(truth, frequency_hz=SPREAD * (1 + 2e-4))
-    last = accelerances(drifted, LINES_HZ, seed=SEED + 1).frfs([5])
+    last = accelerances(drifted, LINES_HZ, seed=SEED + 1).select_frfs([5])
     fit = fit_residues(last, truth.poles, FitOptions())
     np.testing.assert_array_equal(poles_of(fit), truth.poles)
     assert len(fit.warnings) == 1
     assert "off the given poles" in fit.warnings[0]
     assert float(fit.warnings[0].split(";")[0].split()[-1]) == pytest.approx(200, rel=0.05)
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.05
-    steady = fit_residues(frfs.frfs([5]), truth.poles, FitOptions())
+    steady = fit_residues(frfs.select_frfs([5]), truth.poles, FitOptions())
     assert steady.warnings == ()
     assert np.sqrt(np.mean(steady.misfit["ratio"] ** 2)) < 1.05
 
@@ -263,7 +263,9 @@ def test_drift_between_frfs_is_said():
     truth = random_modes(SPREAD, 0.001, seed=SEED)
     drift = np.linspace(-1e-4, 1e-4, 12)
     columns = [
-        accelerances(replace(truth, frequency_hz=SPREAD * (1 + change)), LINES_HZ, seed=SEED + k).frfs([k]).values
+        accelerances(replace(truth, frequency_hz=SPREAD * (1 + change)), LINES_HZ, seed=SEED + k)
+        .select_frfs([k])
+        .values
         for k, change in enumerate(drift)
     ]
     frfs = accelerances(truth, LINES_HZ, seed=SEED)

@@ -65,7 +65,7 @@ def test_errors_of_gains_are_as_large_as_said():
 
 def test_two_channels_that_record_the_same():
     frfs = measured()
-    second = frfs.frfs([8, 9])
+    second = frfs.select_frfs([8, 9])
     labels = tuple(replace(label, output_channel="second") for label in second.labels)
     rng = np.random.default_rng(3)
     noise = (rng.standard_normal(second.values.shape) + 1j * rng.standard_normal(second.values.shape)) / np.sqrt(2)

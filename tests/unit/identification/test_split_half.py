@@ -49,7 +49,7 @@ def on_even_lines(frfs, others):
 
 def halves_of(frfs, options):
     number = np.arange(frfs.n_lines)
-    return [fit_modes(frfs.lines(number % 2 == half), options) for half in range(2)]
+    return [fit_modes(frfs.select_lines(number % 2 == half), options) for half in range(2)]
 
 
 def partners(first, second):

@@ -30,7 +30,7 @@ def test_frfs_are_drawn_on_the_axes_of_the_caller(results):
 
 def test_the_fitted_curve_is_that_of_the_model(results):
     frfs, fit = results["ingest"].frfs, results["fit"]
-    used = frfs.lines(fit.used_lines)
+    used = frfs.select_lines(fit.used_lines)
     drawn = curve(plot_fit(frfs, fit), str(frfs.labels[0])).get_ydata()
     np.testing.assert_array_equal(drawn, np.abs(fit.model(used.s)[:, 0]))
 

@@ -70,5 +70,5 @@ def test_without_parts_the_flexibility_is_drawn(run):
 
 def test_a_model_of_springs_has_masses_in_a_row(run):
     assert not run.is_lumped
-    assert replace(run, geometry=replace(run.geometry, is_a_row=True)).is_lumped
+    assert replace(run, geometry=replace(run.geometry, is_schematic=True)).is_lumped
     assert len(parts_of(synthetic_folder().results["model"])) == len(run.parts)

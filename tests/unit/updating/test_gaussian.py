@@ -74,7 +74,7 @@ def test_the_likely_scales_have_the_largest_evidence():
 def test_a_scale_without_doubt_stays():
     parts = [np.eye(4), np.ones((4, 1))]
     terms = [
-        PriorTerm(name="sure", root=np.eye(4), std=0.2, doubt=0.0),
+        PriorTerm(name="sure", root=np.eye(4), std=0.2, scale_uncertainty=0.0),
         PriorTerm(name="open", root=np.eye(1), std=0.2),
     ]
     found = most_likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))

@@ -148,7 +148,7 @@ def test_the_mass_of_a_sensor_is_found():
     """What a test adds to every structure: without it the stiffness has to make up for it, and is wrong."""
     case = make_update_case(21)
     sensor, grams = case.structure.sensors[0], 3e-3
-    place = case.structure.nominal_model.place(sensor)
+    place = case.structure.nominal_model.full_index(sensor)
     added = np.zeros(case.structure.nominal_model.mass_all.shape)
     added[place, place] = grams
     real = replace(
@@ -177,7 +177,7 @@ def chosen_parameters(case, elements):
         logarithmic=np.array([True]),
         terms=(PriorTerm(name="the stretch", root=np.eye(1), std=0.5),),
         regions=(replace(regions[elements[0]], stiffness=stiffness[0]),),
-        chosen=True,
+        is_from_diagnosis=True,
     )
 
 

@@ -79,7 +79,7 @@ class ModelContext:
     def unit(self, dof: Dof) -> FloatArray:
         """Motion of one DOF, (n_all,) array."""
         motion = np.zeros(len(self.model.all_dofs))
-        motion[self.model.place(dof)] = 1.0
+        motion[self.model.full_index(dof)] = 1.0
         return motion
 
     def stiffness_against(self, motion: FloatArray) -> float:

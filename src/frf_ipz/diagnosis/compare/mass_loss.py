@@ -80,7 +80,7 @@ def _mass_there(model: StructuralModel, directions: Sequence[str], nodes: Sequen
     """Largest masses that could be taken from nodes with the mass matrix still positive, ``1 / (M^-1)_uu``, kg."""
     free = np.flatnonzero(~model.fixed)
     number = {int(row): place for place, row in enumerate(free)}
-    rows = {(dof.node, dof.direction): number[row] for dof, row in model.places.items() if row in number}
+    rows = {(dof.node, dof.direction): number[row] for dof, row in model.full_indices.items() if row in number}
     loads = np.zeros((len(free), len(nodes)))
     wanted = [rows[int(str(node)), direction] for node, direction in zip(nodes, directions, strict=True)]
     loads[wanted, np.arange(len(wanted))] = 1.0

@@ -170,7 +170,7 @@ def set_up(
         If the model lacks a DOF that was measured.
     """
     layout = lay_out(source.training.labels)
-    places = [model.place(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     basis = make_basis(model, 2 * np.pi * band_hz[1], places)
     nuisance = make_nuisance(basis, layout, options)
     coarse, middle = source.coarse, source.middle

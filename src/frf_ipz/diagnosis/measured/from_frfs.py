@@ -75,7 +75,7 @@ def survey_frfs(frfs: FrfSet, band_hz: tuple[float, float]) -> FrfSurvey:
     InputError
         If the band has too few lines.
     """
-    inside = frfs.lines(frfs.in_band(band_hz) & (frfs.frequency_hz > 0))
+    inside = frfs.select_lines(frfs.in_band(band_hz) & (frfs.frequency_hz > 0))
     if inside.n_lines < MIN_LINES:
         raise InputError(
             f"the band {band_hz[0]:g} to {band_hz[1]:g} Hz has {inside.n_lines} lines; a diagnosis needs at least "

@@ -66,7 +66,7 @@ def estimate_finer_frfs(observations: Observations, frfs: FrfSet) -> FrfSet:
     factor = refinement_factor(len(in_band))
     spacing = float(frfs.frequency_hz[1] - frfs.frequency_hz[0])
     length = round(1 / (spacing * observations.records[0].step_s))
-    lines = frfs.lines(np.repeat(in_band, factor))
+    lines = frfs.select_lines(np.repeat(in_band, factor))
     combs = [_estimate_comb(observations, frfs.labels, length, in_band, part / factor) for part in range(factor)]
     frequency = frfs.frequency_hz[in_band, None] + spacing * np.arange(factor) / factor
     noise = lines.variance * np.repeat(combs[0].force, factor, axis=0) / _interleave([comb.force for comb in combs])

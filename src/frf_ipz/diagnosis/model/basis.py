@@ -204,7 +204,7 @@ def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
 
 
 def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:
-    rows = [row for dof, row in basis.model.places.items() if dof.node in nodes and not basis.model.fixed[row]]
+    rows = [row for dof, row in basis.model.full_indices.items() if dof.node in nodes and not basis.model.fixed[row]]
     loads = np.zeros((len(basis.model.all_dofs), len(rows)))
     loads[rows, np.arange(len(rows))] = 1.0
     return loads

@@ -114,7 +114,7 @@ def motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
         A single entry.
     """
     row = np.zeros(len(model.all_dofs))
-    row[model.place(dof)] = dof.sign
+    row[model.full_index(dof)] = dof.sign
     return row
 
 
@@ -186,15 +186,15 @@ def _shift_row(model: StructuralModel, dof: Dof, axis: str) -> FloatArray:
         return slope_row(model, float(position[0]))
     row = np.zeros(len(model.all_dofs))
     rotation, sign = ROTATION[dof.direction, axis]
-    if Dof(dof.node, rotation) in model.places:
-        row[model.places[Dof(dof.node, rotation)]] = sign
+    if Dof(dof.node, rotation) in model.full_indices:
+        row[model.full_indices[Dof(dof.node, rotation)]] = sign
         return row
     return _from_neighbours(model, dof, AXES.index(axis))
 
 
 def _from_neighbours(model: StructuralModel, dof: Dof, axis: int) -> FloatArray:
     """Slope of a plane through the motion of the nearest nodes."""
-    rows = [place for other, place in model.places.items() if other.direction == dof.direction]
+    rows = [place for other, place in model.full_indices.items() if other.direction == dof.direction]
     nodes = np.array([model.all_dofs[row].node for row in rows])
     places = model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, nodes)]
     here = places[nodes == dof.node][0]

@@ -214,7 +214,7 @@ def _geometry(lumped: LumpedOptions, nodes: list[int]) -> Geometry:
         coordinates_m=coordinates,
         lines=np.array([spring.nodes for spring in lumped.spring], dtype=np.int64).reshape(-1, 2),
         supports={node: "ground" for node in nodes if node == GROUND},
-        is_a_row=True,
+        is_schematic=True,
     )
 
 

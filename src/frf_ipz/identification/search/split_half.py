@@ -110,7 +110,7 @@ def find_support(frfs: FrfSet, fitted: Fitted, options: FitOptions) -> Support |
     advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * fitted.delay_s))
     options = replace(options, band_hz=fitted.lines.band_hz, delay=False)
     numbers = np.arange(frfs.n_lines)
-    halves = [_half(advanced.lines(numbers % HALVES == number), options) for number in range(HALVES)]
+    halves = [_half(advanced.select_lines(numbers % HALVES == number), options) for number in range(HALVES)]
     poles = fitted.fit.poles
     partners = np.stack([_partners(poles, half.poles) for half in halves])
     both = (partners >= 0).all(axis=0)

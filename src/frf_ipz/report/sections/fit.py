@@ -54,7 +54,7 @@ def build(run: RunContents) -> Section | None:
     fit, frfs = run.fit, run.frfs
     if fit is None or frfs is None:
         return None
-    used = frfs.lines(fit.used_lines)
+    used = frfs.select_lines(fit.used_lines)
     fitted = fit.model(used.s)
     misfit = np.linalg.norm(fitted - used.values) / max(float(np.linalg.norm(used.values)), np.finfo(float).tiny)
     lead = f"The fitted curves differ from the measured ones by {number(100 * float(misfit), 3)} % of their norm."

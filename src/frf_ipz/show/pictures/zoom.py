@@ -50,7 +50,7 @@ def zoomed_traces(run: RunContents, stretch_hz: tuple[float, float], shown: Sequ
     inside[max(int(first) - 1, 0) : int(last) + 1] = True
     if np.count_nonzero(inside) < 2:
         raise InputError(f"no lines were measured from {stretch_hz[0]:g} to {stretch_hz[1]:g} Hz")
-    part = replace(recordings, frfs=recordings.frfs.frfs(shown).lines(inside))
+    part = replace(recordings, frfs=recordings.frfs.select_frfs(shown).select_lines(inside))
     section = frf_section.build(replace(run, recordings=part, fit=None))
     (picture,) = pictures_of([] if section is None else [section])
     return [{axis: _numbers(trace[axis]) for axis in ("x", "y")} for trace in picture.traces]

@@ -60,7 +60,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     """
     if not len(problem.values):
         return nothing_to_do(problem.model, "ipz")
-    if problem.basis is not None and problem.basis.chosen:
+    if problem.basis is not None and problem.basis.is_from_diagnosis:
         return _with_parameters(problem, problem.basis, options)
     model, frfs, left_out = problem.model, *_usable_frfs(problem)
     result = _phase(problem, model, frfs, options, progress, damping=False)

@@ -10,7 +10,7 @@ known better.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -301,13 +301,11 @@ def _chosen(basis: ParameterBasis, inner: ModalFrame, dashpots: FloatArray) -> t
     matrices = [*inner.inside(basis.damping[own]), *([dashpots] if np.any(dashpots) else [])]
     places = np.eye(len(matrices))
     count = int(own.sum())
-    terms = [
-        PriorTerm(name=term.name, root=places[:, :count] @ term.root[own], std=term.std, doubt=term.doubt)
-        for term in basis.terms
-        if np.any(term.root[own])
-    ]
+    terms = [replace(term, root=places[:, :count] @ term.root[own]) for term in basis.terms if np.any(term.root[own])]
     if len(matrices) > count:
-        terms.append(PriorTerm(name="a factor on the dampers", root=places[:, count:], std=DASHPOT_STD, doubt=0.0))
+        terms.append(
+            PriorTerm(name="a factor on the dampers", root=places[:, count:], std=DASHPOT_STD, scale_uncertainty=0.0)
+        )
     return np.reshape(matrices, (len(matrices), *dashpots.shape)), tuple(terms)
 
 
@@ -317,11 +315,16 @@ def _make_terms(order: int, extra: int, chosen: tuple[PriorTerm, ...]) -> tuple[
     own = 1 + order + couplings
     places = np.eye(own + extra)
     terms = [
-        PriorTerm(name="a factor on the damping", root=places[:, :1], std=COMMON_STD, doubt=0.0),
-        PriorTerm(name="damping of each mode", root=places[:, 1 : 1 + order], std=MODE_STD, doubt=0.7),
-        PriorTerm(name="coupling of modes by damping", root=places[:, 1 + order : own], std=COUPLING_STD, doubt=0.0),
+        PriorTerm(name="a factor on the damping", root=places[:, :1], std=COMMON_STD, scale_uncertainty=0.0),
+        PriorTerm(name="damping of each mode", root=places[:, 1 : 1 + order], std=MODE_STD, scale_uncertainty=0.7),
+        PriorTerm(
+            name="coupling of modes by damping",
+            root=places[:, 1 + order : own],
+            std=COUPLING_STD,
+            scale_uncertainty=0.0,
+        ),
     ]
     for term in chosen:
         root = np.vstack([np.zeros((own, term.root.shape[1])), term.root])
-        terms.append(PriorTerm(name=term.name, root=root, std=term.std, doubt=term.doubt))
+        terms.append(replace(term, root=root))
     return tuple(terms)

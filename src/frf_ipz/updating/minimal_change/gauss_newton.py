@@ -22,7 +22,7 @@ STILL = 0.03  # prior standard deviations that no parameter moved by: the optimu
 MET = 0.1  # of the number of targets: a misfit so far below what noise makes needs no further step
 MAX_HALVINGS = 6
 CURVATURE = 0.5  # of the squared error at first, then of what the last linear step did not foresee: taken as noise
-DOUBT = 1.5  # standard deviation of the logarithm of the factor on the slack
+SLACK_UNCERTAINTY = 1.5  # standard deviation of the logarithm of the factor on the slack
 STALLED = 3.0  # times that noise is taken after a step of which no part was any good
 SCALE_ITERATIONS = 3  # iterations that ask the evidence again: later ones would only chase their own change
 
@@ -196,7 +196,12 @@ def iterate(
         Where it ended.
     """
     known = scales is not None
-    terms = (*phase.terms, PriorTerm(name="what no parameter explains", root=np.zeros((0, 0)), std=1.0, doubt=DOUBT))
+    terms = (
+        *phase.terms,
+        PriorTerm(
+            name="what no parameter explains", root=np.zeros((0, 0)), std=1.0, scale_uncertainty=SLACK_UNCERTAINTY
+        ),
+    )
     scales = np.array([term.std for term in terms]) if scales is None else scales.copy()
     whitened = np.zeros(sum(term.root.shape[1] for term in phase.terms)) if start is None else start
     place = _Place(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))

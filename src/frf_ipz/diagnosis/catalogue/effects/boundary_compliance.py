@@ -58,7 +58,7 @@ class BoundaryCompliance(Effect):
         """Release the held DOFs and put springs there."""
         model = specimen.model
         node = model.source.beam.elements + 1 if place.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
-        released = tuple(model.place(Dof(node, way)) for way in _ways(place))
+        released = tuple(model.full_index(Dof(node, way)) for way in _ways(place))
         size = len(model.all_dofs)
 
         def change(values: FloatArray) -> Change:

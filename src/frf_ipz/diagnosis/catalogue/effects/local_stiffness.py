@@ -135,7 +135,7 @@ def _curvature(specimen: ModelContext, place: Place) -> tuple[FloatArray, float]
     first, last = int(str(place.key[1])), int(str(place.key[2]))
     model = specimen.model
     motion = np.zeros(len(model.all_dofs))
-    motion[model.places[Dof(last + 1, "ry")]], motion[model.places[Dof(first, "ry")]] = 1.0, -1.0
+    motion[model.full_indices[Dof(last + 1, "ry")]], motion[model.full_indices[Dof(first, "ry")]] = 1.0, -1.0
     parts = {part.name: part for part in model.parts if part.kind == "element"}
     flexibility = 0.0
     for name in _names(place):
