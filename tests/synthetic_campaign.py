@@ -13,9 +13,9 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
 PAD = 4  # times the record: what the transform is made on
-FORGOTTEN = 24.0  # exp(-24) of the motion wraps around
+WRAPPED = 24.0  # exp(-24) of the motion wraps around
 AT_S = 0.03  # when the hammer touches
-PULSE_S = 0.8e-3  # standard deviation of the pulse: nothing is left of it at half of the sampling rate
+PULSE_S = 0.8e-3  # standard deviation of the pulse: its spectrum vanishes before half of the sampling rate
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Structure:
     """Accelerances of one input and a few outputs by modes."""
 
     frequency_hz: tuple = (31.0, 88.0, 173.0)
-    damping_ratio: tuple = (0.05, 0.02, 0.012)  # 1e-8 of the motion is left after 2 s
+    damping_ratio: tuple = (0.05, 0.02, 0.012)  # 1e-8 of the motion remains after 2 s
     shapes: tuple = ((1.0, 0.7, -0.5), (0.6, -0.8, 0.9))  # residues, one row an output, 1/kg
 
     def accelerance(self, s):
@@ -42,7 +42,7 @@ class Structure:
 def respond(structure, force, step_s):
     """Give the responses to a force from rest, one row an output."""
     n = len(force)
-    sigma = FORGOTTEN / (PAD * n * step_s)
+    sigma = WRAPPED / (PAD * n * step_s)
     window = np.exp(-sigma * np.arange(n) * step_s)
     s = sigma + 2j * np.pi * np.fft.rfftfreq(PAD * n, step_s)
     spectrum = np.fft.rfft(force * window, PAD * n)[:, None] * structure.accelerance(s)
@@ -50,14 +50,14 @@ def respond(structure, force, step_s):
 
 
 def pulse(n_samples, step_s, *, height=100.0, at_s=AT_S, length_s=PULSE_S):
-    """Give the force of one blow."""
+    """Give the force of one impact."""
     time = np.arange(n_samples) * step_s
     return height * np.exp(-0.5 * ((time - at_s) / length_s) ** 2)
 
 
-def impact(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, force=None, **of_pulse):
-    """Give force and responses of one blow, (1 + n_outputs, n_samples)."""
-    force = pulse(n_samples, step_s, **of_pulse) if force is None else force
+def impact(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, force=None, **pulse_options):
+    """Give force and responses of one impact, (1 + n_outputs, n_samples)."""
+    force = pulse(n_samples, step_s, **pulse_options) if force is None else force
     signals = np.vstack([force, respond(structure, force, step_s)])
     if noise:
         signals += noise * rng.standard_normal(signals.shape)
@@ -91,9 +91,9 @@ def channels_toml(n_outputs, *, force_unit="N", unit="m/s^2"):
     return text
 
 
-def write_test(folder, body, *, kind="hammer", n_outputs=2, head="", **of_channels):
+def write_test(folder, body, *, kind="hammer", n_outputs=2, head="", **channel_options):
     """Write `test.toml`."""
-    channels = channels_toml(n_outputs, **of_channels) if kind != "frf" else ""
+    channels = channels_toml(n_outputs, **channel_options) if kind != "frf" else ""
     path = folder / "test.toml"
     path.write_text(f'[test]\nkind = "{kind}"\n{head}\n{channels}\n{body}\n', encoding="utf-8")
     return path
@@ -102,12 +102,12 @@ def write_test(folder, body, *, kind="hammer", n_outputs=2, head="", **of_channe
 HIT = '[[hit]]\ndof = "7:+z"\nfiles = ["hits/*.csv"]\n'
 
 
-def hammer_campaign(folder, *, structure=None, heights=(100.0, 60.0, 150.0), noise=0.0, seed=0, **of_impact):
-    """Write a hammer test with one blow a file, and return the path of `test.toml`."""
+def hammer_campaign(folder, *, structure=None, heights=(100.0, 60.0, 150.0), noise=0.0, seed=0, **impact_options):
+    """Write a hammer test with one impact a file, and return the path of `test.toml`."""
     structure = structure or Structure()
     rng = np.random.default_rng(seed)
-    step_s = of_impact.setdefault("step_s", 1 / 2048)
+    step_s = impact_options.setdefault("step_s", 1 / 2048)
     for number, height in enumerate(heights, start=1):
-        signals = impact(structure, height=height, noise=noise, rng=rng, **of_impact)
+        signals = impact(structure, height=height, noise=noise, rng=rng, **impact_options)
         write_csv(folder / "hits" / f"p7_{number:02d}.csv", signals, step_s)
     return write_test(folder, HIT, n_outputs=structure.n_outputs)

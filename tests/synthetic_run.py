@@ -142,7 +142,7 @@ def recordings_of(truth, labels, band, rng):
             "pulse_s": 8e-4,
             "used": [True, True, False, True, True],
             "weight": [0.3, 0.2, 0.0, 0.3, 0.2],
-            "marks": ["", "", "double hit: 41 % of the pulse 18.7 ms after it", "", "weak blow"],
+            "marks": ["", "", "double hit: 41 % of the pulse 18.7 ms after it", "", "weak impact"],
         }
     )
     time = np.linspace(0, 1, 400)

@@ -1,4 +1,4 @@
-"""CPU time and memory of averaging hammer blows, against pyFRF on the same arrays.
+"""CPU time and memory of averaging impacts of a hammer, against pyFRF on the same arrays.
 
 Run with ``pytest tests/benchmarks --benchmark-only -s``; numbers are CPU seconds of one thread.
 """
@@ -9,9 +9,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from frf_ipz.ingest.spectra import empty_sums, estimate_coherence, estimate_frf
+from frf_ipz.ingest.estimation.spectra import empty_sums, estimate_coherence, estimate_frf
 
-N_BLOWS, N_OUTPUTS, N_SAMPLES, RATE_HZ = 200, 8, 32768, 8192
+N_RECORDS, N_OUTPUTS, N_SAMPLES, RATE_HZ = 200, 8, 32768, 8192
 SAME = 1e-12  # relative to the largest value: both divide the same sums
 FASTER = 2.0  # times
 MOST_BYTES = 60e6  # above the data
@@ -19,26 +19,26 @@ MOST_BYTES = 60e6  # above the data
 
 @pytest.fixture(scope="module")
 def records():
-    """(n_blows, 1 + n_outputs, n_samples): half sines on eight decaying tones, noise on everything."""
+    """(n_records, 1 + n_outputs, n_samples): half sines on eight decaying tones, noise on everything."""
     rng = np.random.default_rng(3)
     time_s = np.arange(N_SAMPLES) / RATE_HZ
     tones = np.exp(-2.0 * time_s) * np.sin(2 * np.pi * np.outer(100.0 + 90.0 * np.arange(N_OUTPUTS), time_s))
     kernels = np.fft.rfft(tones)
-    records = np.empty((N_BLOWS, 1 + N_OUTPUTS, N_SAMPLES))
-    for blow in records:
+    records = np.empty((N_RECORDS, 1 + N_OUTPUTS, N_SAMPLES))
+    for record in records:
         length_s, start_s = 0.8e-3 * (1 + 0.1 * rng.standard_normal()), 0.02 + 0.002 * rng.random()
         inside = (time_s > start_s) & (time_s < start_s + length_s)
-        blow[0] = np.where(inside, 100.0 * np.sin(np.pi * (time_s - start_s) / length_s), 0.0)
-        blow[1:] = np.fft.irfft(kernels * np.fft.rfft(blow[0]), N_SAMPLES)
-        blow[1:] += 0.01 * blow[1:].std(axis=1, keepdims=True) * rng.standard_normal((N_OUTPUTS, N_SAMPLES))
-        blow[0] += 0.02 * rng.standard_normal(N_SAMPLES)
+        record[0] = np.where(inside, 100.0 * np.sin(np.pi * (time_s - start_s) / length_s), 0.0)
+        record[1:] = np.fft.irfft(kernels * np.fft.rfft(record[0]), N_SAMPLES)
+        record[1:] += 0.01 * record[1:].std(axis=1, keepdims=True) * rng.standard_normal((N_OUTPUTS, N_SAMPLES))
+        record[0] += 0.02 * rng.standard_normal(N_SAMPLES)
     return records
 
 
 def average(records):
     sums = empty_sums(N_SAMPLES // 2 + 1, N_OUTPUTS)
-    for blow in records:
-        sums.add(blow[0], blow[1:])
+    for record in records:
+        sums.add(record[0], record[1:])
     return estimate_frf(sums), estimate_coherence(sums)
 
 
@@ -87,8 +87,7 @@ def test_against_pyfrf(benchmark, records):
     benchmark.pedantic(lambda: average(records), rounds=1)
     frf, reference = ours[1][0][1:], theirs[1][0][1:]  # pyFRF divides by zero at 0 Hz
     error = np.abs(frf - reference).max() / np.abs(reference).max()
-    print(
-        f"\n  {N_BLOWS} blows: {ours[0]:.2f} s here, {theirs[0]:.2f} s by pyFRF; FRFs differ by {error:.1e} of the peak"
-    )
+    print(f"\n  {N_RECORDS} records: {ours[0]:.2f} s here, {theirs[0]:.2f} s by pyFRF")
+    print(f"  FRFs differ by {error:.1e} of the peak")
     assert error < SAME
     assert ours[0] * FASTER < theirs[0]

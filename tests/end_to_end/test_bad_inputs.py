@@ -127,7 +127,7 @@ CASES = {
     ),
     "time goes back": (lambda f: edit_blow(f, with_field(50, 0, "0.0")), ["blow_1.csv"]),
     "unequal lengths": (lambda f: edit_blow(f, lambda lines: lines[: len(lines) // 2]), ["blow_1.csv", "samples"]),
-    "no blow found": (without_force, ["blow"]),
+    "no impact found": (without_force, ["no impact found"]),
     "all blows dropped": (
         lambda f: edit(
             f,
@@ -190,7 +190,7 @@ def test_where_all_blows_are_bad_the_least_bad_is_used_and_it_is_said(campaign, 
         command.main()
     said = capsys.readouterr().out
     assert not stop.value.code
-    assert "used although it is bad (clipping of force): no better blow at 15:+z" in " ".join(said.split())
+    assert "used although it is bad (clipping of force): no better record at 15:+z" in " ".join(said.split())
 
 
 def test_out_that_is_a_file(campaign, monkeypatch, capsys):

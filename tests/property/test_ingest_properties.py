@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.estimation.spectra import empty_sums, estimate_coherence, estimate_frf
+from frf_ipz.ingest.estimation.variance import frf_variance
 from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
-from frf_ipz.ingest.spectra import empty_sums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.survey.checks import SECOND_PULSE
-from frf_ipz.ingest.variance import frf_variance
 from synthetic_campaign import HIT, Structure, impact, pulse, write_csv, write_test
 
 FILES = settings(max_examples=30, deadline=None)  # an example writes and reads files
@@ -69,9 +69,9 @@ structures = st.builds(
 @FILES
 @given(structure=structures, decay_1_s=st.floats(6.0, 12.0), at_s=st.floats(0.02, 0.06))
 def test_an_exponential_window_is_taken_back_exactly_for_any_structure(structure, decay_1_s, at_s):
-    """However light the damping: the rest at the end, exp(-sigma T), is all that is lost."""
+    """However light the damping: the remainder at the end, exp(-sigma T), is all that is lost."""
     n_samples = 2048
-    left = np.exp(-decay_1_s * (n_samples * STEP_S - at_s))
+    remainder = np.exp(-decay_1_s * (n_samples * STEP_S - at_s))
     with tempfile.TemporaryDirectory() as folder:
         signals = impact(structure, n_samples=n_samples, step_s=STEP_S, at_s=at_s, length_s=1.6e-3)
         write_csv(Path(folder) / "hits" / "1.csv", signals, STEP_S)
@@ -80,7 +80,7 @@ def test_an_exponential_window_is_taken_back_exactly_for_any_structure(structure
     band = frfs.in_band((5.0, 150.0))
     truth = structure.accelerance(frfs.s[band])
     # a mode's FRF is as high as its decay rate is small, and what is cut off stands against its first swing
-    assert np.abs(frfs.values[band] - truth).max() < (EXACT + 4.0 * left) * np.abs(truth).max()
+    assert np.abs(frfs.values[band] - truth).max() < (EXACT + 4.0 * remainder) * np.abs(truth).max()
 
 
 @FILES
@@ -90,10 +90,10 @@ def test_units_do_not_change_frfs(force, acc):
     values = []
     with tempfile.TemporaryDirectory() as folder:
         for number, (force_unit, unit) in enumerate((("N", "m/s^2"), (force, acc))):
-            own = Path(folder) / str(number)
+            campaign = Path(folder) / str(number)
             scaled = signals / np.array([UNITS["force"][force_unit]] + [UNITS["acc"][unit]] * 2)[:, None]
-            write_csv(own / "hits" / "1.csv", scaled, STEP_S)
-            test = read_test(write_test(own, HIT, force_unit=force_unit, unit=unit))
+            write_csv(campaign / "hits" / "1.csv", scaled, STEP_S)
+            test = read_test(write_test(campaign, HIT, force_unit=force_unit, unit=unit))
             values.append(estimate_frfs(test, IngestOptions(exponential_window_s=0.1)).frfs.values)
     assert np.abs(values[1] - values[0]).max() <= ROUNDING * np.abs(values[0]).max()
 
@@ -104,7 +104,7 @@ def test_units_do_not_change_frfs(force, acc):
     heights=st.lists(st.floats(20.0, 150.0), min_size=6, max_size=6),
     sign=st.sampled_from([-1, 1]),
 )
-def test_every_blow_of_a_file_is_found(gaps, heights, sign):
+def test_every_impact_of_a_file_is_found(gaps, heights, sign):
     at_s = 0.1 + np.concatenate([[0.0], np.cumsum(gaps)])
     n_samples = int((at_s[-1] + 1.0) / STEP_S)
     force = sum(
@@ -131,10 +131,10 @@ pulses = st.builds(
 def test_a_pulse_is_found_whatever_its_scale_and_sign(force, scale, seed):
     force = force + 1e-3 * np.abs(force).max() * np.random.default_rng(seed).standard_normal(4000)
     pulse_ = find_pulse(force, threshold=SECOND_PULSE)
-    other = find_pulse(-scale * force, threshold=SECOND_PULSE)
-    assert pulse_.bumps.size == other.bumps.size == 0
-    assert pulse_.peak == other.peak == np.argmax(np.abs(force))
-    np.testing.assert_allclose([other.width, -other.height / scale], [pulse_.width, pulse_.height], rtol=1e-6)
+    scaled = find_pulse(-scale * force, threshold=SECOND_PULSE)
+    assert pulse_.bumps.size == scaled.bumps.size == 0
+    assert pulse_.peak == scaled.peak == np.argmax(np.abs(force))
+    np.testing.assert_allclose([scaled.width, -scaled.height / scale], [pulse_.width, pulse_.height], rtol=1e-6)
     start, stop = pulse_extent(force, pulse_)
     assert start <= pulse_.onset <= pulse_.peak < stop
 
@@ -155,40 +155,40 @@ def test_the_digital_step_is_found(step, counts):
     off = np.abs((levels - levels[0]) / smallest - np.round((levels - levels[0]) / smallest)).max() if smallest else 0
     assume(off < 1e-9 or off > 0.06)  # nearer than 5 % of the step counts as a multiple
     multiple = levels.size > 1 and off < 1e-9
-    found = digital_step(np.array(counts) * step)
-    np.testing.assert_allclose(found, smallest * step if multiple else 0.0, rtol=ROUNDING)
+    measured = digital_step(np.array(counts) * step)
+    np.testing.assert_allclose(measured, smallest * step if multiple else 0.0, rtol=ROUNDING)
 
 
 @given(start=st.integers(-50, 1100), length=st.integers(1, 900))
-def test_a_force_window_keeps_its_stretch_and_nothing_far_from_it(start, length):
+def test_a_force_window_keeps_its_interval_and_nothing_far_from_it(start, length):
     window = force_window(1000, start, start + length)
-    place = np.arange(1000)
-    inside = (place >= start) & (place < start + length)
-    far = (place < start - 0.25 * length - 5) | (place > start + 1.25 * length + 5)
+    sample = np.arange(1000)
+    inside = (sample >= start) & (sample < start + length)
+    far = (sample < start - 0.25 * length - 5) | (sample > start + 1.25 * length + 5)
     assert (window[inside] == 1.0).all()
     assert (window[far] < 1e-12).all()
     assert ((window >= 0.0) & (window <= 1.0)).all()
 
 
 @given(decay=st.floats(0.0, 100.0), origin=st.integers(0, 99))
-def test_exponential_windows_are_1_at_the_blow(decay, origin):
+def test_exponential_windows_are_1_at_the_impact(decay, origin):
     window = exponential_window(100, 0.01, decay, origin)
     assert window[origin] == 1.0
     np.testing.assert_allclose(window[1:] / window[:-1], np.exp(-0.01 * decay), rtol=ROUNDING)
 
 
-@given(records=st.integers(2, 6), outputs=st.integers(1, 3), seed=st.integers(0, 2**16), gain=st.floats(1e-6, 1e6))
+@given(n_records=st.integers(2, 6), outputs=st.integers(1, 3), seed=st.integers(0, 2**16), gain=st.floats(1e-6, 1e6))
 @settings(max_examples=50, deadline=None)
-def test_estimates_scale_with_the_signals(records, outputs, seed, gain):
+def test_estimates_scale_with_the_signals(n_records, outputs, seed, gain):
     rng = np.random.default_rng(seed)
-    one, other = empty_sums(65, outputs), empty_sums(65, outputs)
-    for _ in range(records):
+    sums, scaled = empty_sums(65, outputs), empty_sums(65, outputs)
+    for _ in range(n_records):
         force, responses = rng.standard_normal(128), rng.standard_normal((outputs, 128))
-        one.add(force, responses)
-        other.add(force, gain * responses)
+        sums.add(force, responses)
+        scaled.add(force, gain * responses)
     for name in ("H1", "H2", "Hv"):
-        np.testing.assert_allclose(estimate_frf(other, name), gain * estimate_frf(one, name), rtol=1e-8)
-    coherence = estimate_coherence(one)
+        np.testing.assert_allclose(estimate_frf(scaled, name), gain * estimate_frf(sums, name), rtol=1e-8)
+    coherence = estimate_coherence(sums)
     assert ((coherence >= 0.0) & (coherence <= 1.0)).all()
-    np.testing.assert_allclose(estimate_coherence(other), coherence, rtol=1e-8)
-    np.testing.assert_allclose(frf_variance(other), gain**2 * frf_variance(one), rtol=1e-5)
+    np.testing.assert_allclose(estimate_coherence(scaled), coherence, rtol=1e-8)
+    np.testing.assert_allclose(frf_variance(scaled), gain**2 * frf_variance(sums), rtol=1e-5)

@@ -131,9 +131,14 @@ class VibrationTest:
         return tuple(dict.fromkeys(label.input_dof for label in self.labels))
 
     @property
+    def recordings(self) -> tuple[tuple[TestSetup, Path], ...]:
+        """Every recording with its set-up, in the order of the test."""
+        return tuple((setup, path) for setup in self.setups for path in setup.files)
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
-        recordings = [file for setup in self.setups for file in setup.files]
+        recordings = [path for _, path in self.recordings]
         return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources)]))
 
     @cached_property

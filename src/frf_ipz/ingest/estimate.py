@@ -1,12 +1,12 @@
-"""From a test to FRFs with their uncertainty, whatever its kind: the door of the stage."""
+"""From a test to FRFs with their uncertainty, whatever its kind."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.ingest.kinds.frf import estimate_frf_files
-from frf_ipz.ingest.kinds.hammer import estimate_hammer
-from frf_ipz.ingest.kinds.random import estimate_random
+from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
+from frf_ipz.ingest.estimation.hammer import estimate_hammer
+from frf_ipz.ingest.estimation.random import estimate_random
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -27,17 +27,17 @@ def estimate_frfs(test: VibrationTest, options: IngestOptions, *, progress: Prog
     options : IngestOptions
         The user's choice.
     progress : Progress
-        Told how far it is.
+        Called with the share of the work that is done.
 
     Returns
     -------
     FrfEstimate
-        FRFs in SI with variance and coherence, the table of blows, what was chosen, what has to be known.
+        FRFs in SI with variance and coherence, the table of records, what was chosen, warnings.
 
     Raises
     ------
     InputError
-        If a recording cannot be used: which file, which place, what to do.
+        If a recording cannot be used: which file, which line, what to do.
     """
     result = KINDS[test.kind](test, options, progress)
     progress(1.0, "FRFs estimated")

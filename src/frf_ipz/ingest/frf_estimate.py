@@ -1,4 +1,4 @@
-"""What ingest gives: FRFs, and the blows behind them."""
+"""The result of ingest: FRFs, and the records behind them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from frf_ipz.frf import FrfSet
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trace:
-    """A stretch of one recording, thinned for drawing.
+    """Part of a channel of one record, thinned for drawing.
 
     Parameters
     ----------
     name : str
-        Which blow, as in the table of blows.
+        Which record, as in the table of records.
     channel : str
         Column of the recording.
     unit : str
@@ -35,7 +35,7 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrfEstimate:
-    """FRFs and the quality of what they were made from.
+    """FRFs and the quality of the records that they were estimated from.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class FrfEstimate:
     choices : tuple of str
         What was chosen, and by what: windows, segments, lines.
     warnings : tuple of str
-        What the user has to know.
+        Whatever the user has to know.
     """
 
     frfs: FrfSet

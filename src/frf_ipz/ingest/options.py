@@ -17,15 +17,15 @@ class IngestOptions:
     estimator : str
         H1 (noise on the responses), H2 (noise on the force) or Hv (on both).
     force_window_s : float, optional
-        Length of the force that is kept, from the blow on, s; chosen from the pulse where it is left out.
+        Length of the force that is kept, from the impact on, s; chosen from the pulse where it is left out.
     exponential_window_s : float, optional
         Time constant of an exponential window on force and response, s; 0 for none. Where it is left out, one is used
         only if decays are cut off, and just as strong as that needs.
     segment_s : float, optional
         Length of segments under Hann windows (kind ``random``), s; where it is left out, records are used whole or in
-        pieces, and the motion that goes on at both ends is taken off.
+        sub-records, and the transients at both ends are removed.
     keep, drop : tuple of str
-        Files, or ``file#2`` for the second blow in a file, that are used or left out whatever the checks say.
+        Files, or ``file#2`` for the second impact in a file, that are used or left out whatever the checks say.
     hide : tuple of str
         DOFs of sensors whose FRFs are left out, of whatever sign. A known mass of the sensor stays in the model.
     """

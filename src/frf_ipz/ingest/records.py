@@ -1,7 +1,6 @@
-"""Single blows and records as arrays: checked, calibrated, one at a time in constant memory.
+"""Records as arrays: checked, calibrated, one at a time in constant memory.
 
-The door for whoever needs the recordings themselves: the estimation of FRFs, and the diagnosis, which transforms force
-and responses at any complex frequency.
+The estimation of FRFs reads them, and the diagnosis, which transforms force and responses at any complex frequency.
 """
 
 from __future__ import annotations
@@ -34,30 +33,30 @@ SURVEYS = {"hammer": survey_hammer, "random": survey_random}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record:
-    """One blow of a hammer, or one record of a shaker.
+    """One impact of a hammer, or one record of a shaker, with its responses.
 
     Parameters
     ----------
     name : str
-        As in the table of blows.
+        As in the table of records.
     labels : tuple of FrfLabel
         The FRFs that it contributes to, one a row of `responses`: DOFs with their signs, quantities, columns.
     step_s : float
         Time step, s; the first sample is at time 0.
     force : (n_samples,) array
-        N, its constant part taken off, no window applied; the sign is that of the recording.
+        N, its DC offset subtracted, no window applied; the sign is that of the recording.
     responses : (n_outputs, n_samples) array
-        SI, constant parts taken off where they are significant; the signs are those of the recording.
+        SI, DC offsets subtracted where they are significant; the signs are those of the recording.
     trigger : int
-        Sample at which the force sets in; 0 for records.
+        Sample at which the force sets in; 0 for a shaker's record.
     force_interval : pair of int
-        First sample of the force that is its pulse, and the one after the last; outside there is only noise.
+        First sample of the force that is more than noise, and the one after the last.
     starts_at_rest : bool
         The structure was at rest at the first sample.
     recording : str
-        What it was cut from.
+        The file that it was cut from.
     number : int
-        1 for the first blow of its recording.
+        1 for the first impact in its recording.
     start_s : float
         Time of its first sample in its recording, s.
     marks : tuple of str
@@ -89,7 +88,7 @@ class Record:
         """Number of samples."""
         return len(self.force)
 
-    def windowed(self, decay_1_s: float, n_samples: int) -> FloatArray:
+    def apply_windows(self, decay_1_s: float, n_samples: int) -> FloatArray:
         """Give the force within its pulse and the responses, under a window, filled up with zeros to a common length.
 
         Parameters
@@ -97,7 +96,7 @@ class Record:
         decay_1_s : float
             Rate of the exponential window that force and responses share.
         n_samples : int
-            The length wanted; at least that of the blow.
+            The common length; at least that of the record.
 
         Returns
         -------
@@ -114,7 +113,7 @@ class Record:
 
 
 def survey_records(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
-    """Look at all blows or records of a test and decide how they are used.
+    """Check all records of a test and decide how they are used.
 
     Parameters
     ----------
@@ -123,12 +122,12 @@ def survey_records(files: RecordingFiles, options: IngestOptions, progress: Prog
     options : IngestOptions
         The user's choice.
     progress : Progress
-        Told how far it is.
+        Called with the share of the work that is done.
 
     Returns
     -------
     Survey
-        What is wrong with which, what is used, windows and lengths.
+        What is wrong with each, which are used, windows and lengths.
 
     Raises
     ------
@@ -137,7 +136,7 @@ def survey_records(files: RecordingFiles, options: IngestOptions, progress: Prog
     """
     kind = files.test.kind
     if kind not in SURVEYS:
-        raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no blows to read")
+        raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no records to read")
     return SURVEYS[kind](files, options, progress)
 
 
@@ -149,7 +148,7 @@ def read_records(
     files: RecordingFiles | None = None,
     used_only: bool = True,
 ) -> Iterator[Record]:
-    """Read the blows or records of a test, one at a time.
+    """Read the records of a test, one at a time.
 
     Parameters
     ----------
@@ -158,11 +157,11 @@ def read_records(
     options : IngestOptions
         The user's choice.
     survey : Survey, optional
-        Where it has been made already.
+        The test's, where it exists already.
     files : RecordingFiles, optional
-        Where they have been opened already.
+        The test's, where they are open already.
     used_only : bool
-        Leave out what does not enter the FRFs.
+        Leave out records that do not enter the FRFs.
 
     Yields
     ------
@@ -176,17 +175,15 @@ def read_records(
     """
     files = files or RecordingFiles(test=test)
     survey = survey or survey_records(files, options)
-    wanted = survey.used if used_only else survey.records
-    for _, group in groupby(wanted, key=lambda record: record.path):
-        records = list(group)
-        stretches = files.stretches(
-            records[0].setup, records[0].path, [(record.start, record.stop) for record in records]
-        )
-        for record, signals in zip(records, stretches, strict=True):
-            yield _calibrated(test, record, signals)
+    selected = survey.used if used_only else survey.records
+    for path, group in groupby(selected, key=lambda info: info.path):
+        infos = list(group)
+        segments = files.segments(infos[0].setup, path, [(info.start, info.stop) for info in infos])
+        for info, signals in zip(infos, segments, strict=True):
+            yield _make_record(test, info, signals)
 
 
-def _calibrated(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:
+def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:
     signals = signals[1:] - np.array(info.offsets)[:, None]
     return Record(
         name=info.name,

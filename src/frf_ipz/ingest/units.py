@@ -25,6 +25,7 @@ EXAMPLES = {
 UNREADABLE = (pint.PintError, ValueError, TypeError, AttributeError, AssertionError, TokenError, ZeroDivisionError)
 NUMBER = re.compile(r"^\s*[+-]?[\d.]*([eE][+-]?\d+)?")
 SAME = 1e-9  # relative: two factors that differ by less are one unit, written in two ways
+GRAVITY_SYMBOLS = {"g": "g_0", "G": "g_0", "gn": "g_0"}  # how analysers write the acceleration of gravity
 
 
 def si_unit(quantity: str, *, rotational: bool = False) -> str:
@@ -55,7 +56,7 @@ def si_unit(quantity: str, *, rotational: bool = False) -> str:
 
 
 def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:
-    """Return what values in a unit are to be multiplied by to be SI.
+    """Return the factor from values in a unit to SI.
 
     Parameters
     ----------
@@ -81,16 +82,18 @@ def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:
     >>> unit_factor("g_0", "acceleration")
     9.80665
     """
-    return _to(_parse(unit), si_unit(quantity, rotational=rotational), f"'{unit}' is no unit of {quantity}", quantity)
+    return _convert(
+        _parse(unit), si_unit(quantity, rotational=rotational), f"'{unit}' is no unit of {quantity}", quantity
+    )
 
 
 def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = False) -> float:
-    """Return the factor to SI of a column that holds what a sensor puts out.
+    """Return the factor to SI of a column that holds the output of a sensor.
 
     Parameters
     ----------
     sensitivity : str
-        Output over what is measured, such as ``10.2 mV/g_0``; the column is in the unit of the numerator.
+        Output over measured quantity, such as ``10.2 mV/g_0``; the column is in the unit of the numerator.
     quantity : str
         What is measured.
     rotational : bool
@@ -111,12 +114,12 @@ def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = Fa
     >>> round(sensitivity_factor("10 mV/N", "force"), 3)
     0.1
     """
-    value = _parse(sensitivity)
-    if value.magnitude == 0:
+    output = _parse(sensitivity)
+    if output.magnitude == 0:
         raise QuantityError(f"the sensitivity '{sensitivity}' is zero")
-    measured = _parse(numerator_of(sensitivity)) / value
+    measured = _parse(numerator_of(sensitivity)) / output
     problem = f"the sensitivity '{sensitivity}' is not per unit of {quantity}"
-    return _to(measured, si_unit(quantity, rotational=rotational), problem, quantity)
+    return _convert(measured, si_unit(quantity, rotational=rotational), problem, quantity)
 
 
 def numerator_of(sensitivity: str) -> str:
@@ -142,8 +145,8 @@ def numerator_of(sensitivity: str) -> str:
     >>> numerator_of("10.2 mV/g_0")
     'mV'
     """
-    top, slash, _ = sensitivity.partition("/")
-    unit = NUMBER.sub("", top).strip()
+    numerator, slash, _ = sensitivity.partition("/")
+    unit = NUMBER.sub("", numerator).strip()
     if not slash or not unit:
         raise QuantityError(f"the sensitivity '{sensitivity}' is no ratio of units; write it as in '10.2 mV/g_0'")
     return unit
@@ -176,16 +179,16 @@ def frf_factor(unit: str, quantity: FrfQuantity, output_direction: str, input_di
     >>> round(frf_factor("mm/s/N", FrfQuantity.MOBILITY, "z", "z"), 6)
     0.001
     """
-    wanted = quantity.unit(output_direction, input_direction)
-    return _to(_parse(unit), wanted, f"'{unit}' is no unit of {quantity.value}", "")
+    si = quantity.unit(output_direction, input_direction)
+    return _convert(_parse(unit), si, f"'{unit}' is no unit of {quantity.value}", "")
 
 
-def same_unit(one: str, other: str) -> bool | None:
+def same_unit(first: str, second: str) -> bool | None:
     """Tell whether two texts mean the same unit.
 
     Parameters
     ----------
-    one, other : str
+    first, second : str
         Units.
 
     Returns
@@ -194,8 +197,7 @@ def same_unit(one: str, other: str) -> bool | None:
         None where one of them cannot be read: an analyser's own way of writing it says nothing.
     """
     try:
-        first, second = _parse(one), _parse(other)
-        ratio = float((first / second).to("").magnitude)
+        ratio = float((_parse(first) / _parse(second)).to("").magnitude)
     except QuantityError:
         return None
     except pint.PintError:
@@ -217,14 +219,14 @@ def _parse(text: str) -> pint.Quantity[float]:
     return value
 
 
-def _to(value: pint.Quantity[float], wanted: str, problem: str, quantity: str) -> float:
+def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) -> float:
     try:
-        factor = float(value.to(wanted).magnitude)
+        factor = float(value.to(si).magnitude)
     except pint.PintError:
         hint = EXAMPLES.get(quantity, "")
         gram = "; 'g' is the gram, the acceleration of gravity is 'g_0'" if quantity == "acceleration" else ""
-        expected = f"expected is {hint}" if hint else f"expected is a unit like {wanted}"
+        expected = f"expected is {hint}" if hint else f"expected is a unit like {si}"
         raise QuantityError(f"{problem}; {expected}{gram}") from None
     if not math.isfinite(factor) or factor == 0.0:
-        raise QuantityError(f"{problem}: it is {factor:g} {wanted}; write a unit, without a number that is zero or NaN")
+        raise QuantityError(f"{problem}: it is {factor:g} {si}; write a unit, without a number that is zero or NaN")
     return factor

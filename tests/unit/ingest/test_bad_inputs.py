@@ -167,13 +167,13 @@ def test_recordings_of_unequal_length(path):
     assert re.search(r"p7_02\.csv: holds 399 samples where the others hold 512.*keep", message(path))
 
 
-def test_a_force_without_a_blow(path):
+def test_a_force_without_an_impact(path):
     csv = path.parent / "hits" / "p7_02.csv"
     table = np.loadtxt(csv, delimiter=",", skiprows=1)
     for force in (np.zeros(512), np.random.default_rng(1).standard_normal(512)):
         table[:, 1] = force
         np.savetxt(csv, table, delimiter=",", header="time,force,acc_1,acc_2", comments="")
-        assert re.search(r"p7_02\.csv: no blow found: the column 'force' rises to .* N at most", message(path))
+        assert re.search(r"p7_02\.csv: no impact found: the column 'force' rises to .* N at most", message(path))
 
 
 def test_a_column_without_any_unit(path):
@@ -181,7 +181,7 @@ def test_a_column_without_any_unit(path):
     assert re.search("column 'force': has no unit: give the .*channel.* a 'unit' or a 'sensitivity'", message(path))
 
 
-def test_all_blows_of_one_dof_with_another_step(path):
+def test_all_records_of_one_dof_with_a_different_step(path):
     csv = path.parent / "late" / "1.csv"
     table = np.loadtxt(path.parent / "hits" / "p7_01.csv", delimiter=",", skiprows=1)
     table[:, 0] *= 2
@@ -190,4 +190,4 @@ def test_all_blows_of_one_dof_with_another_step(path):
     path.write_text(
         path.read_text(encoding="utf-8") + '[[hit]]\ndof = "8:+z"\nfiles = ["late/*.csv"]\n', encoding="utf-8"
     )
-    assert re.search(r"all blows at 8:\+z have the time step 0\.000976.* s.*export them with one step", message(path))
+    assert re.search(r"all records at 8:\+z have the time step 0\.000976.* s.*export them with one step", message(path))

@@ -1,4 +1,4 @@
-"""How much of a response is left at its end, and the noise under it."""
+"""How much of a response remains at its end, and the noise under it."""
 
 import numpy as np
 import pytest
@@ -11,16 +11,16 @@ TIME = np.arange(N_SAMPLES) * STEP_S
 DURATION_S = N_SAMPLES * STEP_S
 
 
-def ringing(frequency_hz, left, amplitude=1.0):
-    return amplitude * left ** (TIME / DURATION_S) * np.sin(2 * np.pi * frequency_hz * TIME)
+def ringing(frequency_hz, remainder, amplitude=1.0):
+    return amplitude * remainder ** (TIME / DURATION_S) * np.sin(2 * np.pi * frequency_hz * TIME)
 
 
-@pytest.mark.parametrize("left", [0.3, 0.03, 3e-3])
+@pytest.mark.parametrize("remainder", [0.3, 0.03, 3e-3])
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
-def test_what_is_left_of_a_mode(left, noise):
-    response = ringing(211.3, left) + noise * np.random.default_rng(1).standard_normal(N_SAMPLES)
+def test_the_remaining_amplitude_of_a_mode(remainder, noise):
+    response = ringing(211.3, remainder) + noise * np.random.default_rng(1).standard_normal(N_SAMPLES)
     decay = measure_decay(response, STEP_S, 2)
-    assert decay.remaining_amplitude == pytest.approx(left, rel=0.05)
+    assert decay.remaining_amplitude == pytest.approx(remainder, rel=0.05)
     assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
 
 
@@ -62,16 +62,16 @@ def test_the_noise_power_follows_its_colour():
     white = rng.standard_normal(N_SAMPLES + 1)
     lines = np.array([100.0, 1000.0, 1900.0])
     expected = np.abs(1 - 0.9 * np.exp(-2j * np.pi * lines * STEP_S)) ** 2
-    found = noise_power(white[1:] - 0.9 * white[:-1], STEP_S, lines)
-    np.testing.assert_allclose(found, expected, rtol=0.5)  # the median of 51 lines varies by 20 %
+    power = noise_power(white[1:] - 0.9 * white[:-1], STEP_S, lines)
+    np.testing.assert_allclose(power, expected, rtol=0.5)  # the median of 51 lines varies by 20 %
 
 
-def test_signals_that_are_too_short_tell_nothing():
+def test_signals_that_are_too_short_give_no_decay_and_no_noise():
     assert measure_decay(np.ones(100), STEP_S, 2).remaining_amplitude == 0.0
     assert np.isnan(noise_power(np.ones(100), STEP_S, np.array([1.0]))).all()
 
 
-def test_windowed_noise_is_independent_on_the_lines_that_are_kept():
+def test_windowed_noise_is_independent_on_lines_far_enough_apart():
     """Monte Carlo: lines apart by what `correlated_lines` says hardly correlate, neighbours do."""
     rng = np.random.default_rng(5)
     decay, n_samples = 8.0, 1024

@@ -32,13 +32,13 @@ def message(folder, *entries):
     return text
 
 
-def entry(file="frf.csv", quantity="accelerance", **more):
-    given = {"file": file, "quantity": quantity, **more}
-    return "\n".join(f"{key} = {str(value).replace(chr(39), chr(34))}" for key, value in quoted(given).items())
+def entry(file="frf.csv", quantity="accelerance", **keys):
+    keys = {"file": file, "quantity": quantity, **keys}
+    return "\n".join(f"{key} = {str(value).replace(chr(39), chr(34))}" for key, value in quoted(keys).items())
 
 
-def quoted(given):
-    return {key: f'"{value}"' if isinstance(value, str) else list_or_number(value) for key, value in given.items()}
+def quoted(keys):
+    return {key: f'"{value}"' if isinstance(value, str) else list_or_number(value) for key, value in keys.items()}
 
 
 def list_or_number(value):
@@ -51,8 +51,10 @@ def long_csv(
     rows = [",".join(["frequency_hz", "output_dof", "input_dof", "real", "imag", *extra])]
     for column, output in enumerate(outputs):
         for frequency, value in zip(lines_hz, values[:, column] * factor, strict=True):
-            more = {"coherence": 0.9, "variance": 0.25}
-            numbers = [repr(float(number)) for number in (value.real, value.imag, *(more[key] for key in extra))]
+            extra_values = {"coherence": 0.9, "variance": 0.25}
+            numbers = [
+                repr(float(number)) for number in (value.real, value.imag, *(extra_values[key] for key in extra))
+            ]
             rows.append(",".join([repr(float(frequency)), output, "7:+z", *numbers]))
     (folder / name).write_text("\n".join(rows) + "\n", encoding="utf-8")
 
@@ -99,7 +101,7 @@ def test_units_scale_values_and_their_variance(tmp_path):
 def test_rows_of_a_long_csv_may_come_in_any_order(tmp_path):
     long_csv(tmp_path)
     head, *rows = (tmp_path / "frf.csv").read_text(encoding="utf-8").splitlines()
-    mixed = [rows[place] for place in np.random.default_rng(1).permutation(len(rows))]
+    mixed = [rows[row] for row in np.random.default_rng(1).permutation(len(rows))]
     (tmp_path / "frf.csv").write_text("\n".join([head, *mixed]), encoding="utf-8")
     frfs = read(tmp_path, entry()).frfs
     order = [str(label.output_dof) for label in frfs.labels].index("1:+z")
@@ -109,12 +111,12 @@ def test_rows_of_a_long_csv_may_come_in_any_order(tmp_path):
 @pytest.mark.parametrize("delimiter", ["\t", " ", ",", ";"])
 def test_text_with_real_and_imaginary_parts(tmp_path, delimiter):
     text_file(tmp_path, [LINES_HZ, VALUES[:, 0].real, VALUES[:, 0].imag], delimiter=delimiter)
-    frfs = read(tmp_path, one_text(["frequency_hz", "real", "imag"])).frfs
+    frfs = read(tmp_path, text_entry(["frequency_hz", "real", "imag"])).frfs
     expect(frfs, VALUES[:, :1])
 
 
-def one_text(columns, file="frf.txt", output="1:+z", **more):
-    return entry(file, output_dof=output, input_dof="7:+z", columns=tuple(columns), skip_rows=1, **more)
+def text_entry(columns, file="frf.txt", output="1:+z", **keys):
+    return entry(file, output_dof=output, input_dof="7:+z", columns=tuple(columns), skip_rows=1, **keys)
 
 
 @pytest.mark.parametrize(
@@ -128,19 +130,19 @@ def one_text(columns, file="frf.txt", output="1:+z", **more):
 def test_text_with_magnitude_and_phase(tmp_path, columns, make):
     lines, values = LINES_HZ[1:], VALUES[1:, 1]
     text_file(tmp_path, [lines, *make(values)])
-    frfs = read(tmp_path, one_text(["frequency_hz", *columns])).frfs
+    frfs = read(tmp_path, text_entry(["frequency_hz", *columns])).frfs
     np.testing.assert_allclose(frfs.values[:, 0], values, rtol=1e-12)
 
 
 def test_columns_may_be_skipped(tmp_path):
     text_file(tmp_path, [LINES_HZ, LINES_HZ, VALUES[:, 0].imag, np.full(len(LINES_HZ), 0.5), VALUES[:, 0].real])
-    frfs = read(tmp_path, one_text(["frequency_hz", "skip", "imag", "coherence", "real"])).frfs
+    frfs = read(tmp_path, text_entry(["frequency_hz", "skip", "imag", "coherence", "real"])).frfs
     expect(frfs, VALUES[:, :1])
     assert np.unique(frfs.coherence) == [0.5]
 
 
-def universal(folder, *, func_type=4, values=VALUES[:, 0], **more):
-    of_set = {
+def universal(folder, *, func_type=4, values=VALUES[:, 0], **fields):
+    data_set = {
         "func_type": func_type,
         "rsp_node": 3,
         "rsp_dir": -3,
@@ -154,9 +156,9 @@ def universal(folder, *, func_type=4, values=VALUES[:, 0], **more):
         "rsp_ent_name": "part",
         "ref_ent_name": "part",
         "id1": "a measurement",
-    } | more
+    } | fields
     file = pyuff.UFF(str(folder / "frf.uff"))
-    data = pyuff.prepare_58(binary=0, data=values, x=LINES_HZ, **of_set)
+    data = pyuff.prepare_58(binary=0, data=values, x=LINES_HZ, **data_set)
     file.write_sets([data], "add" if (folder / "frf.uff").exists() else "overwrite")
 
 
@@ -203,10 +205,10 @@ def test_several_files_make_one_test(tmp_path):
     text_file(tmp_path, [LINES_HZ, VALUES[:, 0].real, VALUES[:, 0].imag], name="a.txt")
     text_file(tmp_path, [LINES_HZ, VALUES[:, 1].real, VALUES[:, 1].imag], name="b.txt")
     columns = ["frequency_hz", "real", "imag"]
-    expect(read(tmp_path, one_text(columns, "a.txt"), one_text(columns, "b.txt", "2:+z")).frfs)
+    expect(read(tmp_path, text_entry(columns, "a.txt"), text_entry(columns, "b.txt", "2:+z")).frfs)
 
 
-def test_only_common_lines_are_used_and_said(tmp_path):
+def test_only_common_lines_are_used_and_reported(tmp_path):
     long_csv(tmp_path, outputs=("1:+z",))
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ[20:], values=VALUES[20:])
     result = read(tmp_path, entry(), entry("b.csv"))
@@ -259,11 +261,11 @@ def test_values_that_cannot_be(tmp_path):
         (lambda: entry(quantity="inertance"), "quantity.*receptance.*mobility.*accelerance"),
         (lambda: entry(unit="m/N"), "'m/N' is no unit of accelerance; expected is a unit like m/s\\^2/N"),
         (lambda: entry(unit="quark"), "'quark' is no unit that can be read"),
-        (lambda: one_text(["frequency_hz", "real", "imagin"]), "'columns' names 'imagin'; did you mean 'imag'"),
-        (lambda: one_text(["frequency_hz", "real"]), "needed are frequency_hz and either real and imag"),
-        (lambda: one_text(["frequency_hz", "real", "imag", "coherence"]), "has 3 columns, but 'columns'.*names 4"),
+        (lambda: text_entry(["frequency_hz", "real", "imagin"]), "'columns' names 'imagin'; did you mean 'imag'"),
+        (lambda: text_entry(["frequency_hz", "real"]), "needed are frequency_hz and either real and imag"),
+        (lambda: text_entry(["frequency_hz", "real", "imag", "coherence"]), "has 3 columns, but 'columns'.*names 4"),
         (lambda: entry("frf.txt", columns=("frequency_hz", "real", "imag")), "needs 'output_dof' and 'input_dof'"),
-        (lambda: one_text(["frequency_hz", "real", "imag"], output="1:q"), r"\[\[frf\]\] 'frf.txt'.*1:q"),
+        (lambda: text_entry(["frequency_hz", "real", "imag"], output="1:q"), r"\[\[frf\]\] 'frf.txt'.*1:q"),
         (lambda: entry(skip_row=3), "skip_row.*did you mean 'skip_rows'"),
     ],
 )
@@ -297,7 +299,7 @@ def test_a_channel_in_a_test_of_frfs(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("more", "says"),
+    ("fields", "says"),
     [
         ({"func_type": 1}, "holds no data set 58 with a frequency response function"),
         ({"rsp_dir": 0}, "states no direction .rsp_dir 0 at node 3.; name output_dof and input_dof"),
@@ -305,9 +307,9 @@ def test_a_channel_in_a_test_of_frfs(tmp_path):
         ({"orddenom_spec_data_type": 12}, "is not a ratio to a force"),
     ],
 )
-def test_faults_in_a_universal_file(tmp_path, more, says):
-    values = VALUES[:, 0].real if more.get("func_type") == 1 else VALUES[:, 0]
-    universal(tmp_path, values=values, **more)
+def test_faults_in_a_universal_file(tmp_path, fields, says):
+    values = VALUES[:, 0].real if fields.get("func_type") == 1 else VALUES[:, 0]
+    universal(tmp_path, values=values, **fields)
     text = message(tmp_path, entry("frf.uff"))
     assert re.search(says, text), text
     assert "frf.uff" in text

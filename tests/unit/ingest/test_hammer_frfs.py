@@ -13,7 +13,7 @@ from frf_ipz.ingest.survey.file_index import CELL
 from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
 EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle
-RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode is left after 2 s
+RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode remains after 2 s
 BAND_HZ = (5.0, 400.0)
 
 
@@ -51,8 +51,8 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     path = hammer_campaign(tmp_path, structure=RINGING)
     result = estimate(path)
     truncated = estimate(path, exponential_window_s=0.0)
-    left = np.exp(-0.0006 * 2 * np.pi * 31.0 * (4096 / 2048 - 0.03))
-    assert result.records.remaining_amplitude.max() == pytest.approx(left, rel=0.05)
+    remainder = np.exp(-0.0006 * 2 * np.pi * 31.0 * (4096 / 2048 - 0.03))
+    assert result.records.remaining_amplitude.max() == pytest.approx(remainder, rel=0.05)
     assert result.records.marks.str.contains("cut-off decay").all()
     assert result.records.used.all()
     assert errors(truncated, RINGING).max() > 0.5
@@ -68,7 +68,7 @@ def test_lines_that_a_window_correlates_are_counted(tmp_path):
     assert np.diff(result.frfs.frequency_hz) == pytest.approx(0.5)
 
 
-def test_a_recording_that_starts_long_before_the_blow_is_cut_to_it(tmp_path):
+def test_a_recording_that_starts_long_before_the_impact_is_cut_to_it(tmp_path):
     structure = Structure()
     path = hammer_campaign(tmp_path, structure=structure, at_s=0.7, n_samples=8192)
     result = estimate(path)
@@ -101,7 +101,7 @@ def test_a_force_window_may_be_asked_for(tmp_path):
     assert errors(result, Structure()).max() < EXACT
 
 
-def test_several_blows_in_a_file_are_found_by_their_pulses(tmp_path):
+def test_several_impacts_in_a_file_are_found_by_their_pulses(tmp_path):
     structure, step_s = Structure(), 1 / 2048
     heights = np.zeros(5 * 4096)
     for start, height in zip((300, 4500, 8600, 12800, 17000), (100, 8.0, 70, 120, 90), strict=True):
@@ -111,10 +111,10 @@ def test_several_blows_in_a_file_are_found_by_their_pulses(tmp_path):
     assert list(result.records.record) == [f"hits/all.csv#{number}" for number in range(1, 6)]
     assert result.records.peak_force_N.to_numpy() == pytest.approx([100, 8, 70, 120, 90], rel=1e-3)
     assert list(result.frfs.averages) == [5, 5]
-    assert errors(result, structure).max() < 2e-3  # what is left of the blow before
+    assert errors(result, structure).max() < 2e-3  # motion that remains of the impact before
 
 
-def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_the_others(tmp_path):
+def test_an_impact_at_the_beginning_of_a_file_does_not_shorten_the_lead_of_those_after_it(tmp_path):
     step_s = 1 / 2048
     heights = np.zeros(3 * 4096)
     for start in (40, 4240, 8440):
@@ -122,18 +122,18 @@ def test_a_blow_at_the_beginning_of_a_file_does_not_shorten_what_comes_before_th
     write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=heights), step_s)
     test = read_test(write_test(tmp_path, HIT))
     result = estimate_frfs(test, IngestOptions())
-    first, *others = result.records.trigger_s
+    first, *later = result.records.trigger_s
     assert first < 40 * step_s
-    assert min(others) > 0.9 * CELL * step_s
-    observed = observe(test, IngestOptions(), result.frfs).records
-    assert [one.number for one in observed] == [1, 2, 3]
-    assert [one.follows for one in observed] == [False, True, True]
-    pulses = [one.start_s + one.step_s * np.argmax(one.force) for one in observed]
+    assert min(later) > 0.9 * CELL * step_s
+    records = observe(test, IngestOptions(), result.frfs).records
+    assert [record.number for record in records] == [1, 2, 3]
+    assert [record.follows for record in records] == [False, True, True]
+    pulses = [record.start_s + record.step_s * np.argmax(record.force) for record in records]
     np.testing.assert_allclose(np.diff(pulses), 4200 * step_s)
-    assert len({one.recording for one in observed}) == 1
+    assert len({record.recording for record in records}) == 1
 
 
-def test_a_short_blow_is_filled_up_with_zeros(tmp_path):
+def test_a_short_record_is_padded_with_zeros(tmp_path):
     path = hammer_campaign(tmp_path, structure=RINGING)
     short = impact(RINGING, n_samples=2500)
     write_csv(tmp_path / "hits" / "p7_02.csv", short, 1 / 2048)
@@ -148,7 +148,7 @@ def test_recordings_whose_lengths_differ_by_a_little_are_used(tmp_path):
     assert errors(estimate(path), Structure()).max() < 1e-5
 
 
-def test_offsets_are_taken_off(tmp_path):
+def test_offsets_are_removed(tmp_path):
     structure = Structure()
     for number in range(3):
         signals = impact(structure, height=100.0 + 20 * number)
@@ -156,28 +156,28 @@ def test_offsets_are_taken_off(tmp_path):
         write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
     result = estimate(write_test(tmp_path, HIT), exponential_window_s=0.3)
     assert errors(result, structure).max() < EXACT
-    assert "DC offset of acc_1: 5 m/s^2, taken off" in result.records.marks[0]
+    assert "DC offset of acc_1: 5 m/s^2, removed" in result.records.marks[0]
     assert "DC offset of force: 2 N" in result.records.marks[0]
 
 
-def test_what_a_blow_before_has_left_is_no_offset(tmp_path):
-    """A slow mode that still moves looks like a constant for as long as the recording shows before the next blow."""
+def test_motion_from_the_impact_before_is_no_offset(tmp_path):
+    """A slow mode that still moves looks like a constant for as long as the recording shows before the next impact."""
     step_s, offsets = 1 / 32768, np.array([[0.0], [0.02], [-0.03]])
     heights = np.zeros(3 * 8192)
     for start in (400, 8592, 16784):
         heights += pulse(len(heights), step_s, at_s=start * step_s)
     signals = impact(RINGING, force=heights, step_s=step_s)
     write_csv(tmp_path / "hits" / "all.csv", signals + offsets, step_s)
-    recorded = list(read_records(read_test(write_test(tmp_path, HIT)), IngestOptions()))
-    assert len(recorded) == 3
-    begins = len(heights) - sum(one.n_samples for one in recorded)
-    for one in recorded:
-        off = one.responses - signals[1:, begins : begins + one.n_samples]
-        assert np.abs(off).max() < 1e-6 * np.abs(signals).max()  # the pulse has no sharp beginning
-        begins += one.n_samples
+    records = list(read_records(read_test(write_test(tmp_path, HIT)), IngestOptions()))
+    assert len(records) == 3
+    start = len(heights) - sum(record.n_samples for record in records)
+    for record in records:
+        error = record.responses - signals[1:, start : start + record.n_samples]
+        assert np.abs(error).max() < 1e-6 * np.abs(signals).max()  # the pulse has no sharp beginning
+        start += record.n_samples
 
 
-def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):
+def test_signs_of_dofs_and_forces_are_unchanged(tmp_path):
     structure = Structure()
     for number in range(2):
         write_csv(tmp_path / "hits" / f"p_{number}.csv", -impact(structure), 1 / 2048)
@@ -189,15 +189,15 @@ def test_signs_of_dofs_and_forces_are_left_alone(tmp_path):
 
 
 def test_a_roving_hammer_gives_a_column_for_every_struck_dof(tmp_path):
-    structure, other = Structure(), Structure(shapes=((0.2, 0.4, 0.8), (0.9, -0.3, 0.1)))
+    structure, structure_from_9 = Structure(), Structure(shapes=((0.2, 0.4, 0.8), (0.9, -0.3, 0.1)))
     write_csv(tmp_path / "a" / "1.csv", impact(structure), 1 / 2048)
-    write_csv(tmp_path / "b" / "1.csv", impact(other), 1 / 2048)
+    write_csv(tmp_path / "b" / "1.csv", impact(structure_from_9), 1 / 2048)
     body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "9:-x"\nfiles = ["b/*.csv"]\n'
     result = estimate(write_test(tmp_path, body))
     values, measured = result.frfs.matrix()
     assert measured.all()
     band = result.frfs.in_band(BAND_HZ)
-    for place, truth in enumerate((structure, other)):
+    for place, truth in enumerate((structure, structure_from_9)):
         expected = truth.accelerance(result.frfs.s[band])
         assert np.abs(values[band, :, place] - expected).max() < EXACT * np.abs(expected).max()
 
@@ -248,7 +248,7 @@ def test_a_response_may_be_a_velocity(tmp_path):
     assert np.abs(frfs.values[band] - truth).max() < EXACT * np.abs(truth).max()
 
 
-def test_the_variance_of_a_single_blow_is_the_noise_in_its_own_record(tmp_path):
+def test_the_variance_of_a_single_impact_is_the_noise_in_its_own_record(tmp_path):
     """Over many lines the squared error is what the variance says, though nothing was averaged."""
     structure = Structure()
     path = hammer_campaign(tmp_path, structure=structure, heights=(100.0,), noise=0.05, seed=4)
@@ -258,10 +258,10 @@ def test_the_variance_of_a_single_blow_is_the_noise_in_its_own_record(tmp_path):
     ratio = np.abs(result.frfs.values[band] - truth) ** 2 / result.frfs.variance[band]
     assert np.mean(ratio) == pytest.approx(1.0, abs=0.3)  # under the window a sixth of the 790 lines is independent
     assert np.isnan(result.frfs.coherence).all()
-    assert any("a single blow or record at 7:+z: no coherence" in warning for warning in result.warnings)
+    assert any("a single record at 7:+z: no coherence" in warning for warning in result.warnings)
 
 
-def test_the_variance_of_several_blows_is_their_error(tmp_path):
+def test_the_variance_of_several_impacts_is_their_error(tmp_path):
     structure = Structure()
     path = hammer_campaign(tmp_path, structure=structure, heights=(100, 60, 150, 80, 120), noise=0.05, seed=5)
     frfs = estimate(path).frfs
@@ -271,14 +271,14 @@ def test_the_variance_of_several_blows_is_their_error(tmp_path):
     assert np.median(frfs.coherence[band]) > 0.99
 
 
-def test_the_scatter_between_blows_is_what_the_variance_says(tmp_path):
-    """FRFs of single blows scatter about their mean as the variance of the mean foretells."""
+def test_the_scatter_between_impacts_is_what_the_variance_says(tmp_path):
+    """FRFs of single impacts scatter about their mean as the variance of the mean predicts."""
     path = hammer_campaign(tmp_path, heights=(100.0,) * 6, noise=0.05, seed=6, at_s=0.0303)
     names = [f"p7_{number:02d}.csv" for number in range(1, 7)]
     windows = {"exponential_window_s": 0.3}
     mean = estimate(path, **windows).frfs
     alone = [
-        estimate(path, drop=tuple(other for other in names if other != name), **windows).frfs.values for name in names
+        estimate(path, drop=tuple(rest for rest in names if rest != name), **windows).frfs.values for name in names
     ]
     band = mean.in_band(BAND_HZ)
     scatter = np.var(alone, axis=0, ddof=1)[band] / 6

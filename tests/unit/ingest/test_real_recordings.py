@@ -8,7 +8,7 @@ from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 
-ALIKE = 2.0  # times: no two blows of a hand are quite alike, so that five of them do not scatter like noise
+HAND_SCATTER = 2.0  # times: no two impacts by hand are quite alike, so that five of them do not scatter like noise
 
 
 def estimate(path, **options):
@@ -21,7 +21,7 @@ def write(folder, text):
     return path
 
 
-def test_five_hammer_blows_are_coherent(recordings):
+def test_five_impacts_are_coherent(recordings):
     result = estimate(recordings / "raw_hammer" / "test.toml")
     band = result.frfs.in_band((200.0, 1000.0))
     assert np.median(result.frfs.coherence[band]) >= 0.999
@@ -32,19 +32,20 @@ def test_five_hammer_blows_are_coherent(recordings):
     assert list(result.frfs.averages) == [5]
 
 
-def test_the_variance_of_four_blows_foretells_the_fifth(recordings):
-    """Each blow alone differs from the mean of the other four by as much as the variance and its weight say."""
+def test_the_variance_of_four_impacts_predicts_the_fifth(recordings):
+    """Each impact alone differs from the mean of the other four by as much as the variance and its weight say."""
     path = recordings / "raw_hammer" / "test.toml"
     records = estimate(path).records
     ratios = []
     for name, weight in zip(records.record, records.weight, strict=True):
-        others = tuple(other for other in records.record if other != name)
+        rest = tuple(record for record in records.record if record != name)
         windows = {"exponential_window_s": 0.1}
-        alone, rest = estimate(path, drop=others, **windows).frfs, estimate(path, drop=(name,), **windows).frfs
+        alone = estimate(path, drop=rest, **windows).frfs
+        mean = estimate(path, drop=(name,), **windows).frfs
         band = alone.in_band((200.0, 6000.0))
-        error = np.abs(alone.values - rest.values)[band] ** 2
-        ratios.append(error / (rest.variance[band] / weight))
-    assert 1 / ALIKE < np.mean(ratios) < ALIKE
+        error = np.abs(alone.values - mean.values)[band] ** 2
+        ratios.append(error / (mean.variance[band] / weight))
+    assert 1 / HAND_SCATTER < np.mean(ratios) < HAND_SCATTER
 
 
 def test_a_milling_tool_has_the_receptance_that_its_laboratory_found(recordings, tmp_path):
@@ -73,9 +74,9 @@ def test_a_milling_tool_has_the_receptance_that_its_laboratory_found(recordings,
     frfs = estimate(path).frfs
     frequency, real, imag = np.loadtxt(folder / "EMA_Point_1.txt").T
     receptance = frfs.values[1:, 0] / frfs.s[1:] ** 2
-    ours = np.interp(frequency, frfs.frequency_hz[1:], receptance)
+    estimated = np.interp(frequency, frfs.frequency_hz[1:], receptance)
     band = (frequency >= 300.0) & (frequency <= 3500.0)
-    assert frac(ours[band], (real + 1j * imag)[band]) >= 0.998
+    assert frac(estimated[band], (real + 1j * imag)[band]) >= 0.998
 
 
 def test_all_points_of_a_milling_tool_are_read_as_receptances(recordings, tmp_path):
@@ -163,5 +164,6 @@ def test_recordings_without_force_or_time_are_refused(recordings, tmp_path, file
         estimate(path)
 
 
-def frac(one, other):
-    return float(np.abs(np.vdot(one, other)) ** 2 / (np.vdot(one, one).real * np.vdot(other, other).real))
+def frac(a, b):
+    """Frequency response assurance criterion of two FRFs."""
+    return float(np.abs(np.vdot(a, b)) ** 2 / (np.vdot(a, a).real * np.vdot(b, b).real))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.estimation.traces import thin
 from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.formats.text_layout import name_and_unit
 from frf_ipz.ingest.recording_files import RecordingFiles
-from frf_ipz.ingest.signals.thinning import thin
 from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
 
 STEP_S = 1 / 2048
@@ -146,14 +146,14 @@ def test_large_files_come_in_blocks_that_join_up(tmp_path):
     np.testing.assert_allclose(np.concatenate(blocks)[:, 1:].T, signals, rtol=DIGITS)
 
 
-def test_stretches_across_blocks_are_whole(tmp_path):
+def test_segments_across_blocks_are_whole(tmp_path):
     signals = np.random.default_rng(1).standard_normal((3, 150_000))
     path = write_csv(tmp_path / "hits" / "1.csv", signals, STEP_S)
     test = read_test(write_test(tmp_path, HIT))
     bounds = [(5, 20), (40_000, 140_000), (140_000, 140_001), (149_990, 150_000)]
-    pieces = list(RecordingFiles(test=test).stretches(test.setups[0], path, bounds))
-    for (start, stop), piece in zip(bounds, pieces, strict=True):
-        np.testing.assert_allclose(piece[1:], signals[:, start:stop], rtol=DIGITS)
+    segments = list(RecordingFiles(test=test).segments(test.setups[0], path, bounds))
+    for (start, stop), segment in zip(bounds, segments, strict=True):
+        np.testing.assert_allclose(segment[1:], signals[:, start:stop], rtol=DIGITS)
 
 
 def test_files_are_read_anew_beyond_the_budget(tmp_path, monkeypatch):
@@ -163,7 +163,7 @@ def test_files_are_read_anew_beyond_the_budget(tmp_path, monkeypatch):
     for _ in range(2):
         for path in test.files:
             expect(np.concatenate(list(files.blocks(test.setups[0], path))))
-    assert len(files._kept) == 2
+    assert len(files._cache) == 2
 
 
 def write_test_of_three(folder):
@@ -176,15 +176,15 @@ def write_test_of_three(folder):
     ("text", "expected"),
     [("force [N]", ("force", "N")), ("a (m/s^2)", ("a", "m/s^2")), ("force", ("force", "")), ("[N]", ("[N]", ""))],
 )
-def test_names_and_units_are_told_apart(text, expected):
+def test_names_are_separated_from_units(text, expected):
     assert name_and_unit(text) == expected
 
 
 @pytest.mark.parametrize("n_samples", [399, 400, 401, 799, 10_000, 10_007])
 def test_thinned_signals_keep_their_extremes(n_samples):
     signal = np.random.default_rng(3).standard_normal(n_samples)
-    places, values = thin(signal, 400)
-    assert len(places) <= 400
-    assert (np.diff(places) > 0).all()
-    np.testing.assert_array_equal(values, signal[places])
+    positions, values = thin(signal, 400)
+    assert len(positions) <= 400
+    assert (np.diff(positions) > 0).all()
+    np.testing.assert_array_equal(values, signal[positions])
     assert (values.max(), values.min()) == (signal.max(), signal.min())

@@ -1,4 +1,4 @@
-"""Memory does not grow with the number of blows, and progress is told."""
+"""Memory does not grow with the number of records, and progress is reported."""
 
 import tracemalloc
 
@@ -13,12 +13,12 @@ from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, w
 
 STEP_S = 1 / 2048
 N_SAMPLES = 2048
-BYTES_OF_A_BLOW = 4 * 8 * N_SAMPLES
+BYTES_OF_A_RECORD = 4 * 8 * N_SAMPLES
 
 
-def campaign(folder, records):
+def campaign(folder, n_records):
     signals = impact(Structure(), n_samples=N_SAMPLES)
-    for number in range(records):
+    for number in range(n_records):
         write_csv(folder / "hits" / f"{number:03d}.csv", (1 + 0.01 * number) * signals, STEP_S)
     return read_test(write_test(folder, HIT))
 
@@ -31,14 +31,14 @@ def peak_bytes(test):
     return peak
 
 
-def test_memory_does_not_grow_with_the_number_of_blows(tmp_path, monkeypatch):
-    monkeypatch.setattr("frf_ipz.ingest.recording_files.BUDGET", 3 * BYTES_OF_A_BLOW)
-    few, many = campaign(tmp_path / "few", 8), campaign(tmp_path / "many", 16)
-    estimate_frfs(few, IngestOptions())  # what is loaded once does not count; 8 blows give all responses to draw
-    assert peak_bytes(many) - peak_bytes(few) < 3 * BYTES_OF_A_BLOW  # 8 of them are what it would grow by
+def test_memory_does_not_grow_with_the_number_of_records(tmp_path, monkeypatch):
+    monkeypatch.setattr("frf_ipz.ingest.recording_files.BUDGET", 3 * BYTES_OF_A_RECORD)
+    small, large = campaign(tmp_path / "small", 8), campaign(tmp_path / "large", 16)
+    estimate_frfs(small, IngestOptions())  # what is loaded once does not count; 8 records give all responses to draw
+    assert peak_bytes(large) - peak_bytes(small) < 3 * BYTES_OF_A_RECORD  # 8 of them are what it would grow by
 
 
-def test_blows_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
+def test_impacts_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr("frf_ipz.ingest.recording_files.BUDGET", 0)
     force = np.zeros(20 * 2048)
     for start in range(500, len(force), 2048):
@@ -52,10 +52,10 @@ def test_blows_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
 
 
 def test_progress_rises_to_the_end(tmp_path):
-    told = []
+    reports = []
     test = read_test(hammer_campaign(tmp_path, n_samples=1024))
-    estimate_frfs(test, IngestOptions(), progress=lambda fraction, text: told.append((fraction, text)))
-    fractions = [fraction for fraction, _ in told]
+    estimate_frfs(test, IngestOptions(), progress=lambda fraction, text: reports.append((fraction, text)))
+    fractions = [fraction for fraction, _ in reports]
     assert fractions == sorted(fractions)
     assert (fractions[0], fractions[-1]) == (0.0, 1.0)
-    assert told[0][1] == "reading p7_01.csv"
+    assert reports[0][1] == "reading p7_01.csv"

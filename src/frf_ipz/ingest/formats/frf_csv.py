@@ -34,10 +34,10 @@ class _LongCsv:
         groups: dict[tuple[str, str], list[int]] = {}
         for row, pair in enumerate(zip(*(table[name].to_pylist() for name in LABELS), strict=True)):
             groups.setdefault(pair, []).append(row)
-        dofs = {text: _dof(layout, text) for pair in groups for text in pair}
+        dofs = {text: _parse_dof(layout, text) for pair in groups for text in pair}
         values = {name: table[name].to_numpy() for name in table.column_names if name not in LABELS}
         return tuple(
-            _frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
+            _make_frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
             for (output, input_), rows in groups.items()
         )
 
@@ -50,26 +50,26 @@ def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
         problem = f"has {layout.n_columns} values where the header has {len(names)} columns"
         raise FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
     numeric = [*NUMBERS, *(name for name in OPTIONAL if name in names)]
-    places = {column_index(layout, names, name): name for name in (*numeric, *LABELS)}
-    types = {place: pa.string() if name in LABELS else pa.float64() for place, name in places.items()}
+    columns = {column_index(layout, names, name): name for name in (*numeric, *LABELS)}
+    types = {index: pa.string() if name in LABELS else pa.float64() for index, name in columns.items()}
     batches = list(read_blocks(layout, names, types))
-    table = pa.Table.from_batches(batches).rename_columns(list(places.values()))
-    needed = [place for place, name in places.items() if name in NUMBERS]
-    stacked = np.column_stack([table[name].to_numpy() for name in NUMBERS])
-    bad = ~np.isfinite(stacked).all(axis=1)
+    table = pa.Table.from_batches(batches).rename_columns(list(columns.values()))
+    required = [index for index, name in columns.items() if name in NUMBERS]
+    numbers = np.column_stack([table[name].to_numpy() for name in NUMBERS])
+    bad = ~np.isfinite(numbers).all(axis=1)
     if bad.any():
-        raise not_a_number(layout, names, needed, int(np.argmax(bad)))
+        raise not_a_number(layout, names, required, int(np.argmax(bad)))
     return table
 
 
-def _dof(layout: TextLayout, text: str) -> Dof:
+def _parse_dof(layout: TextLayout, text: str) -> Dof:
     try:
         return parse_dof(text)
     except InputError as error:
         raise FileFormatError(layout.path, str(error), where="column 'output_dof' or 'input_dof'") from None
 
 
-def _frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[str, FloatArray]) -> MeasuredFrf:
+def _make_frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[str, FloatArray]) -> MeasuredFrf:
     order = np.argsort(columns["frequency_hz"], kind="stable")
     return MeasuredFrf(
         source=source,

@@ -1,4 +1,4 @@
-"""What a file with FRFs is said to hold, what it holds, and what a format for such files must offer."""
+"""Files with FRFs: how the test describes one, what it holds, and the protocol of a format for such files."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class FrfFormat(Protocol):
         Parameters
         ----------
         source : FrfSource
-            The file and what is said about it.
+            The file as the test describes it.
         head : bytes
             Its first bytes.
 
@@ -128,7 +128,7 @@ class FrfFormat(Protocol):
         Parameters
         ----------
         source : FrfSource
-            The file and what is said about it.
+            The file as the test describes it.
 
         Returns
         -------

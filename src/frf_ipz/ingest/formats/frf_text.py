@@ -34,7 +34,7 @@ class _TextColumns:
         return bool(source.columns)
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
-        _check(source)
+        _check_columns(source)
         columns = _read_columns(source)
         if source.output_dof is None or source.input_dof is None:
             raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
@@ -46,7 +46,7 @@ class _TextColumns:
                 output_dof=source.output_dof,
                 input_dof=source.input_dof,
                 frequency_hz=columns["frequency_hz"],
-                values=_values(columns),
+                values=_complex_values(columns),
                 coherence=columns.get("coherence"),
                 variance=columns.get("variance"),
             ),
@@ -56,15 +56,15 @@ class _TextColumns:
 FORMAT = _TextColumns()
 
 
-def _check(source: FrfSource) -> None:
+def _check_columns(source: FrfSource) -> None:
     for name in source.columns:
         if name not in KNOWN:
             raise FileFormatError(source.path, f"'columns' names '{name}'; {did_you_mean(name, KNOWN)}")
-    given = set(source.columns)
-    complete = {"real", "imag"} <= given or (
-        len(given & {"magnitude", "magnitude_db"}) == 1 and len(given & {"phase_deg", "phase_rad"}) == 1
+    columns = set(source.columns)
+    is_complete = {"real", "imag"} <= columns or (
+        len(columns & {"magnitude", "magnitude_db"}) == 1 and len(columns & {"phase_deg", "phase_rad"}) == 1
     )
-    if "frequency_hz" not in given or not complete:
+    if "frequency_hz" not in columns or not is_complete:
         raise FileFormatError(
             source.path,
             f"'columns' are {', '.join(source.columns)}; needed are frequency_hz and either real and imag, or one "
@@ -78,18 +78,18 @@ def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
         problem = f"has {layout.n_columns} columns, but 'columns' of its [[frf]] names {len(source.columns)}"
         raise FileFormatError(source.path, problem, where=f"line {layout.n_before + 1}")
     names = [*source.columns, *[SKIP] * (layout.n_columns - len(source.columns))]
-    wanted = [index for index, name in enumerate(names) if name != SKIP]
-    table = pa.Table.from_batches(read_blocks(layout, names, dict.fromkeys(wanted, pa.float64())))
-    numbers = np.column_stack([table.column(place).to_numpy() for place in range(len(wanted))])
+    indices = [index for index, name in enumerate(names) if name != SKIP]
+    table = pa.Table.from_batches(read_blocks(layout, names, dict.fromkeys(indices, pa.float64())))
+    numbers = np.column_stack([table.column(position).to_numpy() for position in range(len(indices))])
     bad = ~np.isfinite(numbers).all(axis=1)
     if bad.any():
-        raise not_a_number(layout, names, wanted, int(np.argmax(bad)))
-    return {names[index]: numbers[:, place] for place, index in enumerate(wanted)}
+        raise not_a_number(layout, names, indices, int(np.argmax(bad)))
+    return {names[index]: numbers[:, position] for position, index in enumerate(indices)}
 
 
-def _values(columns: dict[str, FloatArray]) -> ComplexArray:
+def _complex_values(columns: dict[str, FloatArray]) -> ComplexArray:
     if "real" in columns:
         return np.asarray(columns["real"] + 1j * columns["imag"])
     phase = columns["phase_rad"] if "phase_rad" in columns else np.radians(columns["phase_deg"])
-    size = columns["magnitude"] if "magnitude" in columns else 10.0 ** (columns["magnitude_db"] / 20.0)
-    return np.asarray(size * np.exp(1j * phase))
+    magnitude = columns["magnitude"] if "magnitude" in columns else 10.0 ** (columns["magnitude_db"] / 20.0)
+    return np.asarray(magnitude * np.exp(1j * phase))

@@ -1,4 +1,4 @@
-"""What a format for recordings gives, and what it must offer."""
+"""Recordings as their format reads them, and the protocol of a format for recordings."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class RecordingFormat(Protocol):
         path : Path
             The file.
         columns : sequence of str
-            Columns wanted besides the time.
+            Columns besides the time.
 
         Returns
         -------

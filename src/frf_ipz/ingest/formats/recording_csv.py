@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
-LARGEST = 1e100  # what is larger is no measurement, and its square may be no number
+LARGEST = 1e100  # a larger value is no measurement, and its square may overflow
 TIME = re.compile(r"^t(ime)?\b", re.IGNORECASE)
 
 
@@ -38,12 +38,12 @@ class _CsvRecordings:
 
     def open(self, path: Path, columns: Sequence[str]) -> RawRecording:
         layout = sniff(path)
-        names, units = _names_and_units(layout)
-        wanted = [0, *(column_index(layout, names, column) for column in columns)]
+        names, units = _read_header(layout)
+        indices = [0, *(column_index(layout, names, column) for column in columns)]
         return RawRecording(
             path=path,
-            units=tuple(units[index] for index in wanted),
-            blocks=_numbers(layout, names, wanted),
+            units=tuple(units[index] for index in indices),
+            blocks=_read_numbers(layout, names, indices),
             line_of_row=lambda row: line_of_row(layout, row),
         )
 
@@ -51,59 +51,64 @@ class _CsvRecordings:
 FORMAT = _CsvRecordings()
 
 
-def _names_and_units(layout: TextLayout) -> tuple[list[str], list[str]]:
+def _read_header(layout: TextLayout) -> tuple[list[str], list[str]]:
+    """Give the name and the unit of each column."""
     if not layout.header:
         return [str(index + 1) for index in range(layout.n_columns)], [""] * layout.n_columns
-    place = next((index for index, fields in enumerate(layout.header) if TIME.match(fields[0])), None)
-    if place is None:
-        said = ", ".join(field for field in layout.header[-1] if field)
-        problem = f"has no column 'time'; the first column must be the time in s, and the header says {said}"
+    header_row = next((index for index, fields in enumerate(layout.header) if TIME.match(fields[0])), None)
+    if header_row is None:
+        columns = ", ".join(field for field in layout.header[-1] if field)
+        problem = f"has no column 'time'; the first column must be the time in s, and the header says {columns}"
         raise FileFormatError(layout.path, problem, where=f"line {layout.n_before}")
-    names = _as_wide(layout, layout.header[place])
+    names = _match_width(layout, layout.header[header_row])
     units = [name_and_unit(name)[1] for name in names]
-    below = layout.header[place + 1 :]
-    if below:
-        units = [stated or unit for stated, unit in zip(_units_row(layout, below), units, strict=True)]
+    rows_below = layout.header[header_row + 1 :]
+    if rows_below:
+        units = [row_unit or unit for row_unit, unit in zip(_read_units_row(layout, rows_below), units, strict=True)]
     return names, units
 
 
-def _units_row(layout: TextLayout, below: tuple[tuple[str, ...], ...]) -> list[str]:
+def _read_units_row(layout: TextLayout, rows_below: tuple[tuple[str, ...], ...]) -> list[str]:
     """Take the line under the header as a row of units, unless it is a line of numbers with a fault."""
-    if len(below) > 1 or any(is_number(field) for field in below[0]):
-        problem = f"holds '{below[0][0]}' where a number is expected; under the header only one row of units may stand"
-        raise FileFormatError(layout.path, problem, where=f"line {layout.n_before - len(below) + 1}, column 'time'")
-    return [field.strip("[]() ") for field in _as_wide(layout, below[0])]
+    if len(rows_below) > 1 or any(is_number(field) for field in rows_below[0]):
+        problem = (
+            f"holds '{rows_below[0][0]}' where a number is expected; under the header only one row of units may stand"
+        )
+        raise FileFormatError(
+            layout.path, problem, where=f"line {layout.n_before - len(rows_below) + 1}, column 'time'"
+        )
+    return [field.strip("[]() ") for field in _match_width(layout, rows_below[0])]
 
 
-def _as_wide(layout: TextLayout, fields: Sequence[str]) -> list[str]:
+def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str]:
     """Make a line of the header as wide as the numbers where a delimiter at the end is all that differs."""
-    wide = list(fields)
-    while len(wide) > layout.n_columns and not wide[-1]:
-        wide.pop()
-    if len(wide) == layout.n_columns - 1:
-        wide.append("")
-    if len(wide) != layout.n_columns:
+    matched = list(fields)
+    while len(matched) > layout.n_columns and not matched[-1]:
+        matched.pop()
+    if len(matched) == layout.n_columns - 1:
+        matched.append("")
+    if len(matched) != layout.n_columns:
         problem = f"has {layout.n_columns} values where the header has {len(fields)} columns"
         hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
         raise FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")
-    return wide
+    return matched
 
 
-def _numbers(layout: TextLayout, names: list[str], wanted: list[int]) -> Iterator[FloatArray]:
+def _read_numbers(layout: TextLayout, names: list[str], indices: list[int]) -> Iterator[FloatArray]:
     """Give blocks of rows; rows that are empty to the last field may only stand at the end."""
-    types = dict.fromkeys(dict.fromkeys(wanted), pa.float64())
-    order = [list(types).index(index) for index in wanted]
+    types = dict.fromkeys(dict.fromkeys(indices), pa.float64())
+    order = [list(types).index(index) for index in indices]
     n_rows, first_empty = 0, -1
     for batch in read_blocks(layout, names, types):
-        block = np.column_stack([batch.column(place).to_numpy(zero_copy_only=False) for place in order])
+        block = np.column_stack([batch.column(position).to_numpy(zero_copy_only=False) for position in order])
         finite = np.abs(block) < LARGEST
         empty = ~finite.any(axis=1) & np.isnan(block).all(axis=1)
         if first_empty < 0 and empty.any():
             first_empty = n_rows + int(np.argmax(empty))
         bad = ~finite.all(axis=1) & ~empty
         if bad.any():
-            raise not_a_number(layout, names, wanted, n_rows + int(np.argmax(bad)))
+            raise not_a_number(layout, names, indices, n_rows + int(np.argmax(bad)))
         if first_empty >= 0 and not empty[max(first_empty - n_rows, 0) :].all():
-            raise not_a_number(layout, names, wanted, first_empty)
+            raise not_a_number(layout, names, indices, first_empty)
         n_rows += len(block)
         yield block[~empty]

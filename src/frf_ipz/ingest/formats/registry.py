@@ -11,7 +11,7 @@ from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.recording import RecordingFormat
-from frf_ipz.ingest.formats.text_layout import HEAD
+from frf_ipz.ingest.formats.text_layout import read_head
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
     path : Path
         The file.
     columns : sequence of str
-        Columns wanted besides the time.
+        Columns besides the time.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
     FileFormatError
         If it cannot be read, or lacks a column.
     """
-    head = _head(path)
+    head = read_head(path)
     for candidate in _formats(RecordingFormat):
         if candidate.fits(path, head):
             recording: RawRecording = candidate.open(path, columns)
@@ -55,7 +55,7 @@ def read_frfs(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     Parameters
     ----------
     source : FrfSource
-        The file and what is said about it.
+        The file as the test describes it.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def read_frfs(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     FileFormatError
         If it cannot be read.
     """
-    head = _head(source.path)
+    head = read_head(source.path)
     for candidate in _formats(FrfFormat):
         if candidate.holds(source, head):
             frfs: tuple[MeasuredFrf, ...] = candidate.read(source)
@@ -77,25 +77,9 @@ def read_frfs(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     )
 
 
-def _head(path: Path) -> bytes:
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD)
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file") from None
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
-    if not head.strip():
-        raise FileFormatError(path, "is empty; measure or export it again")
-    return head
-
-
 @cache
 def _formats(protocol: type) -> tuple[Any, ...]:
-    modules = [importlib.import_module(found.name) for found in pkgutil.iter_modules(formats.__path__, _prefix())]
+    prefix = f"{formats.__name__}."
+    modules = [importlib.import_module(module.name) for module in pkgutil.iter_modules(formats.__path__, prefix)]
     candidates = [module.FORMAT for module in modules if isinstance(getattr(module, "FORMAT", None), protocol)]
     return tuple(sorted(candidates, key=lambda candidate: candidate.rank))
-
-
-def _prefix() -> str:
-    return formats.__name__ + "."

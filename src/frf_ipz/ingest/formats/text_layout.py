@@ -12,8 +12,9 @@ from frf_ipz.errors import FileFormatError
 if TYPE_CHECKING:
     from pathlib import Path
 
-HEAD = 1 << 16  # bytes that are looked at
+HEAD = 1 << 16  # bytes from which the layout is found
 BOM = b"\xef\xbb\xbf"
+EMPTY = "is empty; measure or export it again"
 DELIMITERS = (";", "\t", ",", " ")  # in the order they are tried; the blank stands for any run of blanks
 NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
 NEWLINE = re.compile(r"\r\n|\n|\r")  # str.splitlines breaks at more
@@ -21,7 +22,7 @@ TWO_NUMBERS = re.compile(r"\d\s+[+-]?[\d.]")
 DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eE][+-]?\d+)?$")
 NAME_AND_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]$")
 MAX_HEADER = 200  # lines
-SAMPLE = MAX_HEADER + 50  # lines that tell the delimiter
+SAMPLE = MAX_HEADER + 50  # lines from which the delimiter is found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +79,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
     path : Path
         The file.
     skip_rows : int
-        Lines at the start that are not looked at.
+        Lines at the start to skip.
 
     Returns
     -------
@@ -91,24 +92,25 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
         If the file is missing, empty, no text, or holds no line of numbers.
     """
     head = read_head(path)
-    whole = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
-    lines = NEWLINE.split(decode(whole.removeprefix(BOM)))
+    _check_text(path, head)
+    whole_lines = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
+    lines = NEWLINE.split(decode(whole_lines.removeprefix(BOM)))
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
-    delimiter = _delimiter([line for _, line in rows[:SAMPLE]])
+    delimiter = _find_delimiter([line for _, line in rows[:SAMPLE]])
     first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
     if first is None or first > MAX_HEADER + skip_rows:
         raise FileFormatError(path, "holds no line that begins with a number; expected is a table of numbers")
-    before = tuple(tuple(split_line(line, delimiter)) for index, line in rows if index < first)
+    header = tuple(tuple(split_line(line, delimiter)) for index, line in rows if index < first)
     fields = split_line(lines[first], delimiter)
-    commas = delimiter != "," and any(
+    has_commas = delimiter != "," and any(
         DECIMAL_COMMA.match(field) for _, line in rows[:50] for field in split_line(line, delimiter)
     )
     return TextLayout(
         path=path,
         delimiter=delimiter,
-        decimal="," if commas else ".",
+        decimal="," if has_commas else ".",
         n_before=first,
-        header=before,
+        header=header,
         n_columns=len(fields),
         starts_with_bom=head.startswith(BOM),
     )
@@ -130,7 +132,7 @@ def read_head(path: Path) -> bytes:
     Raises
     ------
     FileFormatError
-        If there is no such file, it cannot be read, is empty, or is no text.
+        If there is no such file, it cannot be read, or is empty.
     """
     try:
         with path.open("rb") as stream:
@@ -139,10 +141,8 @@ def read_head(path: Path) -> bytes:
         raise FileFormatError(path, "there is no such file") from None
     except OSError as error:
         raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
-    if not head.strip(b" \t\r\n" + BOM):
-        raise FileFormatError(path, "is empty; measure or export it again")
-    if b"\0" in head:
-        raise FileFormatError(path, "is no text in UTF-8 or Latin-1 (it holds zero bytes); export it as CSV")
+    if not head.strip():
+        raise FileFormatError(path, EMPTY)
     return head
 
 
@@ -224,7 +224,14 @@ def name_and_unit(text: str) -> tuple[str, str]:
     return (match["name"], match["unit"].strip()) if match else (text, "")
 
 
-def _delimiter(lines: list[str]) -> str:
+def _check_text(path: Path, head: bytes) -> None:
+    if not head.strip(b" \t\r\n" + BOM):
+        raise FileFormatError(path, EMPTY)
+    if b"\0" in head:
+        raise FileFormatError(path, "is no text in UTF-8 or Latin-1 (it holds zero bytes); export it as CSV")
+
+
+def _find_delimiter(lines: list[str]) -> str:
     """Take the first delimiter that splits most lines of numbers sensibly."""
     for delimiter in DELIMITERS:
         split = [split_line(line, delimiter) for line in lines]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BLOCK_BYTES = 1 << 22
 
 
-def column_index(layout: TextLayout, names: Sequence[str], wanted: str) -> int:
+def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
     """Find a column by its name, with or without the unit in brackets behind it.
 
     Parameters
@@ -28,7 +28,7 @@ def column_index(layout: TextLayout, names: Sequence[str], wanted: str) -> int:
         The file's layout, for the message.
     names : sequence of str
         The header.
-    wanted : str
+    column : str
         The name.
 
     Returns
@@ -42,15 +42,15 @@ def column_index(layout: TextLayout, names: Sequence[str], wanted: str) -> int:
         If there is no such column, or more than one.
     """
     plain = [name_and_unit(name)[0] for name in names]
-    places = [index for index, name in enumerate(names) if name == wanted]
-    places = places or [index for index, name in enumerate(plain) if name == wanted]
-    if not places:
+    indices = [index for index, name in enumerate(names) if name == column]
+    indices = indices or [index for index, name in enumerate(plain) if name == column]
+    if not indices:
         known = [name for name in names if name]
         where = f"line {max(layout.n_before, 1)}"
-        raise FileFormatError(layout.path, f"has no column '{wanted}'; {did_you_mean(wanted, known)}", where=where)
-    if len(places) > 1:
-        raise FileFormatError(layout.path, f"has {len(places)} columns '{wanted}'; give each its own name")
-    return places[0]
+        raise FileFormatError(layout.path, f"has no column '{column}'; {did_you_mean(column, known)}", where=where)
+    if len(indices) > 1:
+        raise FileFormatError(layout.path, f"has {len(indices)} columns '{column}'; give each its own name")
+    return indices[0]
 
 
 def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.DataType]) -> Iterator[pa.RecordBatch]:
@@ -63,7 +63,7 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
     names : sequence of str
         Names of all its columns, for messages.
     types : dict of int to DataType
-        Index and type of the columns wanted, in the order wanted.
+        Index and type of the columns to read, in the order to give them.
 
     Yields
     ------
@@ -79,7 +79,7 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
     try:
         with layout.path.open("rb") as stream:
             reader = arrow_csv.open_csv(
-                _source(stream, layout),
+                _prepare_stream(stream, layout),
                 read_options=arrow_csv.ReadOptions(
                     column_names=keys, skip_rows=layout.n_before, block_size=BLOCK_BYTES, use_threads=False
                 ),
@@ -94,7 +94,7 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
             yield from reader
     except pa.ArrowInvalid as error:
         numeric = [index for index, kind in types.items() if pa.types.is_floating(kind)]
-        raise _explain(layout, names, numeric, str(error)) from None
+        raise _explain_error(layout, names, numeric, str(error)) from None
     except OSError as error:
         raise FileFormatError(layout.path, f"cannot be read: {error.strerror or error}") from None
 
@@ -107,20 +107,20 @@ def line_of_row(layout: TextLayout, row: int) -> int:
     layout : TextLayout
         The file's layout.
     row : int
-        Row, from 0; empty lines are no rows.
+        Row, from 0; empty lines do not count.
 
     Returns
     -------
     int
         Line, from 1.
     """
-    for count, (number, _) in enumerate(_rows(layout)):
+    for count, (number, _) in enumerate(_numbered_rows(layout)):
         if count == row:
             return number
     return 0
 
 
-def not_a_number(layout: TextLayout, names: Sequence[str], wanted: Sequence[int], row: int) -> FileFormatError:
+def not_a_number(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], row: int) -> FileFormatError:
     """Make the error for a row that holds an empty field, NaN or infinity.
 
     Parameters
@@ -129,7 +129,7 @@ def not_a_number(layout: TextLayout, names: Sequence[str], wanted: Sequence[int]
         The file's layout.
     names : sequence of str
         Names of all columns.
-    wanted : sequence of int
+    numeric : sequence of int
         Indices of the columns that must be numbers.
     row : int
         The row.
@@ -137,11 +137,11 @@ def not_a_number(layout: TextLayout, names: Sequence[str], wanted: Sequence[int]
     Returns
     -------
     FileFormatError
-        Names line, column and what stands there.
+        Names line, column and content.
     """
     line = line_of_row(layout, row)
-    fields = next((layout.split(text) for number, text in _rows(layout) if number == line), [])
-    for index in wanted:
+    fields = next((layout.split(text) for number, text in _numbered_rows(layout) if number == line), [])
+    for index in numeric:
         field = fields[index] if index < len(fields) else ""
         if not is_number(field):
             return _bad_field(layout.path, line, names[index], field)
@@ -150,9 +150,9 @@ def not_a_number(layout: TextLayout, names: Sequence[str], wanted: Sequence[int]
     )
 
 
-def _explain(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], reason: str) -> FileFormatError:
+def _explain_error(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], reason: str) -> FileFormatError:
     """Find the first line that cannot be read, and say what is wrong with it."""
-    lines = list(_rows(layout))
+    lines = list(_numbered_rows(layout))
     for number, line in lines:
         fields = layout.split(line)
         if len(fields) != len(names):
@@ -163,21 +163,23 @@ def _explain(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], r
     return FileFormatError(layout.path, f"cannot be read as a table of numbers: {reason.splitlines()[0]}")
 
 
-def _bad_length(layout: TextLayout, number: int, found: int, expected: int, *, is_last: bool) -> FileFormatError:
-    place = f"line {number}"
-    if is_last and found < expected:
+def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, is_last: bool) -> FileFormatError:
+    where = f"line {number}"
+    if is_last and length < expected:
         return FileFormatError(
             layout.path,
-            f"the last line has {found} of {expected} values: the file is cut off; copy or export it again",
-            where=place,
+            f"the last line has {length} of {expected} values: the file is cut off; copy or export it again",
+            where=where,
         )
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
-    return FileFormatError(layout.path, f"has {found} values where the table has {expected} columns{hint}", where=place)
+    return FileFormatError(
+        layout.path, f"has {length} values where the table has {expected} columns{hint}", where=where
+    )
 
 
 def _bad_field(path: Path, line: int, name: str, field: str) -> FileFormatError:
-    given = f"'{field}'" if field else "nothing"
-    problem = f"holds {given} where a number is expected; correct the file, or leave it out by [ingest] drop"
+    content = f"'{field}'" if field else "nothing"
+    problem = f"holds {content} where a number is expected; correct the file, or leave it out by [ingest] drop"
     return FileFormatError(path, problem, where=f"line {line}, column '{name}'")
 
 
@@ -185,7 +187,7 @@ def _is_special(field: str) -> bool:
     return field.lower().lstrip("+-") in {"nan", "inf", "infinity", "null", "n/a", "#n/a"}
 
 
-def _rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
+def _numbered_rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
     """Give the lines of numbers with their line numbers."""
     number = 0
     with layout.path.open("rb") as stream:
@@ -200,7 +202,7 @@ def _arrow_delimiter(layout: TextLayout) -> str:
     return "\t" if layout.delimiter == " " else layout.delimiter
 
 
-def _source(stream: BinaryIO, layout: TextLayout) -> BinaryIO | _BlankSeparated:
+def _prepare_stream(stream: BinaryIO, layout: TextLayout) -> BinaryIO | _BlankSeparated:
     if layout.starts_with_bom:
         stream.seek(len(BOM))
     return _BlankSeparated(stream) if layout.delimiter == " " else stream
@@ -213,16 +215,16 @@ class _BlankSeparated:
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._left = b""
+        self._buffer = b""
 
     def read(self, size: int = -1) -> bytes:
-        while size < 0 or len(self._left) < size:
+        while size < 0 or len(self._buffer) < size:
             lines = self._stream.readlines(BLOCK_BYTES)
             if not lines:
                 break
-            self._left += b"".join(b"\t".join(line.split()) + b"\n" for line in lines)
-        size = len(self._left) if size < 0 else size
-        result, self._left = self._left[:size], self._left[size:]
+            self._buffer += b"".join(b"\t".join(line.split()) + b"\n" for line in lines)
+        size = len(self._buffer) if size < 0 else size
+        result, self._buffer = self._buffer[:size], self._buffer[size:]
         return result
 
     def readable(self) -> bool:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 
 EQUAL = 1e-6  # of the range: values that differ by less were the same reading
 FEWEST_STEPS = 30  # digital steps: a signal of fewer has equal extreme values by nature
 CORNER = 4.0  # digital steps: a smooth top falls off less than this beside two equal samples
 SYMMETRIC = 1e-3  # of the height: a pulse without noise that is sampled symmetrically has equal samples in pairs
-NEAR, MORE = 0.03, 3.0  # of the height: samples near the top; and times as many at the top as smooth tops have
-STEEP = 0.01  # of the height: what the signal falls beside a plateau that was cut
+NEAR_TOP = 0.03  # of the height: samples just below the top
+PILED_UP = 3.0  # times as many samples at the top as smooth tops have
+STEEP = 0.01  # of the height: drop of the signal beside a plateau that was cut
 
 
 def is_clipped(signal: FloatArray) -> bool:
@@ -38,9 +39,9 @@ def is_clipped(signal: FloatArray) -> bool:
         return False
     centre = float(np.median(signal))
     # the sample beside a plateau may lie just past the corner: fine signals show the next
-    sides = [(side, _plateaus(side, reach=1 if step else 2)) for side in (signal - centre, centre - signal)]
-    meets_both = not step and abs(float(signal.max() + signal.min())) < EQUAL * height  # ends of the range
-    if meets_both and any(_has_corners(*side) for side in sides):
+    sides = [(side, _find_plateaus(side, reach=1 if step else 2)) for side in (signal - centre, centre - signal)]
+    is_symmetric = not step and abs(float(signal.max() + signal.min())) < EQUAL * height  # both ends of the range
+    if is_symmetric and any(_has_corners(*side) for side in sides):
         return True
     return any(_is_cut(*side, step, height) for side in sides)
 
@@ -56,7 +57,7 @@ def digital_step(signal: FloatArray) -> float:
     Returns
     -------
     float
-        The step; 0 where the signal is finer than can be told.
+        The step; 0 where the signal is too fine to show one.
 
     Examples
     --------
@@ -72,30 +73,30 @@ def digital_step(signal: FloatArray) -> float:
     return step if float(np.abs(multiples - np.round(multiples)).max()) < 0.05 else 0.0
 
 
-def share_a_rail(peaks: FloatArray, widths: FloatArray) -> np.ndarray:
+def share_a_rail(peaks: FloatArray, widths: FloatArray) -> BoolArray:
     """Tell which of several pulses have equal peaks to the last digit: they met the end of one range.
 
     Parameters
     ----------
     peaks : (n,) array
-        Extreme values of different blows, with signs.
+        Extreme values of different records, with signs.
     widths : (n,) array
-        Their lengths. Pulses that are alike in both are copies of one blow, which says nothing about a range.
+        Their lengths. Pulses that agree in both are copies of one impact, which says nothing about a range.
 
     Returns
     -------
     (n,) bool array
-        True for a peak that is the largest and equals another one.
+        True for the largest peaks, where several are equal.
     """
     if peaks.size < 2:
         return np.zeros(peaks.size, bool)
     top = peaks[np.argmax(np.abs(peaks))]
-    same = np.abs(peaks - top) <= EQUAL * abs(top)
-    differ = float(np.ptp(widths[same])) > EQUAL * float(widths[same].max())
-    return np.asarray(same & differ)
+    is_top = np.abs(peaks - top) <= EQUAL * abs(top)
+    widths_differ = float(np.ptp(widths[is_top])) > EQUAL * float(widths[is_top].max())
+    return np.asarray(is_top & widths_differ)
 
 
-def _plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
+def _find_plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
     top = float(upward.max())
     at_top = upward >= top - EQUAL * float(np.ptp(upward))
     edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
@@ -111,19 +112,19 @@ def _is_cut(upward: FloatArray, plateaus: list[_Plateau], step: float, height: f
     longest = max((plateau.length for plateau in steep), default=0)
     if step:
         return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, plateaus)
-    lopsided = any(plateau.length == 2 and plateau.lopsided > SYMMETRIC * top for plateau in steep)
-    return longest >= 3 or lopsided or (len(plateaus) >= 2 and _has_corners(upward, plateaus))
+    is_lopsided = any(plateau.length == 2 and plateau.asymmetry > SYMMETRIC * top for plateau in steep)
+    return longest >= 3 or is_lopsided or (len(plateaus) >= 2 and _has_corners(upward, plateaus))
 
 
 class _Plateau:
     """Equal samples at the top: how many, how far the signal falls beside them, and how unequally."""
 
     def __init__(self, upward: FloatArray, start: int, stop: int, top: float, reach: int) -> None:
-        beside = [float(upward[place]) for place in (start - 1, stop) if 0 <= place < len(upward)]
-        around = upward[max(start - reach, 0) : stop + reach]
+        neighbours = [float(upward[sample]) for sample in (start - 1, stop) if 0 <= sample < len(upward)]
+        vicinity = upward[max(start - reach, 0) : stop + reach]
         self.length = stop - start
-        self.drop = top - float(around.min())
-        self.lopsided = max(beside) - min(beside) if beside else 0.0
+        self.drop = top - float(vicinity.min())
+        self.asymmetry = max(neighbours) - min(neighbours) if neighbours else 0.0
 
 
 def _has_corners(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
@@ -132,17 +133,17 @@ def _has_corners(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
     Smooth tops fall off with the square of time: of the samples near them, a part that is a square root is at the top.
     A sweep has hundreds of tops of one height.
     """
-    count, near = _at_and_near_top(upward, plateaus)
-    return bool(count > MORE * near * np.sqrt(EQUAL * np.ptp(upward) / (NEAR * upward.max())))
+    n_at_top, n_near_top = _count_at_and_near_top(upward, plateaus)
+    return bool(n_at_top > PILED_UP * n_near_top * np.sqrt(EQUAL * np.ptp(upward) / (NEAR_TOP * upward.max())))
 
 
 def _is_piled_up(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
     """Tell whether far more samples stand at the top than just below it."""
-    count, near = _at_and_near_top(upward, plateaus)
-    return count >= 3 and count > 2 * near
+    n_at_top, n_near_top = _count_at_and_near_top(upward, plateaus)
+    return n_at_top >= 3 and n_at_top > 2 * n_near_top
 
 
-def _at_and_near_top(upward: FloatArray, plateaus: list[_Plateau]) -> tuple[int, int]:
+def _count_at_and_near_top(upward: FloatArray, plateaus: list[_Plateau]) -> tuple[int, int]:
     """Count samples at the top, and just below it."""
-    count = sum(plateau.length for plateau in plateaus)
-    return count, int((upward > (1 - NEAR) * upward.max()).sum()) - count
+    n_at_top = sum(plateau.length for plateau in plateaus)
+    return n_at_top, int((upward > (1 - NEAR_TOP) * upward.max()).sum()) - n_at_top

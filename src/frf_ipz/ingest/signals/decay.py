@@ -1,8 +1,8 @@
-"""How much of a decaying response is left at the end of its record, mode by mode, and the noise under it.
+"""How much of its amplitude a decaying response still has at the end of its record, and the noise under it.
 
-The second half of the response is compared with the first, frequency by frequency: a mode of decay rate a has lost
-exp(-a T) of its power from the one to the other, and that is also the share of its amplitude that is left at the end
-of the record. The median of neighbouring lines is the noise, since modes are narrow peaks.
+The second half of the response is compared with the first, frequency by frequency: from the first to the second, the
+power of a mode of decay rate a falls to exp(-a T), and so does its amplitude over the whole record of length T. The
+median of neighbouring lines is the noise, since modes are narrow peaks.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from frf_ipz.arrays import BoolArray, FloatArray
 FEWEST_LINES = 32
 NEIGHBOURS = 51  # lines whose median is the noise
 MEDIAN = np.log(2.0)  # of the power of noise, over its mean
-DISTINCT = 20.0  # times the noise: power of a mode that still rings
+RINGING = 20.0  # times the noise: power of a mode that still rings
 NOTABLE = 0.01  # of the strongest peak, in the response or in its velocity: weaker modes do not decide on a window
 MAINS_HZ = (50.0, 60.0)
-STEADY = 0.8  # of its power is left of a hum
+STEADY = 0.8  # of its power: what remains of hum, which does not decay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,12 +43,12 @@ class Decay:
 
 
 def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
-    """Measure how much of a response is left at the end of its record.
+    """Measure how much of a response remains at the end of its record.
 
     Parameters
     ----------
     response : (n,) array
-        From the blow on, SI.
+        From the impact on, SI.
     step_s : float
         Time step, s.
     power : int
@@ -57,18 +57,18 @@ def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
     Returns
     -------
     Decay
-        The slowest mode's rest, and the noise.
+        What remains of the slowest mode, and the noise.
     """
     half = len(response) // 2
     if half < 2 * FEWEST_LINES:
         return Decay(remaining_amplitude=0.0, frequency_hz=0.0, noise=0.0)
-    frequency, first, last = _halves(response, half, step_s)
-    floor = _floor(last)
+    frequency, first, last = _power_of_halves(response, half, step_s)
+    floor = _noise_floor(last)
     noise = float(np.sqrt(np.mean(floor) / np.sum(np.hanning(half) ** 2)))
     early = maximum_filter1d(first, 5)
-    rings = (last == maximum_filter1d(last, 7)) & (last > DISTINCT * floor) & (frequency > 2.5 / (half * step_s))
-    rings &= (last < early) & _is_notable(early, frequency, power)
-    ratio = np.where(rings, last / np.maximum(early, np.finfo(float).tiny), 0.0)
+    is_ringing = (last == maximum_filter1d(last, 7)) & (last > RINGING * floor) & (frequency > 2.5 / (half * step_s))
+    is_ringing &= (last < early) & _is_notable(early, frequency, power)
+    ratio = np.where(is_ringing, last / np.maximum(early, np.finfo(float).tiny), 0.0)
     ratio[_is_hum(frequency, ratio)] = 0.0
     slowest = int(np.argmax(ratio))
     return Decay(
@@ -99,11 +99,11 @@ def noise_power(signal: FloatArray, step_s: float, frequency_hz: FloatArray) -> 
     half = len(signal) // 2
     if half < 2 * FEWEST_LINES:
         return np.full(len(frequency_hz), np.nan)
-    frequency, _, last = _halves(signal, half, step_s)
-    return np.interp(frequency_hz, frequency, _floor(last) / np.sum(np.hanning(half) ** 2))
+    frequency, _, last = _power_of_halves(signal, half, step_s)
+    return np.interp(frequency_hz, frequency, _noise_floor(last) / np.sum(np.hanning(half) ** 2))
 
 
-def _halves(signal: FloatArray, half: int, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _power_of_halves(signal: FloatArray, half: int, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     window = np.hanning(half)
     parts = np.stack([signal[:half], signal[-half:]]) * window
     spectra = np.fft.rfft(parts)
@@ -111,7 +111,7 @@ def _halves(signal: FloatArray, half: int, step_s: float) -> tuple[FloatArray, F
     return np.asarray(np.fft.rfftfreq(half, step_s)), first, last
 
 
-def _floor(power: FloatArray) -> FloatArray:
+def _noise_floor(power: FloatArray) -> FloatArray:
     return np.asarray(median_filter(power, NEIGHBOURS, mode="nearest") / MEDIAN)
 
 
@@ -124,6 +124,8 @@ def _is_notable(power: FloatArray, frequency_hz: FloatArray, derivative: int) ->
 def _is_hum(frequency_hz: FloatArray, ratio: FloatArray) -> BoolArray:
     """Tell which lines are multiples of the mains' frequency and do not decay."""
     spacing = frequency_hz[1]
-    near = [np.abs(frequency_hz - mains * np.round(frequency_hz / mains)) < 1.5 * spacing for mains in MAINS_HZ]
-    # where lines are so wide that every one is near a multiple, nothing can be said
-    return np.asarray((near[0] | near[1]) & (ratio > STEADY) & (12.0 * spacing < MAINS_HZ[0]))
+    is_multiple = np.zeros(len(frequency_hz), bool)
+    for mains in MAINS_HZ:
+        is_multiple |= np.abs(frequency_hz - mains * np.round(frequency_hz / mains)) < 1.5 * spacing
+    # where lines are so wide that every one is close to a multiple, hum cannot be recognised
+    return np.asarray(is_multiple & (ratio > STEADY) & (12.0 * spacing < MAINS_HZ[0]))

@@ -1,30 +1,38 @@
-"""Windows: a force window around the pulse, an exponential one that force and response share.
+"""Windows: a force window around the pulse, an exponential one on force and response, Hann windows on segments.
 
-With both multiplied by exp(-sigma t) the ratio of their transforms is exactly the transfer function at sigma + i omega,
-provided that the structure is at rest before the window starts and nothing is left at its end.
+With force and response multiplied by exp(-sigma t) the ratio of their transforms is exactly the transfer function at
+sigma + i omega, provided that the structure is at rest before the window starts and again at its end.
+
+[Welch1967]: P. D. Welch, The use of fast Fourier transform for the estimation of power spectra, IEEE Transactions on
+Audio and Electroacoustics 15(2) (1967) 70-73 (doi:10.1109/TAU.1967.1161901).
 """
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
 
-TAPER = 0.25  # of the kept stretch, at each end, outside of it
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+TAPER = 0.25  # of the length of the interval, at each end, outside of it
 SHORTEST_TAPER = 4  # samples
+HANN_HALF_OVERLAP = 1.0 / 18.0  # twice the squared correlation of segments that overlap by half, [Welch1967]
 
 
 def force_window(n_samples: int, start: int, stop: int) -> FloatArray:
-    """Make a window that keeps a stretch and falls to zero outside in half a cosine.
+    """Make a window that is 1 on an interval and falls to zero outside in half a cosine.
 
     Parameters
     ----------
     n_samples : int
         Length of the record.
     start, stop : int
-        First sample that is kept whole, and the one after the last; may lie outside the record.
+        First sample of the interval, and the one after the last; may lie outside the record.
 
     Returns
     -------
@@ -33,17 +41,17 @@ def force_window(n_samples: int, start: int, stop: int) -> FloatArray:
     """
     taper = taper_length(start, stop)
     sample = np.arange(n_samples)
-    outside = np.maximum(np.maximum(start - sample, sample - (stop - 1)), 0)
-    return np.asarray(0.5 + 0.5 * np.cos(np.pi * np.minimum(outside / (taper + 1), 1.0)))
+    distance = np.maximum(np.maximum(start - sample, sample - (stop - 1)), 0)
+    return np.asarray(0.5 + 0.5 * np.cos(np.pi * np.minimum(distance / (taper + 1), 1.0)))
 
 
 def taper_length(start: int, stop: int) -> int:
-    """Return how far a force window reaches beyond the stretch it keeps.
+    """Return how far a force window reaches beyond its interval.
 
     Parameters
     ----------
     start, stop : int
-        The stretch.
+        The interval.
 
     Returns
     -------
@@ -54,7 +62,7 @@ def taper_length(start: int, stop: int) -> int:
 
 
 def exponential_window(n_samples: int, step_s: float, decay_1_s: float, origin: int) -> FloatArray:
-    """Make an exponential window that is 1 at the blow.
+    """Make an exponential window that is 1 at the impact.
 
     Parameters
     ----------
@@ -86,8 +94,44 @@ def correlated_lines(decay: float) -> int:
     Returns
     -------
     int
-        At least 1. Of so many lines one is independent: whoever fits takes one in so many.
+        At least 1. One in so many lines is independent: a fit takes one in so many.
     """
     if decay < 1e-6:
         return 1
     return max(1, round(0.5 * decay / math.tanh(0.5 * decay)))
+
+
+def cut_segments(signals: FloatArray, length: int) -> Iterator[FloatArray]:
+    """Cut signals into segments that overlap by half, under Hann windows, [Welch1967].
+
+    Parameters
+    ----------
+    signals : (n_signals, n_samples) array
+        Force and responses.
+    length : int
+        Samples of a segment.
+
+    Yields
+    ------
+    (n_signals, length) array
+        One segment after the other.
+    """
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    for start in range(0, signals.shape[1] - length + 1, max(length // 2, 1)):
+        yield signals[:, start : start + length] * window
+
+
+def count_independent_segments(count: int) -> float:
+    """Return how many independent segments half-overlapping ones under Hann windows are worth, [Welch1967].
+
+    Parameters
+    ----------
+    count : int
+        Segments.
+
+    Returns
+    -------
+    float
+        A little less than `count`.
+    """
+    return count / (1.0 + HANN_HALF_OVERLAP * (count - 1) / count) if count else 0.0

@@ -1,1 +1,1 @@
-"""The first look at recordings: where the blows are, what is wrong with each, what is used and how."""
+"""The first pass over recordings: where the impacts are, what is wrong with each record, what is used and how."""

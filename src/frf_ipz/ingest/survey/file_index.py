@@ -1,4 +1,4 @@
-"""A file's length, step and blows, found in one pass that keeps an envelope of the force only."""
+"""A file's length, time step and impacts, found in one pass that keeps an envelope of the force only."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.recording_files import RecordingFiles
 
 CELL = 64  # samples of the envelope's cells
-BURST = 0.02  # of the highest force of the file: what may be a blow of its own
-QUIET = 5.0  # times the median cell, which is noise or hum: what may be a blow
-NO_BLOW = 3.0  # times the median cell: a highest force below this is no blow at all
-BOUNCE_S = 0.1  # pulses closer than this are one blow that hit twice
-CROWDED = 0.5  # of the longest stretch between pulses: closer ones are one blow that hit twice
+BURST = 0.02  # of the highest force of the file: what may be an impact of its own
+QUIET = 5.0  # times the median cell, which is noise or hum: what may be an impact
+NO_IMPACT = 3.0  # times the median cell: a highest force below this is no impact at all
+BOUNCE_S = 0.1  # pulses closer than this are one impact that hit twice
+CROWDED = 0.5  # of the longest distance between pulses: closer ones are one impact that hit twice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FileIndex:
-    """What one pass through a file tells.
+    """Length, time step and pulses of a file.
 
     Parameters
     ----------
     setup : TestSetup
-        What the file belongs to.
+        The set-up that the file belongs to.
     path : Path
         The file.
     n_rows : int
@@ -60,37 +60,37 @@ class _Envelope:
 
     highest: list[FloatArray] = field(default_factory=list)
     lowest: list[FloatArray] = field(default_factory=list)
-    left: FloatArray = field(default_factory=lambda: np.empty(0))
+    remainder: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def add(self, force: FloatArray) -> None:
-        force = np.concatenate([self.left, force])
+        force = np.concatenate([self.remainder, force])
         n_cells = len(force) // CELL
         cells = force[: n_cells * CELL].reshape(n_cells, CELL)
         self.highest.append(cells.max(axis=1))
         self.lowest.append(cells.min(axis=1))
-        self.left = force[n_cells * CELL :].copy()
+        self.remainder = force[n_cells * CELL :].copy()
 
-    def size(self) -> FloatArray:
+    def amplitude(self) -> FloatArray:
         """Give the largest distance from the base in each cell; the last one may be shorter."""
-        rest = [self.left] if self.left.size else []
-        highest = np.concatenate([*self.highest, *[part.max(keepdims=True) for part in rest]])
-        lowest = np.concatenate([*self.lowest, *[part.min(keepdims=True) for part in rest]])
+        last_cell = [self.remainder] if self.remainder.size else []
+        highest = np.concatenate([*self.highest, *[cell.max(keepdims=True) for cell in last_cell]])
+        lowest = np.concatenate([*self.lowest, *[cell.min(keepdims=True) for cell in last_cell]])
         base = float(np.median(0.5 * (highest + lowest)))
         return np.asarray(np.maximum(highest - base, base - lowest))
 
 
-def index_file(files: RecordingFiles, setup: TestSetup, path: Path, *, for_records: bool) -> FileIndex:
-    """Look through a file.
+def index_file(files: RecordingFiles, setup: TestSetup, path: Path, *, find_impacts: bool) -> FileIndex:
+    """Read through a file.
 
     Parameters
     ----------
     files : RecordingFiles
         The recordings.
     setup : TestSetup
-        What the file belongs to.
+        The set-up that the file belongs to.
     path : Path
         The file.
-    for_blows : bool
+    find_impacts : bool
         Look for pulses of the force.
 
     Returns
@@ -101,7 +101,7 @@ def index_file(files: RecordingFiles, setup: TestSetup, path: Path, *, for_recor
     Raises
     ------
     FileFormatError
-        If the file cannot be read, or no blow is found.
+        If the file cannot be read, or no impact is found.
     """
     envelope = _Envelope()
     n_rows, first, last = 0, 0.0, 0.0
@@ -111,12 +111,12 @@ def index_file(files: RecordingFiles, setup: TestSetup, path: Path, *, for_recor
         last = float(block[-1, 0])
         n_rows += len(block)
         envelope.add(block[:, 1])
-    onsets = _onsets(path, files.test.input_channel.column, envelope.size()) if for_records else ()
+    onsets = _find_onsets(path, files.test.input_channel.column, envelope.amplitude()) if find_impacts else ()
     return FileIndex(setup=setup, path=path, n_rows=n_rows, step_s=(last - first) / (n_rows - 1), onsets=onsets)
 
 
-def split_records(index: FileIndex, usual_length: int) -> tuple[tuple[int, int], ...]:
-    """Split a file at its blows.
+def split_impacts(index: FileIndex, usual_length: int) -> tuple[tuple[int, int], ...]:
+    """Split a file at its impacts.
 
     Parameters
     ----------
@@ -128,13 +128,13 @@ def split_records(index: FileIndex, usual_length: int) -> tuple[tuple[int, int],
     Returns
     -------
     tuple of pairs of int
-        First row and row after the last of each blow. A blow begins a little before its pulse; a file with one blow
-        is one piece. Pulses that follow too soon to be a new blow stay in the piece of the one before.
+        First row and row after the last of each impact. An impact begins a little before its pulse; a file with one
+        impact is not split. A pulse that follows too soon to be a new impact belongs to the impact before.
     """
-    apart = max(CROWDED * usual_length, BOUNCE_S / index.step_s)
+    distance = max(CROWDED * usual_length, BOUNCE_S / index.step_s)
     starts = [index.onsets[0]]
     for onset in index.onsets[1:]:
-        if onset - starts[-1] >= apart:
+        if onset - starts[-1] >= distance:
             starts.append(onset)
     if len(starts) == 1:
         return ((0, index.n_rows),)
@@ -143,14 +143,14 @@ def split_records(index: FileIndex, usual_length: int) -> tuple[tuple[int, int],
     return tuple(pairwise(bounds))
 
 
-def _onsets(path: Path, column: str, size: FloatArray) -> tuple[int, ...]:
-    top, quiet = float(size.max()), float(np.median(size))
-    if top == 0.0 or (top < NO_BLOW * quiet and len(size) > 3):
+def _find_onsets(path: Path, column: str, amplitude: FloatArray) -> tuple[int, ...]:
+    highest, level = float(amplitude.max()), float(np.median(amplitude))
+    if highest == 0.0 or (highest < NO_IMPACT * level and len(amplitude) > 3):
         problem = (
-            f"no blow found: the column '{column}' rises to {top:.3g} N at most over a level of {quiet:.3g} N; "
+            f"no impact found: the column '{column}' rises to {highest:.3g} N at most over a level of {level:.3g} N; "
             "is it the force, or is the file to be left out by [ingest] drop?"
         )
         raise FileFormatError(path, problem)
-    loud = size >= min(max(BURST * top, QUIET * quiet), top)
+    loud = amplitude >= min(max(BURST * highest, QUIET * level), highest)
     begins = np.flatnonzero(np.diff(loud.astype(np.int8), prepend=0) > 0)
     return tuple(int(cell) * CELL for cell in begins)

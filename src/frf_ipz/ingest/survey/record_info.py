@@ -1,4 +1,4 @@
-"""What is known about one blow or record, and what was decided for a whole test."""
+"""What the survey measures of each record, and what it decides for a whole test."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from frf_ipz.ingest.campaign import TestSetup
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordInfo:
-    """One blow or record: where it is, what was measured, what is wrong with it.
+    """One impact of a hammer or one record of a shaker: where it is, what was measured, what is wrong with it.
 
     Parameters
     ----------
     name : str
-        Its file, relative to the test, with ``#2`` for the second blow of a file.
+        Its file, relative to the test, with ``#2`` for the second impact in a file.
     setup : TestSetup
         What it belongs to.
     path : Path
@@ -26,24 +26,24 @@ class RecordInfo:
         Time step of the file, s.
     trigger : int
         Sample, from `start`, at which the force sets in.
-    pulse : pair of int
+    pulse_interval : pair of int
         First sample of its pulse, ringing and second pulses included, and the one after the last; from `start`.
     force_interval : pair of int
-        The stretch of the force that a force window leaves; the whole where there is none.
+        The samples that a force window keeps, first and one after the last, from `start`; all where there is none.
     offsets : tuple of float
-        Constant part of the force and of each response that is taken off, SI.
+        DC offset of the force and of each response, to be subtracted, SI.
     peak_force : float
         Extreme value of the force, N, with its sign.
-    digital_force : bool
-        The force moves in coarse steps, so that equal peaks mean nothing.
+    has_coarse_force : bool
+        The force is digitised in coarse steps, so that equal peaks mean nothing.
     pulse_s : float
-        Length of the pulse at half of its height, s; NaN for records.
+        Length of the pulse at half of its height, s; NaN for a shaker's record.
     force_noise : float
-        Standard deviation of the force outside of its pulse, N.
+        Standard deviation of the force outside of its pulse, N; NaN for a shaker's record.
     second_pulse_ratio : float
         Height of a second pulse over the first; 0 where there is none.
     remaining_amplitude : float
-        Share of the slowest mode's amplitude that is left at the end.
+        Share of its amplitude that the slowest mode still has at the end.
     slowest_mode_hz : float
         That mode's frequency, Hz.
     snr_db : float
@@ -51,11 +51,11 @@ class RecordInfo:
     starts_at_rest : bool
         The structure was at rest at the first sample.
     number : int
-        1 for the first blow of its file: what that has left may still move the structure at the next.
+        1 for the first impact in its file; at those after it, the structure may still move from the one before.
     faults : tuple of str
-        Why it would be left out.
+        Why it is left out unless the user keeps it.
     remarks : tuple of str
-        What is wrong and can be lived with.
+        What is wrong without being a reason to leave it out.
     used : bool
         It enters the FRFs.
     """
@@ -67,11 +67,11 @@ class RecordInfo:
     stop: int
     step_s: float
     trigger: int
-    pulse: tuple[int, int]
+    pulse_interval: tuple[int, int]
     force_interval: tuple[int, int]
     offsets: tuple[float, ...]
     peak_force: float
-    digital_force: bool
+    has_coarse_force: bool
     pulse_s: float
     force_noise: float
     second_pulse_ratio: float = 0.0
@@ -91,33 +91,33 @@ class RecordInfo:
 
     @property
     def ringing_s(self) -> float:
-        """Time from the blow to the end, s."""
+        """Time from the impact to the end, s."""
         return (self.n_samples - self.trigger) * self.step_s
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """All that is wrong, the reasons for leaving it out first."""
+        """Everything that is wrong, the reasons for leaving it out first."""
         return self.faults + self.remarks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """What was found in the recordings of a test, and what was decided.
+    """The records of a test with what was measured of each, and what was decided for all.
 
     Parameters
     ----------
     records : tuple of RecordInfo
-        All blows or records, also those that are left out.
+        All records, also those that are left out.
     step_s : float
         Time step that those that are used have in common, s.
     n_samples : int
-        Length of the transforms; shorter blows are filled up with zeros.
+        Length of the transforms; shorter records are padded with zeros.
     decay_1_s : float
         Rate sigma of the exponential window on force and response; 0 for none.
-    segment : int
+    segment_length : int
         Samples of the segments, under Hann windows, that records are cut into; 0 for none.
-    piece : int
-        Samples of the pieces that records are cut into, their transients taken off; 0 for none.
+    subrecord_length : int
+        Samples of the sub-records, transients removed, that records are cut into; 0 for none.
     force_window : bool
         The force outside of its pulse is set to zero.
     choices : tuple of str
@@ -130,13 +130,13 @@ class Survey:
     step_s: float
     n_samples: int
     decay_1_s: float = 0.0
-    segment: int = 0
-    piece: int = 0
+    segment_length: int = 0
+    subrecord_length: int = 0
     force_window: bool = False
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
     def used(self) -> tuple[RecordInfo, ...]:
-        """The blows or records that enter the FRFs."""
+        """The records that enter the FRFs."""
         return tuple(record for record in self.records if record.used)

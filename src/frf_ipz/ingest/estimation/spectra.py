@@ -1,7 +1,8 @@
-"""Averaged spectra and the FRFs made of them: H1, H2, Hv, coherence; arrays in, arrays out, one blow at a time.
+"""Averaged spectra and the FRFs made of them: H1, H2, Hv, coherence; arrays in, arrays out, one record at a time.
 
-Only sums over the blows are kept, so memory does not grow with their number. [Bendat2010]: J. S. Bendat, A. G. Piersol,
-Random Data, 4th ed., Wiley 2010 (doi:10.1002/9781118032428).
+Only sums over the records are kept, so memory does not grow with their number.
+
+[Bendat2010]: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010 (doi:10.1002/9781118032428).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 
 @dataclass(slots=True, eq=False)
 class SpectrumSums:
-    """Sums over blows of auto and cross spectra; `add` a blow at a time.
+    """Sums over records of auto and cross spectra; `add` a record at a time.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ class SpectrumSums:
     responses : (n_outputs, n_lines) array
         Sum of the responses' squared moduli.
     count : int
-        Blows in the sums.
+        Records, or segments of records, in the sums.
     """
 
     force: FloatArray
@@ -35,7 +36,7 @@ class SpectrumSums:
     count: int = 0
 
     def add(self, force: FloatArray, responses: FloatArray) -> None:
-        """Add one blow.
+        """Add one record.
 
         Parameters
         ----------
@@ -47,14 +48,14 @@ class SpectrumSums:
         Raises
         ------
         ShapeError
-            If the number of outputs, or of the lines that the samples give, is another one.
+            If the number of outputs, or of the lines that the samples give, differs.
         """
-        require_shape("the responses of a blow", responses, (len(self.cross), len(force)))
-        require_shape("the spectrum of a blow", self.force, (len(force) // 2 + 1,))
+        require_shape("the responses of a record", responses, (len(self.cross), len(force)))
+        require_shape("the spectrum of a record", self.force, (len(force) // 2 + 1,))
         self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses))
 
     def add_spectra(self, force: ComplexArray, responses: ComplexArray) -> None:
-        """Add the spectra of one blow or segment.
+        """Add the spectra of one record or segment.
 
         Parameters
         ----------
@@ -93,10 +94,10 @@ def estimate_frf(sums: SpectrumSums, estimator: str = "H1") -> ComplexArray:
     Parameters
     ----------
     sums : SpectrumSums
-        Of at least one blow.
+        Of at least one record.
     estimator : str
-        ``H1`` (noise on the responses), ``H2`` (noise on the force), ``Hv`` (on both: the geometric mean of the other
-        two, which does not depend on units).
+        ``H1`` (noise on the responses), ``H2`` (noise on the force), ``Hv`` (on both: the geometric mean of
+        H1 and H2, which does not depend on units).
 
     Returns
     -------
@@ -111,14 +112,14 @@ def estimate_frf(sums: SpectrumSums, estimator: str = "H1") -> ComplexArray:
     >>> bool(np.allclose(estimate_frf(sums), 3.0, rtol=1e-12, atol=0.0))
     True
     """
-    h1 = _ratio(sums.cross, sums.force)
+    h1 = _divide(sums.cross, sums.force)
     if estimator == "H1":
         return h1
-    h2 = _ratio(sums.responses.astype(complex), sums.cross.conj().T)
+    h2 = _divide(sums.responses.astype(complex), sums.cross.conj().T)
     if estimator == "H2":
         return h2
-    size = np.sqrt(np.abs(h1) * np.abs(h2))
-    return np.asarray(size * np.exp(1j * np.angle(h1)))
+    magnitude = np.sqrt(np.abs(h1) * np.abs(h2))
+    return np.asarray(magnitude * np.exp(1j * np.angle(h1)))
 
 
 def estimate_coherence(sums: SpectrumSums) -> FloatArray:
@@ -127,39 +128,39 @@ def estimate_coherence(sums: SpectrumSums) -> FloatArray:
     Parameters
     ----------
     sums : SpectrumSums
-        Of any number of blows.
+        Of any number of records.
 
     Returns
     -------
     (n_lines, n_outputs) array
-        0 to 1; NaN for fewer than two blows, for which it says nothing.
+        0 to 1; NaN for fewer than two records, for which it says nothing.
     """
     if sums.count < 2:
         return np.full(sums.cross.T.shape, np.nan)
     cross = sums.cross.real**2 + sums.cross.imag**2
-    return np.minimum(_ratio(cross, (sums.force * sums.responses).T).real, 1.0)
+    return np.minimum(_divide(cross, (sums.force * sums.responses).T).real, 1.0)
 
 
 def unexplained_power(sums: SpectrumSums) -> FloatArray:
-    """Give the responses' power that H1 does not explain, summed over blows.
+    """Give the responses' power that H1 does not explain, summed over records.
 
     Parameters
     ----------
     sums : SpectrumSums
-        Of any number of blows.
+        Of any number of records.
 
     Returns
     -------
     (n_lines, n_outputs) array
-        Its expectation is (count - 1) times the noise power of one blow.
+        Its expectation is (count - 1) times the noise power of one record.
     """
     cross = sums.cross.real**2 + sums.cross.imag**2
-    explained = _ratio(cross, sums.force).real
+    explained = _divide(cross, sums.force).real
     return np.maximum(sums.responses.T - explained, 0.0)
 
 
-def _ratio(top: ComplexArray | FloatArray, bottom: ComplexArray | FloatArray) -> ComplexArray:
+def _divide(numerator: ComplexArray | FloatArray, denominator: ComplexArray | FloatArray) -> ComplexArray:
     """Divide (n_outputs, n_lines) by (n_lines,) or (n_lines, n_outputs), with 0 for what cannot be divided."""
-    above = np.asarray(top.T, complex)
-    below = bottom[:, None] if bottom.ndim == 1 else bottom
-    return np.asarray(np.divide(above, below, out=np.zeros_like(above), where=below != 0))
+    dividend = np.asarray(numerator.T, complex)
+    divisor = denominator[:, None] if denominator.ndim == 1 else denominator
+    return np.asarray(np.divide(dividend, divisor, out=np.zeros_like(dividend), where=divisor != 0))

@@ -1,4 +1,4 @@
-"""FRFs of a test with a shaker: whole records or pieces without transients, or segments under Hann windows."""
+"""FRFs of a test with a shaker: whole records or sub-records without transients, or segments under Hann windows."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.kinds.averaging import average_recordings
+from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.signals.transients import transform_subrecords
-from frf_ipz.ingest.survey.random import independent_segments, segments_of
+from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.campaign import VibrationTest
+    from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.frf_estimate import FrfEstimate
-    from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey
@@ -33,7 +33,7 @@ def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progr
     options : IngestOptions
         The user's choice.
     progress : Progress
-        Told how far it is.
+        Called with the share of the work that is done.
 
     Returns
     -------
@@ -45,31 +45,31 @@ def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progr
     InputError
         If a recording cannot be used.
     """
-    return average_recordings(test, options, progress, _add)
+    return average_recordings(test, options, progress, _add_record)
 
 
-def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
-    """Add a record to its run's sums, and return the energy of its force."""
+def _add_record(average: SetupAverage, record: Record, survey: Survey) -> float:
+    """Add a record to the average of its set-up, and return the energy of its force."""
     before = average.sums.count
-    if survey.piece:
-        energy = _add_pieces(average, record, survey.piece)
+    if survey.subrecord_length:
+        energy = _add_subrecords(average, record, survey.subrecord_length)
     else:
         energy = 0.0
-        for signals in _windowed(record, survey):
+        for signals in _window_record(record, survey):
             average.sums.add(signals[0], signals[1:])
             energy += float(np.sum(signals[0] ** 2))
     count = average.sums.count - before
-    average.independent += independent_segments(count) if survey.segment else count
+    average.independent += count_independent_segments(count) if survey.segment_length else count
     return energy
 
 
-def _add_pieces(average: SetupAverage, record: Record, length: int) -> float:
+def _add_subrecords(average: SetupAverage, record: Record, length: int) -> float:
     for force, responses in transform_subrecords(record.force, record.responses, length):
         average.sums.add_spectra(force, responses)
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 
 
-def _windowed(record: Record, survey: Survey) -> Iterable[FloatArray]:
-    if survey.segment:
-        return segments_of(np.vstack([record.force, record.responses]), survey.segment)
-    return [record.windowed(survey.decay_1_s, survey.n_samples)]
+def _window_record(record: Record, survey: Survey) -> Iterable[FloatArray]:
+    if survey.segment_length:
+        return cut_segments(np.vstack([record.force, record.responses]), survey.segment_length)
+    return [record.apply_windows(survey.decay_1_s, survey.n_samples)]

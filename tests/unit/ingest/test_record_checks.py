@@ -1,4 +1,4 @@
-"""What is wrong with a blow is said; double hits, clipping, overload and a wrong step are left out, others stay in."""
+"""Faults of records are reported; double hits, clipping, overload and a wrong step are left out, others stay in."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def noisy(rng, **of_record):
     return impact(Structure(), noise=NOISE, rng=rng, **of_record)
 
 
-def twice(rng):
+def hit_twice(rng):
     force = pulse(N_SAMPLES, STEP_S) + pulse(N_SAMPLES, STEP_S, height=30.0, at_s=0.05)
     return noisy(rng, force=force)
 
@@ -50,13 +50,13 @@ def weak(rng):
     return noisy(rng, height=0.17)
 
 
-def unheard(rng):
+def noisy_response(rng):
     signals = impact(Structure(), height=30.0)
     signals[1:] += np.abs(signals[1:]).max() * rng.standard_normal(signals[1:].shape)
     return signals
 
 
-def restless(rng, share=0.1):
+def moving(rng, share=0.1):
     signals = noisy(rng)
     time = np.arange(N_SAMPLES) * STEP_S
     before = np.exp(-time / 0.2) * np.sin(2 * np.pi * 88.0 * time)
@@ -68,25 +68,25 @@ def fine(rng):
     return noisy(rng, height=90.0)
 
 
-def campaign(folder, third, *, step_s=STEP_S, others=2):
-    """Write blows of which the last is something special."""
+def campaign(folder, make_last, *, step_s=STEP_S, n_good=2):
+    """Write impacts of which the last is made by a function of its own."""
     rng = np.random.default_rng(5)
-    for number in range(others):
+    for number in range(n_good):
         write_csv(folder / "hits" / f"p7_{number + 1}.csv", noisy(rng, height=100.0 + 20 * number), STEP_S)
-    write_csv(folder / "hits" / "p7_bad.csv", third(rng), step_s)
+    write_csv(folder / "hits" / "p7_bad.csv", make_last(rng), step_s)
     return write_test(folder, HIT)
 
 
 @pytest.mark.parametrize(
-    ("third", "mark"),
+    ("make_last", "mark"),
     [
-        (twice, "double hit: 30 % of the pulse 20 ms after it"),
+        (hit_twice, "double hit: 30 % of the pulse 20 ms after it"),
         (clipped, "clipping of force"),
         (overloaded, "overload of acc_1"),
     ],
 )
-def test_bad_blows_are_left_out_and_said(tmp_path, third, mark):
-    result = estimate(campaign(tmp_path, third))
+def test_bad_impacts_are_left_out_and_reported(tmp_path, make_last, mark):
+    result = estimate(campaign(tmp_path, make_last))
     assert list(result.records.used) == [True, True, False]
     assert mark in result.records.marks[2]
     assert list(result.records.marks[:2]) == ["", ""]
@@ -96,29 +96,29 @@ def test_bad_blows_are_left_out_and_said(tmp_path, third, mark):
 
 
 @pytest.mark.parametrize(
-    ("third", "mark"),
+    ("make_last", "mark"),
     [
         (cut_off, "cut-off decay"),
-        (weak, "weak blow: its peak is"),
-        (unheard, "weak blow: its response is"),
-        (restless, "not at rest before the blow"),
+        (weak, "weak impact: its peak is"),
+        (noisy_response, "weak impact: its response is"),
+        (moving, "not at rest before the impact"),
     ],
 )
-def test_blows_that_can_be_lived_with_are_marked_and_stay(tmp_path, third, mark):
-    result = estimate(campaign(tmp_path, third))
+def test_impacts_with_minor_faults_are_marked_and_stay(tmp_path, make_last, mark):
+    result = estimate(campaign(tmp_path, make_last))
     assert mark in result.records.marks[2]
     assert list(result.records.marks[:2]) == ["", ""]
     assert result.records.used.all()
     assert list(result.frfs.averages) == [3, 3]
 
 
-def test_a_weak_blow_hardly_counts(tmp_path):
+def test_a_weak_impact_has_little_weight(tmp_path):
     weights = estimate(campaign(tmp_path, weak)).records.weight
     assert weights.sum() == pytest.approx(1.0)
     assert weights[2] < 0.01 * weights[0]
 
 
-def test_a_blow_with_nothing_wrong_has_no_mark(tmp_path):
+def test_a_good_impact_has_no_mark(tmp_path):
     result = estimate(campaign(tmp_path, fine))
     assert list(result.records.marks) == ["", "", ""]
     assert result.warnings == ()
@@ -129,12 +129,12 @@ def test_weak_means_below_the_noise_and_not_weaker_than_others(tmp_path):
     assert result.records.marks[2] == ""
 
 
-def test_a_little_motion_before_a_blow_is_no_fault(tmp_path):
-    result = estimate(campaign(tmp_path, lambda rng: restless(rng, share=0.015)))
+def test_a_little_motion_before_an_impact_is_no_fault(tmp_path):
+    result = estimate(campaign(tmp_path, lambda rng: moving(rng, share=0.015)))
     assert result.records.marks[2] == ""
 
 
-def test_a_wrong_time_step_is_left_out_and_said(tmp_path):
+def test_a_wrong_time_step_is_left_out_and_reported(tmp_path):
     result = estimate(campaign(tmp_path, fine, step_s=1.3 * STEP_S))
     assert list(result.records.used) == [True, True, False]
     assert "wrong sampling step: 0.000634766 s where the others have 0.000488281 s" in result.records.marks[2]
@@ -145,29 +145,29 @@ def test_steps_that_differ_in_their_last_digits_are_one_step(tmp_path):
     assert result.records.used.all()
 
 
-@pytest.mark.parametrize("only", [twice, clipped, overloaded])
-def test_the_last_blow_of_a_dof_is_used_with_a_warning(tmp_path, only):
-    result = estimate(campaign(tmp_path, only, others=0))
+@pytest.mark.parametrize("make_last", [hit_twice, clipped, overloaded])
+def test_the_last_impact_at_a_dof_is_used_with_a_warning(tmp_path, make_last):
+    result = estimate(campaign(tmp_path, make_last, n_good=0))
     assert list(result.records.used) == [True]
     assert any("is used although it is bad" in text and "7:+z" in text for text in result.warnings)
     assert not any("is left out" in text for text in result.warnings)
 
 
-def test_of_bad_blows_only_the_least_bad_is_used(tmp_path):
+def test_of_bad_impacts_only_the_least_bad_is_used(tmp_path):
     rng = np.random.default_rng(6)
     harder = pulse(N_SAMPLES, STEP_S) + pulse(N_SAMPLES, STEP_S, height=60.0, at_s=0.05)
     write_csv(tmp_path / "hits" / "1.csv", noisy(rng, force=harder), STEP_S)
-    write_csv(tmp_path / "hits" / "2.csv", twice(rng), STEP_S)
-    both = twice(rng)
-    both[0] = np.minimum(both[0], 70.0)
-    write_csv(tmp_path / "hits" / "3.csv", both, STEP_S)
+    write_csv(tmp_path / "hits" / "2.csv", hit_twice(rng), STEP_S)
+    hit_twice_and_clipped = hit_twice(rng)
+    hit_twice_and_clipped[0] = np.minimum(hit_twice_and_clipped[0], 70.0)
+    write_csv(tmp_path / "hits" / "3.csv", hit_twice_and_clipped, STEP_S)
     result = estimate(write_test(tmp_path, HIT))
     assert list(result.records.used) == [False, True, False]
 
 
-def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
+def test_a_dof_whose_impacts_are_bad_is_not_lost_beside_a_good_one(tmp_path):
     rng = np.random.default_rng(7)
-    for name, make in (("a/1", fine), ("a/2", twice), ("b/1", clipped), ("b/2", twice)):
+    for name, make in (("a/1", fine), ("a/2", hit_twice), ("b/1", clipped), ("b/2", hit_twice)):
         write_csv(tmp_path / f"{name}.csv", make(rng), STEP_S)
     body = '[[hit]]\ndof = "7:+z"\nfiles = ["a/*.csv"]\n[[hit]]\ndof = "8:+z"\nfiles = ["b/*.csv"]\n'
     result = estimate(write_test(tmp_path, body))
@@ -178,24 +178,24 @@ def test_a_dof_whose_blows_are_bad_is_not_lost_beside_a_good_one(tmp_path):
 @pytest.mark.parametrize("force_window_s", [None, 0.008])
 def test_a_double_hit_that_is_kept_gives_the_right_frf(tmp_path, force_window_s):
     """Both pulses are in the force, so that nothing is wrong with the FRF when the window keeps them."""
-    result = estimate(campaign(tmp_path, twice, others=0), force_window_s=force_window_s)
+    result = estimate(campaign(tmp_path, hit_twice, n_good=0), force_window_s=force_window_s)
     band = result.frfs.in_band((20.0, 250.0))
     truth = Structure().accelerance(result.frfs.s[band])
     assert np.abs(result.frfs.values[band] - truth).max() < 0.02 * np.abs(truth).max()
 
 
 def test_the_user_overrules_the_checks(tmp_path):
-    path = campaign(tmp_path, twice)
-    kept = estimate(path, keep=("p7_bad.csv",))
-    assert kept.records.used.all()
-    assert kept.records.marks[2].endswith("kept by the user")
-    assert kept.warnings == ()
-    dropped = estimate(path, drop=("hits/p7_1.csv",))
-    assert list(dropped.records.used) == [False, True, False]
-    assert dropped.records.marks[0] == "dropped by the user"
+    path = campaign(tmp_path, hit_twice)
+    with_bad = estimate(path, keep=("p7_bad.csv",))
+    assert with_bad.records.used.all()
+    assert with_bad.records.marks[2].endswith("kept by the user")
+    assert with_bad.warnings == ()
+    without_first = estimate(path, drop=("hits/p7_1.csv",))
+    assert list(without_first.records.used) == [False, True, False]
+    assert without_first.records.marks[0] == "dropped by the user"
 
 
-def test_one_blow_of_a_file_may_be_dropped(tmp_path):
+def test_one_impact_of_a_file_may_be_dropped(tmp_path):
     force = np.zeros(3 * N_SAMPLES)
     for start, height in ((300, 100.0), (4400, 80.0), (8500, 110.0)):
         force += pulse(len(force), STEP_S, height=height, at_s=start * STEP_S)
@@ -215,10 +215,10 @@ def test_a_file_that_cannot_be_read_may_be_dropped(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"keep": ("p7_11.csv",)}, "keep: there is no blow or file 'p7_11.csv'"),
-        ({"drop": ("p7_01.csv#2",)}, "drop: there is no blow or file 'p7_01.csv#2'"),
+        ({"keep": ("p7_11.csv",)}, "keep: there is no record or file 'p7_11.csv'"),
+        ({"drop": ("p7_01.csv#2",)}, "drop: there is no record or file 'p7_01.csv#2'"),
         ({"keep": ("p7_01.csv",), "drop": ("p7_01.csv",)}, "named by both keep and drop"),
-        ({"drop": ("p7_01.csv", "p7_02.csv", "p7_03.csv")}, "drop leaves no blow at 7:\\+z"),
+        ({"drop": ("p7_01.csv", "p7_02.csv", "p7_03.csv")}, "drop leaves no record at 7:\\+z"),
         ({"exponential_window_s": -1.0}, "exponential_window_s is -1"),
         ({"force_window_s": -1.0}, "force_window_s is -1"),
     ],
@@ -228,22 +228,22 @@ def test_choices_that_make_no_sense_are_refused(tmp_path, options, says):
         estimate(hammer_campaign(tmp_path), **options)
 
 
-def test_copies_of_one_blow_are_not_taken_for_clipped_ones(tmp_path):
+def test_copies_of_one_impact_are_not_taken_for_clipped_ones(tmp_path):
     assert list(estimate(hammer_campaign(tmp_path, heights=(100.0, 100.0))).records.marks) == ["", ""]
 
 
 def test_pulses_that_all_end_at_one_force_are_clipped(tmp_path):
-    """A rail that cuts a single sample shows no plateau, but two blows that meet it are equal to the last digit."""
+    """A rail that cuts a single sample shows no plateau, but two impacts that meet it are equal to the last digit."""
     rng = np.random.default_rng(9)
-    for number, late in enumerate((0.0, 0.05, -0.08)):
-        signals = noisy(rng, height=110.0 + number, at_s=(61 + late) * STEP_S)
+    for number, delay in enumerate((0.0, 0.05, -0.08)):
+        signals = noisy(rng, height=110.0 + number, at_s=(61 + delay) * STEP_S)
         signals[0] = np.minimum(signals[0], 100.0)
         assert np.sum(signals[0] == 100.0) == 1
         write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
     write_csv(tmp_path / "hits" / "9.csv", noisy(rng, height=80.0), STEP_S)
     result = estimate(write_test(tmp_path, HIT))
     assert list(result.records.used) == [False, False, False, True]
-    assert "equals another blow's to the last digit" in result.records.marks[0]
+    assert "equals another record's to the last digit" in result.records.marks[0]
 
 
 @pytest.mark.parametrize("step_N", [0.5, 8.0])
@@ -257,21 +257,21 @@ def test_forces_in_coarse_digital_steps_are_not_clipped(tmp_path, step_N):
     assert result.records.used.all()
 
 
-def test_all_blows_can_be_read_the_bad_ones_flagged(tmp_path):
+def test_all_records_can_be_read_the_bad_ones_flagged(tmp_path):
     test = read_test(campaign(tmp_path, clipped))
-    every = list(read_records(test, IngestOptions(), used_only=False))
+    records = list(read_records(test, IngestOptions(), used_only=False))
     used = list(read_records(test, IngestOptions()))
-    assert [one.used for one in every] == [True, True, False]
-    assert [one.name for one in used] == [one.name for one in every[:2]]
-    assert "clipping" in every[2].marks[0]
-    assert every[2].force.max() == pytest.approx(90.0, abs=0.1)
-    assert [str(label.output_dof) for label in every[0].labels] == ["1:+z", "2:+z"]
-    assert every[0].labels[0].input_channel == "force"
-    assert every[0].responses.shape == (2, every[0].n_samples)
-    assert not every[0].force.flags.writeable
+    assert [record.used for record in records] == [True, True, False]
+    assert [record.name for record in used] == [record.name for record in records[:2]]
+    assert "clipping" in records[2].marks[0]
+    assert records[2].force.max() == pytest.approx(90.0, abs=0.1)
+    assert [str(label.output_dof) for label in records[0].labels] == ["1:+z", "2:+z"]
+    assert records[0].labels[0].input_channel == "force"
+    assert records[0].responses.shape == (2, records[0].n_samples)
+    assert not records[0].force.flags.writeable
 
 
-def test_frfs_of_others_have_no_blows(tmp_path):
+def test_frfs_of_others_have_no_records(tmp_path):
     (tmp_path / "frf.csv").write_text(
         "frequency_hz,output_dof,input_dof,real,imag\n1,1:z,2:z,1,0\n2,1:z,2:z,1,0\n", encoding="utf-8"
     )

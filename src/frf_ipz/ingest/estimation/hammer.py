@@ -1,4 +1,4 @@
-"""FRFs of a hammer test: windows, transforms, sums; one blow in memory at a time."""
+"""FRFs of a hammer test: windows, transforms, averages."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.ingest.kinds.averaging import average_recordings
+from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
     from frf_ipz.ingest.campaign import VibrationTest
+    from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.frf_estimate import FrfEstimate
-    from frf_ipz.ingest.kinds.averages import SetupAverage
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import Survey
@@ -30,35 +30,35 @@ def estimate_hammer(test: VibrationTest, options: IngestOptions, progress: Progr
     options : IngestOptions
         The user's choice.
     progress : Progress
-        Told how far it is.
+        Called with the share of the work that is done.
 
     Returns
     -------
     FrfEstimate
-        FRFs, table of blows, traces.
+        FRFs, table of impacts, traces.
 
     Raises
     ------
     InputError
         If a recording cannot be used.
     """
-    return average_recordings(test, options, progress, _add)
+    return average_recordings(test, options, progress, _add_impact)
 
 
-def _add(average: SetupAverage, record: Record, survey: Survey) -> float:
-    """Add a blow to its run's sums, and return the energy of its force."""
-    signals = record.windowed(survey.decay_1_s, survey.n_samples)
+def _add_impact(average: SetupAverage, record: Record, survey: Survey) -> float:
+    """Add an impact to the average of its set-up, and return the energy of its force."""
+    signals = record.apply_windows(survey.decay_1_s, survey.n_samples)
     average.sums.add(signals[0], signals[1:])
     average.independent += 1.0
-    if average.sums.count == 1:  # should it stay the only one, its own record has to tell the noise
+    if average.sums.count == 1:  # should it stay the only one, the noise has to come from its own record
         _measure_noise(average, record, survey)
     return float(np.sum(signals[0] ** 2))
 
 
 def _measure_noise(average: SetupAverage, record: Record, survey: Survey) -> None:
-    frequency = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
+    frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
     decay = exponential_window(record.n_samples, record.step_s, survey.decay_1_s, record.trigger)
-    kept = decay * force_window(record.n_samples, *record.force_interval)
-    responses = [noise_power(response[record.trigger :], record.step_s, frequency) for response in record.responses]
+    window = decay * force_window(record.n_samples, *record.force_interval)
+    responses = [noise_power(response[record.trigger :], record.step_s, frequency_hz) for response in record.responses]
     average.response_noise = np.array(responses) * np.sum(decay**2)
-    average.force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency) * np.sum(kept**2)
+    average.force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency_hz) * np.sum(window**2)

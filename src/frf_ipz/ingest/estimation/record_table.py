@@ -1,4 +1,4 @@
-"""The table of blows: one row each, with what was measured and what is wrong."""
+"""The table of records: one row each, with what was measured and what is wrong."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ COLUMNS = (
 
 
 def record_table(survey: Survey, energies: Sequence[float]) -> pd.DataFrame:
-    """Make the table of blows.
+    """Make the table of records.
 
     Parameters
     ----------
     survey : Survey
-        All blows.
+        All records.
     energies : sequence of float
-        Energy of each one's force under its window, 0 for those that are left out; its share among the blows of its
-        run is its weight in H1.
+        Energy of each record's force under its window, 0 for those that are left out; its share among the records of
+        its set-up is its weight in H1.
 
     Returns
     -------
     DataFrame
-        Columns as `Recordings` documents them.
+        Columns as `FrfEstimate` documents them.
     """
     totals: dict[object, float] = {}
     for record, energy in zip(survey.records, energies, strict=True):
         totals[record.setup] = totals.get(record.setup, 0.0) + energy
     rows = [
-        _row(record, energy / totals[record.setup] if totals[record.setup] else 0.0)
+        _make_row(record, energy / totals[record.setup] if totals[record.setup] else 0.0)
         for record, energy in zip(survey.records, energies, strict=True)
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
@@ -67,7 +67,7 @@ def empty_record_table() -> pd.DataFrame:
     return pd.DataFrame([], columns=list(COLUMNS))
 
 
-def _row(record: RecordInfo, weight: float) -> tuple[object, ...]:
+def _make_row(record: RecordInfo, weight: float) -> tuple[object, ...]:
     return (
         record.name,
         str(record.setup.input_dof),

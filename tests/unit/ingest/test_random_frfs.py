@@ -1,4 +1,4 @@
-"""Shaker tests: records without their transients; segments and exponential windows where they are asked for."""
+"""Shaker tests: records without their transients; segments and exponential windows as options."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.signals.clipping import is_clipped
-from frf_ipz.ingest.survey.random import independent_segments, segments_of
+from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 from synthetic_campaign import Structure, respond, write_csv, write_test
 
 STEP_S = 1 / 1024
@@ -39,9 +39,9 @@ def from_rest(rng, n_samples, *, structure=STRUCTURE, noise=0.0):
     return signals
 
 
-def stationary(rng, n_samples, **more):
-    """A stretch of a test that has been running for a while."""
-    return from_rest(rng, n_samples + 8192, **more)[:, 8192:]
+def stationary(rng, n_samples, **options):
+    """A record of a test that has been running for a while."""
+    return from_rest(rng, n_samples + 8192, **options)[:, 8192:]
 
 
 def write(folder, records, step_s=STEP_S):
@@ -56,10 +56,10 @@ def errors(frfs, structure=STRUCTURE):
     return np.abs(frfs.values[band] - truth) / np.abs(truth).max(axis=0)
 
 
-def test_a_long_stationary_record_is_cut_into_pieces(tmp_path):
+def test_a_long_stationary_record_is_cut_into_subrecords(tmp_path):
     rng = np.random.default_rng(1)
     result = estimate(write(tmp_path, [stationary(rng, 120_000, noise=0.01)]))
-    assert result.choices[0].startswith("pieces of 29.3 s, the motion that goes on at both ends fitted and taken off")
+    assert result.choices[0].startswith("sub-records of 29.3 s, transients at both ends removed")
     assert result.frfs.window_decay_1_s == 0.0
     assert list(result.frfs.averages) == [4, 4]
     assert errors(result.frfs).max() < 0.01
@@ -73,18 +73,18 @@ def test_running_records_give_exact_frfs_of_modes_that_are_narrower_than_their_l
     light = Structure(damping_ratio=(0.0005, 0.0005, 0.0005))
     path = write(tmp_path, [stationary(rng, 3000, structure=light) for _ in range(3)])
     whole, segments = estimate(path), estimate(path, segment_s=1.5)
-    assert whole.choices[0].startswith("records used whole, the motion that goes on at both ends")
+    assert whole.choices[0].startswith("records used whole, transients at both ends removed")
     assert errors(whole.frfs, light).max() < 0.01
     assert errors(segments.frfs, light).max() > 0.2
 
 
-def test_a_single_short_record_is_cut_into_pieces_whose_scatter_tells_the_noise(tmp_path):
+def test_a_single_short_record_is_cut_into_subrecords_whose_scatter_is_the_noise(tmp_path):
     frfs = estimate(write(tmp_path, [stationary(np.random.default_rng(14), 6000, noise=0.1)])).frfs
     assert list(frfs.averages) == [3, 3]
     assert np.isfinite(frfs.variance[1:-1]).all()
 
 
-def test_the_variance_of_pieces_is_their_error(tmp_path):
+def test_the_variance_of_subrecords_is_their_error(tmp_path):
     rng = np.random.default_rng(15)
     frfs = estimate(write(tmp_path, [stationary(rng, 8192, noise=0.3) for _ in range(6)])).frfs
     band = frfs.in_band(BAND_HZ)
@@ -96,7 +96,7 @@ def test_records_from_rest_give_exact_frfs(tmp_path):
     rng = np.random.default_rng(2)
     light = Structure(damping_ratio=(0.003, 0.002, 0.002))
     result = estimate(write(tmp_path, [from_rest(rng, 8192, structure=light) for _ in range(4)]))
-    assert result.choices[0].startswith("records used whole, the motion that goes on at both ends")
+    assert result.choices[0].startswith("records used whole, transients at both ends removed")
     assert result.frfs.window_decay_1_s == 0.0
     assert list(result.frfs.averages) == [4, 4]
     assert errors(result.frfs, light).max() < 1e-4
@@ -123,9 +123,9 @@ def test_segments_would_lose_the_peaks_of_records_from_rest(tmp_path):
     assert errors(segments, light).max() > 0.1
 
 
-def test_a_single_long_record_from_rest_is_cut_into_pieces(tmp_path):
+def test_a_single_long_record_from_rest_is_cut_into_subrecords(tmp_path):
     result = estimate(write(tmp_path, [from_rest(np.random.default_rng(12), 120_000)]))
-    assert "pieces of" in result.choices[0]
+    assert "sub-records of" in result.choices[0]
     assert np.isfinite(result.frfs.variance[1:-1]).all()
 
 
@@ -181,18 +181,18 @@ def test_records_can_be_read_whole(tmp_path):
 
 
 def test_half_overlapping_segments_cover_the_record():
-    pieces = list(segments_of(np.ones((2, 1000)), 200))
-    assert len(pieces) == 9
+    segments = list(cut_segments(np.ones((2, 1000)), 200))
+    assert len(segments) == 9
     total = np.zeros(1000)
-    for number, piece in enumerate(pieces):
-        total[100 * number : 100 * number + 200] += piece[0]
+    for number, segment in enumerate(segments):
+        total[100 * number : 100 * number + 200] += segment[0]
     np.testing.assert_allclose(total[100:900], 1.0, rtol=1e-12)
 
 
 def test_overlapping_segments_are_worth_a_little_less_than_their_number():
-    assert independent_segments(0) == 0.0
-    assert independent_segments(1) == 1.0
-    assert independent_segments(1000) == pytest.approx(1000 / (1 + 1 / 18), rel=1e-3)
+    assert count_independent_segments(0) == 0.0
+    assert count_independent_segments(1) == 1.0
+    assert count_independent_segments(1000) == pytest.approx(1000 / (1 + 1 / 18), rel=1e-3)
 
 
 def sweep(rng, n_samples, *, band_hz=BAND_HZ, noise=1e-3):
@@ -205,22 +205,22 @@ def sweep(rng, n_samples, *, band_hz=BAND_HZ, noise=1e-3):
     return signals + noise * np.abs(signals).max(axis=1, keepdims=True) * rng.standard_normal(signals.shape)
 
 
-def test_what_a_sweep_does_near_its_ends_counts_little(tmp_path):
-    """There a transient cannot be told from the response: one that goes on further tells what the response is."""
+def test_lines_near_the_ends_of_a_sweep_have_little_weight(tmp_path):
+    """There a transient looks like the response; a sweep over a wider band shows what the response is."""
     rng = np.random.default_rng(21)
     records = [sweep(rng, 8192), sweep(rng, 8192, band_hz=(10.0, 330.0)), sweep(rng, 8192)]
     result = estimate(write(tmp_path, records))
     assert result.records.used.all()
     band = result.frfs.in_band(BAND_HZ)
-    later = result.frfs.frequency_hz[band] > 60.0
-    wrong = errors(result.frfs)
-    assert wrong[later].max() < 5e-3
+    inside = result.frfs.frequency_hz[band] > 60.0
+    error = errors(result.frfs)
+    assert error[inside].max() < 5e-3
     largest = np.abs(STRUCTURE.accelerance(result.frfs.s[band])).max(axis=0)
     stated = np.sqrt(result.frfs.variance[band]) / largest
-    assert np.sqrt(np.mean((wrong / stated)[later] ** 2)) < 2.0
+    assert np.sqrt(np.mean((error / stated)[inside] ** 2)) < 2.0
 
 
-def test_a_sine_that_slows_and_hurries_is_not_clipped_unless_it_is():
+def test_a_sweep_is_clipped_only_where_it_was_cut():
     rng = np.random.default_rng(22)
     for _ in range(10):
         force = sweep(rng, 20_000, noise=0.0)[0] * (1 + 1e-7 * rng.standard_normal(20_000))

@@ -9,9 +9,9 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
+from frf_ipz.ingest.estimation.record_table import empty_record_table
 from frf_ipz.ingest.formats.registry import read_frfs
 from frf_ipz.ingest.frf_estimate import FrfEstimate
-from frf_ipz.ingest.kinds.record_table import empty_record_table
 from frf_ipz.ingest.units import frf_factor
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
 
 SAME_LINE = 0.01  # of the spacing: frequencies that differ by less are one line
-MOST_LOST = 0.5  # of the lines that two files could share: more than that is another grid
+FEWEST_COMMON = 0.5  # of the lines in the band that all files cover: with fewer in common, the files have two grids
 
 
 def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
@@ -36,14 +36,14 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     test : VibrationTest
         The test.
     options : IngestOptions
-        Not used: there is nothing left to choose.
+        Not used: nothing remains to be chosen.
     progress : Progress
-        Told about each file.
+        Called at each file.
 
     Returns
     -------
     FrfEstimate
-        FRFs in SI on the lines that all files share; no table of blows.
+        FRFs in SI on the lines that all files share; an empty table of records.
 
     Raises
     ------
@@ -52,22 +52,21 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     """
     del options
     frfs: list[MeasuredFrf] = []
-    for done, source in enumerate(test.frf_sources):
-        progress(done / len(test.frf_sources), f"reading {source.path.name}")
+    for position, source in enumerate(test.frf_sources):
+        progress(position / len(test.frf_sources), f"reading {source.path.name}")
         frfs += [_to_si(frf) for frf in read_frfs(source) if frf.label in test.labels]
     labels = tuple(frf.label for frf in frfs)
-    _check(frfs, labels)
+    _check_frfs(frfs, labels)
     lines, warnings = _common_lines(frfs)
-    places = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
-    nothing = [np.full(len(frf.frequency_hz), np.nan) for frf in frfs]
-    pairs = list(zip(frfs, places, nothing, strict=True))
+    rows = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
+    pairs = list(zip(frfs, rows, strict=True))
     return FrfEstimate(
         frfs=FrfSet(
             frequency_hz=lines,
-            values=np.column_stack([frf.values[place] for frf, place, _ in pairs]),
+            values=np.column_stack([frf.values[row] for frf, row in pairs]),
             labels=labels,
-            variance=np.column_stack([_known(frf.variance, empty)[place] for frf, place, empty in pairs]),
-            coherence=np.column_stack([_known(frf.coherence, empty)[place] for frf, place, empty in pairs]),
+            variance=np.column_stack([_values_or_nan(frf, frf.variance)[row] for frf, row in pairs]),
+            coherence=np.column_stack([_values_or_nan(frf, frf.coherence)[row] for frf, row in pairs]),
             averages=np.zeros(len(frfs), np.int64),
             unknown_scale=test.unknown_scale,
         ),
@@ -76,8 +75,8 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     )
 
 
-def _known(values: FloatArray | None, nothing: FloatArray) -> FloatArray:
-    return nothing if values is None else values
+def _values_or_nan(frf: MeasuredFrf, values: FloatArray | None) -> FloatArray:
+    return np.full(len(frf.frequency_hz), np.nan) if values is None else values
 
 
 def _to_si(frf: MeasuredFrf) -> MeasuredFrf:
@@ -93,7 +92,7 @@ def _to_si(frf: MeasuredFrf) -> MeasuredFrf:
     return replace(frf, values=frf.values * factor, variance=variance)
 
 
-def _check(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None:
+def _check_frfs(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None:
     first: dict[FrfLabel, MeasuredFrf] = {}
     for frf, label in zip(frfs, labels, strict=True):
         path, frequency = frf.source.path, frf.frequency_hz
@@ -117,16 +116,16 @@ def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, .
     """Find the lines that all FRFs have."""
     lines = frfs[0].frequency_hz
     for frf in frfs[1:]:
-        lines = lines[_has(frf.frequency_hz, lines)]
+        lines = lines[_contains(frf.frequency_hz, lines)]
     low = max(frf.frequency_hz[0] for frf in frfs)
     high = min(frf.frequency_hz[-1] for frf in frfs)
-    could = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
-    if len(lines) < max(2, MOST_LOST * could):
+    covered = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
+    if len(lines) < max(2, FEWEST_COMMON * covered):
         raise _no_common_lines(frfs)
-    most = max(len(frf.frequency_hz) for frf in frfs)
-    if len(lines) == most:
+    largest = max(len(frf.frequency_hz) for frf in frfs)
+    if len(lines) == largest:
         return lines, ()
-    return lines, (f"{len(lines)} of up to {most} lines are used: those that all files share",)
+    return lines, (f"{len(lines)} of up to {largest} lines are used: those that all files share",)
 
 
 def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:
@@ -136,16 +135,17 @@ def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:
 def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
     """Make the error that names the file that shares the fewest lines with the first."""
     first = frfs[0]
-    odd = min(frfs, key=lambda frf: int(_has(frf.frequency_hz, first.frequency_hz).sum()))
-    given, wanted = (
+    odd = min(frfs, key=lambda frf: int(_contains(frf.frequency_hz, first.frequency_hz).sum()))
+    lines, expected = (
         f"{len(frf.frequency_hz)} from {frf.frequency_hz[0]:g} to {frf.frequency_hz[-1]:g} Hz" for frf in (odd, first)
     )
-    problem = f"its lines ({given}) are not those of {first.source.path.name} ({wanted}): all FRFs of a test need "
+    problem = f"its lines ({lines}) are not those of {first.source.path.name} ({expected}): all FRFs of a test need "
     return FileFormatError(odd.source.path, problem + "common lines; export them alike")
 
 
-def _has(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
+def _contains(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
+    """Tell which of some lines an FRF has, to within a small part of its spacing."""
     tolerance = SAME_LINE * _spacing(frequency_hz)
-    place = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
-    nearest = np.minimum(np.abs(frequency_hz[place] - lines), np.abs(frequency_hz[place - 1] - lines))
+    above = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
+    nearest = np.minimum(np.abs(frequency_hz[above] - lines), np.abs(frequency_hz[above - 1] - lines))
     return np.asarray(nearest <= tolerance)

@@ -35,7 +35,7 @@ def roving(tmp_path):
     return path
 
 
-def test_what_a_test_says(roving):
+def test_the_channels_dofs_and_files_of_a_test(roving):
     test = read_test(roving)
     assert (test.name, test.kind, test.nominal_damping_ratio) == ("a shelf", "hammer", 0.002)
     assert test.unknown_scale == "common"
@@ -75,7 +75,7 @@ def test_sensors_at_one_node_weigh_together(tmp_path):
     assert read_test(path).sensor_masses == {1: pytest.approx(0.006)}
 
 
-def test_tests_that_say_the_same_have_the_same_text(roving):
+def test_equal_tests_have_equal_reprs(roving):
     assert repr(read_test(roving)) == repr(read_test(roving))
 
 
@@ -91,7 +91,7 @@ def test_traces_are_drawn_of_every_force_and_some_responses(roving):
 
 
 @pytest.mark.parametrize(
-    ("name", "wanted", "expected"),
+    ("name", "pattern", "expected"),
     [
         ("hits/p_1.csv", "hits/p_1.csv", True),
         ("hits/p_1.csv", "p_1.csv", True),
@@ -102,5 +102,5 @@ def test_traces_are_drawn_of_every_force_and_some_responses(roving):
         ("hits/p_1.csv", "other/p_1.csv", False),
     ],
 )
-def test_blows_are_named_by_the_end_of_their_path(name, wanted, expected):
-    assert is_named(name, [wanted]) is expected
+def test_records_are_named_by_the_end_of_their_path(name, pattern, expected):
+    assert is_named(name, [pattern]) is expected

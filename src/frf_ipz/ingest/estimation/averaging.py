@@ -1,0 +1,201 @@
+"""FRFs of a test of recordings: each record added to the averages of its set-up, one in memory at a time.
+
+What the kinds of test differ in is how a record is added. Averages become FRFs by an estimator, with coherence and
+variance; an FRF that several set-ups measured is the mean of them all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.ingest.campaign import setup_labels
+from frf_ipz.ingest.estimation.record_table import record_table
+from frf_ipz.ingest.estimation.spectra import SpectrumSums, empty_sums, estimate_coherence, estimate_frf
+from frf_ipz.ingest.estimation.traces import add_traces
+from frf_ipz.ingest.estimation.variance import frf_variance, power_to_variance
+from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
+from frf_ipz.ingest.recording_files import RecordingFiles
+from frf_ipz.ingest.records import read_records, survey_records
+from frf_ipz.ingest.signals.windows import correlated_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.ingest.campaign import TestSetup, VibrationTest
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.records import Record
+    from frf_ipz.ingest.survey.record_info import Survey
+    from frf_ipz.progress import Progress
+
+SURVEY_SHARE = 0.6  # of the work
+
+
+@dataclass(slots=True, eq=False)
+class SetupAverage:
+    """What has been summed for one set-up.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of all its impacts, records or segments.
+    independent : float
+        How many independent ones they are worth.
+    response_noise, force_noise : array, optional
+        Noise power of one record's responses, (n_outputs, n_lines), and force, (n_lines,), where it was measured in the
+        record itself.
+    """
+
+    sums: SpectrumSums
+    independent: float = 0.0
+    response_noise: FloatArray | None = None
+    force_noise: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LabelEstimate:
+    values: ComplexArray
+    variance: FloatArray
+    coherence: FloatArray
+    count: int
+
+
+def average_recordings(
+    test: VibrationTest,
+    options: IngestOptions,
+    progress: Progress,
+    add: Callable[[SetupAverage, Record, Survey], float],
+) -> FrfEstimate:
+    """Average all records of a test.
+
+    Parameters
+    ----------
+    test : VibrationTest
+        The test.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Called with the share of the work that is done.
+    add : callable
+        Adds one record to the averages of its set-up, and returns the energy of its force.
+
+    Returns
+    -------
+    FrfEstimate
+        FRFs, table of records, traces.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used.
+    """
+    files = RecordingFiles(test=test)
+    survey = survey_records(files, options, lambda fraction, text: progress(SURVEY_SHARE * fraction, text))
+    n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
+    averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs)) for setup in test.setups}
+    energies: list[float] = []
+    traces: tuple[Trace, ...] = ()
+    records = read_records(test, options, survey=survey, files=files, used_only=False)
+    for position, (info, record) in enumerate(zip(survey.records, records, strict=True)):
+        fraction = position / len(survey.records)
+        progress(SURVEY_SHARE + (1.0 - SURVEY_SHARE) * fraction, f"averaging {record.name}")
+        traces = add_traces(traces, info, record)
+        energies.append(add(averages[info.setup], record, survey) if record.used else 0.0)
+    return FrfEstimate(
+        frfs=_assemble_frfs(test, survey, averages, options),
+        records=record_table(survey, energies),
+        traces=traces,
+        choices=survey.choices,
+        warnings=(*survey.warnings, *_warn_of_single_records(averages)),
+    )
+
+
+def _assemble_frfs(
+    test: VibrationTest, survey: Survey, averages: Mapping[TestSetup, SetupAverage], options: IngestOptions
+) -> FrfSet:
+    """Make the FRFs of a test, in the order of its labels."""
+    estimates: dict[FrfLabel, _LabelEstimate] = {}
+    for setups, labels in _group_labels(test).items():
+        pooled = _pool(test, [averages[setup] for setup in setups], setups, labels)
+        estimates |= _estimate(pooled, labels, options.estimator)
+    ordered = [estimates[label] for label in test.labels]
+    duration = survey.n_samples * survey.step_s
+    n_lines = survey.n_samples // 2 + 1
+    return FrfSet(
+        frequency_hz=np.arange(n_lines) / duration,
+        values=np.column_stack([estimate.values for estimate in ordered]),
+        labels=test.labels,
+        variance=np.column_stack([estimate.variance for estimate in ordered]),
+        coherence=np.column_stack([estimate.coherence for estimate in ordered]),
+        averages=np.array([estimate.count for estimate in ordered], np.int64),
+        window_decay_1_s=survey.decay_1_s,
+        correlated_lines=correlated_lines(survey.decay_1_s * duration),
+        unknown_scale=test.unknown_scale,
+    )
+
+
+def _group_labels(test: VibrationTest) -> dict[tuple[TestSetup, ...], list[FrfLabel]]:
+    """Group the labels by the set-ups that measured them."""
+    groups: dict[tuple[TestSetup, ...], list[FrfLabel]] = {}
+    for label in test.labels:
+        setups = tuple(setup for setup in test.setups if label in setup_labels(test.channels, setup))
+        groups.setdefault(setups, []).append(label)
+    return groups
+
+
+def _pool(
+    test: VibrationTest, averages: Sequence[SetupAverage], setups: Sequence[TestSetup], labels: Sequence[FrfLabel]
+) -> SetupAverage:
+    """Add up the averages of some set-ups, of the rows that some labels stand in."""
+    rows_of_setup = [[setup_labels(test.channels, setup).index(label) for label in labels] for setup in setups]
+    if len(averages) == 1:
+        first, rows = averages[0], rows_of_setup[0]
+        sums = SpectrumSums(first.sums.force, first.sums.cross[rows], first.sums.responses[rows], first.sums.count)
+        noise = None if first.response_noise is None else first.response_noise[rows]
+        return SetupAverage(sums, first.independent, noise, first.force_noise)
+    parts = list(zip(averages, rows_of_setup, strict=True))
+    sums = SpectrumSums(
+        np.sum([average.sums.force for average in averages], axis=0),
+        np.sum([average.sums.cross[rows] for average, rows in parts], axis=0),
+        np.sum([average.sums.responses[rows] for average, rows in parts], axis=0),
+        sum(average.sums.count for average in averages),
+    )
+    return SetupAverage(sums, sum(average.independent for average in averages))
+
+
+def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _LabelEstimate]:
+    sums = average.sums
+    values = estimate_frf(sums, estimator)
+    coherence = estimate_coherence(sums)
+    variance = _estimate_variance(average, values)
+    return {
+        label: _LabelEstimate(
+            values=values[:, column],
+            variance=variance[:, column],
+            coherence=coherence[:, column],
+            count=sums.count,
+        )
+        for column, label in enumerate(labels)
+    }
+
+
+def _estimate_variance(average: SetupAverage, values: ComplexArray) -> FloatArray:
+    """Take the scatter between records, and of a single record the noise in itself."""
+    if average.sums.count == 1 and average.response_noise is not None and average.force_noise is not None:
+        power = average.response_noise.T + average.force_noise[:, None] * np.abs(values) ** 2
+        return power_to_variance(power, average.sums.force)
+    return frf_variance(average.sums, average.independent)
+
+
+def _warn_of_single_records(averages: Mapping[TestSetup, SetupAverage]) -> tuple[str, ...]:
+    """Say which FRFs come from a single record, and what their variance is then."""
+    single = [str(setup.input_dof) for setup, average in averages.items() if average.sums.count == 1]
+    if not single:
+        return ()
+    known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
+    source = "is the noise in that record alone" if known else "is not known"
+    return (f"a single record at {', '.join(dict.fromkeys(single))}: no coherence, and the variance {source}",)

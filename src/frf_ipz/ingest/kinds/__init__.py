@@ -1,1 +1,0 @@
-"""From recordings to FRFs, one kind of test a module."""
