@@ -120,7 +120,7 @@ def parts_of(model):
 
 
 def recordings_of(truth, labels, band, rng):
-    """FRFs with noise, blows of which one is left out, and traces."""
+    """FRFs with noise, records of which one is left out, and traces."""
     frequency = np.linspace(0.5 * band[0], 1.2 * band[1], 1500)
     exact = np.stack([truth.receptance(2j * np.pi * frequency, label) for label in labels], 1)
     variance = np.broadcast_to((NOISE * np.sqrt(np.mean(np.abs(exact) ** 2, axis=0))) ** 2, exact.shape)
@@ -206,7 +206,7 @@ def with_tables(fit, frfs):
 
 def reference_of(truth, points, input_dofs, lines):
     """The true FRFs at the points of interest."""
-    labels = tuple(FrfLabel(point, struck, FrfQuantity.RECEPTANCE) for point in points for struck in input_dofs)
+    labels = tuple(FrfLabel(point, input_dof, FrfQuantity.RECEPTANCE) for point in points for input_dof in input_dofs)
     values = np.stack([truth.receptance(2j * np.pi * lines, label) for label in labels], 1)
     unknown = np.full(values.shape, np.nan)
     return FrfSet(
@@ -220,7 +220,7 @@ def reference_of(truth, points, input_dofs, lines):
 
 
 def synthetic_levels(labels, band):
-    """Two modes of three blows each; the second one falls with the level."""
+    """Two modes of three records each; the second one falls with the level."""
     frequency = np.linspace(*band, 300)
     weak = np.abs(1 / (1 - (frequency / np.mean(band)) ** 2 + 0.02j))[:, None] * np.ones(len(labels))
     rows = [
@@ -276,7 +276,7 @@ def many_frfs(n_frfs, n_lines):
 
 
 def synthetic_law():
-    """A cubic spring of 1e9 N/m^3 in a blow of 20 Hz that it stiffens; a thousandth of it is left."""
+    """A cubic spring of 1e9 N/m^3 in a decay at 20 Hz that it stiffens; a thousandth of it is misfit."""
     time = np.linspace(0, 2, 2001)
     motion = 1e-3 * np.exp(-time) * np.sin(2 * np.pi * 20 * time)
     return LawInTime(

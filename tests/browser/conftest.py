@@ -41,5 +41,5 @@ def demo(tmp_path_factory):
 @pytest.fixture(scope="module")
 def address(demo):
     """Address of the page of the demo, served by the command."""
-    with served(demo / "out") as found:
-        yield found
+    with served(demo / "out") as address_of_page:
+        yield address_of_page

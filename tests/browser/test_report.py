@@ -98,7 +98,7 @@ def test_zooming_one_frequency_axis_zooms_all(page):
         np.testing.assert_allclose(axis_range(page, name), np.log10([100, 300]), rtol=1e-9, atol=0)
 
 
-def test_a_linear_frequency_axis_shows_the_same_stretch(page):
+def test_a_linear_frequency_axis_shows_the_same_range(page):
     before = axis_range(page, "frf")
     page.find_element("id", "scale").click()
     np.testing.assert_allclose(axis_range(page, "frf"), 10 ** np.array(before), rtol=1e-6, atol=0)
@@ -128,7 +128,7 @@ def test_keys_zoom_and_move_and_go_back(page):
 
 
 def test_the_legend_is_worked_with_the_keyboard_and_shows_where_one_is(page):
-    shown = visible_traces(page, "frf")
+    count = visible_traces(page, "frf")
     entries = "#frf .legend .traces"
     page.execute_script("document.querySelector('#frf .plot').focus()")
     for _ in range(40):  # the buttons of the picture come before
@@ -145,7 +145,7 @@ def test_the_legend_is_worked_with_the_keyboard_and_shows_where_one_is(page):
         now = f"document.activeElement.getAttribute('aria-pressed') === '{pressed}'"
         wait_for(page, f"return {now} && document.activeElement.matches('{entries}')")
         assert page.switch_to.active_element.get_attribute("aria-label") == label
-        assert (drawn_traces(page, "frf") < shown) == (pressed == "false")
+        assert (drawn_traces(page, "frf") < count) == (pressed == "false")
 
 
 def test_what_is_switched_off_in_a_legend_stays_off_when_the_page_is_drawn_anew(page):
@@ -156,11 +156,11 @@ def test_what_is_switched_off_in_a_legend_stays_off_when_the_page_is_drawn_anew(
 
 
 def test_the_dark_theme_changes_page_and_pictures(page):
-    shown = page.execute_script("return document.documentElement.dataset.theme")
+    count = page.execute_script("return document.documentElement.dataset.theme")
     paper = "return document.querySelector('#frf .plot')._fullLayout.paper_bgcolor"
     before = page.execute_script(paper)
     page.find_element("id", "theme").click()
-    assert page.execute_script("return document.documentElement.dataset.theme") != shown
+    assert page.execute_script("return document.documentElement.dataset.theme") != count
     assert page.execute_script(paper) != before
     page.find_element("id", "theme").click()
     assert page.execute_script(paper) == before

@@ -41,8 +41,8 @@ def test_a_campaign_is_run_from_the_page_and_a_sensor_left_out(browser, tmp_path
         page.wait_for_results(before)
         assert set(columns(run, "output_dof")["output_dof"]) == {"1:+z"}
         assert read_pipeline(folder / "pipeline.toml").file.ingest.hide == ("2:+z",)
-        again = run_pipeline(folder / "pipeline.toml", tmp_path / "again").path
-        assert columns(again, "real", "imag").equals(columns(run, "real", "imag"))
+        repeated = run_pipeline(folder / "pipeline.toml", tmp_path / "again").path
+        assert columns(repeated, "real", "imag").equals(columns(run, "real", "imag"))
         before = page.stamp()
         page.click("#choices [aria-label*='sensor 2:+z left out']")
         page.wait_for_results(before)

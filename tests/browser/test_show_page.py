@@ -9,9 +9,9 @@ from frf_ipz.pipeline.run import run_pipeline
 from served_page import PLACE_OF_NODE, Page
 
 pytestmark = pytest.mark.browser
-STRUCK_HZ = 284.95  # the third mode of the demo
+REJECTED_HZ = 284.95  # the third mode of the demo
 ADDED_HZ = 150.0  # between two modes
-NEAR = 0.02  # relative: a pole within this of a struck one is the struck one
+NEAR = 0.02  # relative: a pole within this of a rejected one is the rejected one
 
 PLACE_OF_POLE = """
 const plot = document.querySelector('#stabilisation .plot');
@@ -54,31 +54,31 @@ def test_every_picture_draws(page):
     assert all(drawn)
 
 
-def test_a_pole_struck_in_the_diagram_is_gone_and_stays_gone_on_the_command_line(page, demo, tmp_path):
-    assert is_there(demo / "out", STRUCK_HZ)
+def test_a_pole_rejected_in_the_diagram_is_gone_and_stays_gone_on_the_command_line(page, demo, tmp_path):
+    assert is_there(demo / "out", REJECTED_HZ)
     comment = (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0]
     page.show("#stabilisation")
-    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ, "shape"))
+    page.click_at(page.run(PLACE_OF_POLE, REJECTED_HZ, "shape"))
     page.wait_until(lambda: page.value("#pole-form", "hz"))
-    assert float(page.value("#pole-form", "hz")) == pytest.approx(STRUCK_HZ, rel=NEAR)
+    assert float(page.value("#pole-form", "hz")) == pytest.approx(REJECTED_HZ, rel=NEAR)
     page.write("#pole-form", why="a cable that rings")
     before = page.stamp()
-    page.click("#pole-form [value=strike]")
+    page.click("#pole-form [value=reject]")
     page.wait_for_results(before)
-    assert not is_there(demo / "out", STRUCK_HZ)
+    assert not is_there(demo / "out", REJECTED_HZ)
     assert "a cable that rings" in page.find("#choices").text
-    (strike,) = read_pipeline(demo / "pipeline.toml").file.fit.strike
-    assert (strike.hz, strike.why) == (pytest.approx(STRUCK_HZ, rel=NEAR), "a cable that rings")
+    (rejection,) = read_pipeline(demo / "pipeline.toml").file.fit.strike
+    assert (rejection.hz, rejection.why) == (pytest.approx(REJECTED_HZ, rel=NEAR), "a cable that rings")
     assert (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0] == comment
-    struck = poles(demo / "out")
-    assert poles(run_pipeline(demo / "pipeline.toml", demo / "out").path) == struck
-    assert poles(run_pipeline(demo / "pipeline.toml", tmp_path / "anew").path) == struck
+    remaining = poles(demo / "out")
+    assert poles(run_pipeline(demo / "pipeline.toml", demo / "out").path) == remaining
+    assert poles(run_pipeline(demo / "pipeline.toml", tmp_path / "anew").path) == remaining
     page.browser.refresh()
     page.wait_until(page.is_drawn)
     before = page.stamp()
     page.click("#choices [aria-label*='a cable that rings']")
     page.wait_for_results(before)
-    assert is_there(demo / "out", STRUCK_HZ)
+    assert is_there(demo / "out", REJECTED_HZ)
 
 
 def test_a_pole_is_added_with_its_reason(page, demo):
@@ -98,12 +98,12 @@ def test_a_pole_is_added_with_its_reason(page, demo):
 
 def test_every_mode_of_the_fit_has_a_handle_to_click(page, demo):
     page.show("#stabilisation")
-    page.click_at(page.run(PLACE_OF_POLE, STRUCK_HZ, "handles"))
+    page.click_at(page.run(PLACE_OF_POLE, REJECTED_HZ, "handles"))
     page.wait_until(lambda: page.value("#pole-form", "hz"))
     assert min(abs(float(page.value("#pole-form", "hz")) / hertz - 1) for hertz in poles(demo / "out")) < 1e-5
 
 
-def test_a_stretch_that_is_dragged_over_is_left_out(page, demo):
+def test_a_range_that_is_dragged_over_is_left_out(page, demo):
     page.click("[data-drag=select]")
     page.show("#stabilisation")
     low, high, height = page.run(PLACES_OF_BAND, [40.0, 60.0])
@@ -111,13 +111,13 @@ def test_a_stretch_that_is_dragged_over_is_left_out(page, demo):
     page.wait_until(lambda: page.value("#band-form", "high_hz"))
     before, theme = page.stamp(), page.run(THEME)
     page.click("#theme")
-    page.click("#band-form [value=leave]")
+    page.click("#band-form [value=exclude]")
     page.wait_for_results(before)
     assert page.run(THEME) not in {theme, None}
     ((low_hz, high_hz),) = read_pipeline(demo / "pipeline.toml").file.fit.exclude_hz
     assert (low_hz, high_hz) == (pytest.approx(40.0, rel=0.02), pytest.approx(60.0, rel=0.02))
-    assert "1 stretches left out" not in page.find("#stabilisation .note").text
-    assert "1 stretch left out" in page.find("#stabilisation .note").text
+    assert "1 ranges left out" not in page.find("#stabilisation .note").text
+    assert "1 range left out" in page.find("#stabilisation .note").text
     assert page.find("[data-drag=select]").get_attribute("aria-pressed") == "true"
 
 
@@ -140,17 +140,17 @@ def test_zooming_in_brings_all_lines_of_the_frfs(page, demo):
     assert page.run(ASKED) <= 3  # once for the view, once for the theme, and a linked axis may follow late
 
 
-def test_a_blow_is_dropped(page, demo):
-    page.click("#blow-choices summary")
+def test_a_record_is_dropped(page, demo):
+    page.click("#record-choices summary")
     before = page.stamp()
     page.run(
-        "const list = document.querySelector('[data-blow=\"hits/p69_02.csv\"]'); list.value = 'drop';"
+        "const list = document.querySelector('[data-record=\"hits/p69_02.csv\"]'); list.value = 'drop';"
         "list.dispatchEvent(new Event('change', {bubbles: true}));"
     )
     page.wait_for_results(before)
     records = pq.read_table(demo / "out" / "records.parquet").to_pandas().set_index("record")
     assert not records.loc["hits/p69_02.csv", "used"]
-    assert page.find("[data-blow='hits/p69_02.csv']").get_attribute("value") == "drop"
+    assert page.find("[data-record='hits/p69_02.csv']").get_attribute("value") == "drop"
 
 
 def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
@@ -166,19 +166,19 @@ def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
 def test_nodes_picked_on_the_drawing_are_what_the_model_is_reduced_to(page, demo):
     before = page.value("#reduce-form", "dofs").split()
     page.show("#structure")
-    page.click_at(page.run(PLACE_OF_NODE, "kept in the reduction", before[-1]))
+    page.click_at(page.run(PLACE_OF_NODE, "retained in the reduction", before[-1]))
     page.wait_until(lambda: page.value("#point-form", "dof").replace("+", "") == before[-1])
     page.click("#toggle-dof")
     page.write("#point-form", dof="25:+z")
     page.click("#toggle-dof")
-    wanted = [*before[:-1], "25:z"]
-    assert page.value("#reduce-form", "dofs").split() == wanted
+    selected = [*before[:-1], "25:z"]
+    assert page.value("#reduce-form", "dofs").split() == selected
     stamp = page.stamp()
     page.click("#reduce-form [value=retain]")
     page.wait_for_results(stamp)
-    assert read_pipeline(demo / "pipeline.toml").file.reduce.dofs == tuple(wanted)
+    assert read_pipeline(demo / "pipeline.toml").file.reduce.dofs == tuple(selected)
     run = run_pipeline(demo / "pipeline.toml", demo / "out")
-    assert [dof.name for dof in run.load("reduce").dofs] == wanted
+    assert [dof.name for dof in run.load("reduce").dofs] == selected
     assert "reduced to" in page.find("#choices").text
 
 
@@ -191,10 +191,10 @@ def test_what_the_run_refuses_is_said_and_taken_back(page, demo):
     assert (demo / "pipeline.toml").read_bytes() == text
 
 
-def test_a_strike_without_a_reason_is_refused(page, demo):
+def test_a_rejection_without_a_reason_is_refused(page, demo):
     text = (demo / "pipeline.toml").read_bytes()
     page.write("#pole-form", hz="100")
-    page.click("#pole-form [value=strike]")
+    page.click("#pole-form [value=reject]")
     page.wait_until(lambda: "say why" in page.find("#problem").text)
     assert (demo / "pipeline.toml").read_bytes() == text
     page.browser.get_log("browser")  # the browser notes the answer 400
@@ -226,7 +226,7 @@ def test_the_structure_moves_and_rests(page):
 def test_nothing_but_the_run_is_served(page, demo):
     (demo / "secret.txt").write_text("secret", encoding="utf-8")
     (demo / "out" / "link.txt").symlink_to(demo / "secret.txt")
-    asked = [
+    addresses = [
         "run/poles.parquet",
         "run/..%2fsecret.txt",
         "run/%2e%2e%2fpipeline.toml",
@@ -236,7 +236,7 @@ def test_nothing_but_the_run_is_served(page, demo):
     ]
     answers = page.browser.execute_async_script(
         "Promise.all(arguments[0].map((one) => fetch(one).then((answer) => answer.status))).then(arguments[1])",
-        asked,
+        addresses,
     )
     assert answers == [200, 404, 404, 404, 404, 404]
     page.browser.get_log("browser")  # the browser notes each answer 404

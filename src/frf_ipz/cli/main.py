@@ -132,7 +132,7 @@ def show(
         bool | None, typer.Option("--browser/--no-browser", help="Open the page; by default on a desktop only.")
     ] = None,
 ) -> None:
-    """Open a local page on a run or a campaign: look, run, strike and pin poles; changes go to pipeline.toml."""
+    """Open a local page on a run or a campaign: look, run, reject and pin poles; changes go to pipeline.toml."""
     from frf_ipz.cli.local_page import serve_page
 
     serve_page(folder, port=port, browser=browser)

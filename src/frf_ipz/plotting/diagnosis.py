@@ -69,12 +69,12 @@ def plot_ranking(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     """
     ranked = [*diagnosis.findings, *diagnosis.alternatives][:MOST_RANKED]
     ax = axes_or_new(ax, height_in=1.0 + 0.28 * len(ranked))
-    found = len(diagnosis.findings)
-    shades = [UPDATED if place < found else FAINT for place in range(len(ranked))]
-    ax.barh(range(len(ranked)), [one.log_evidence_gain for one in ranked], color=shades)
-    ax.set_yticks(range(len(ranked)), [one.effect.replace("_", " ") for one in ranked])
+    n_findings = len(diagnosis.findings)
+    shades = [UPDATED if place < n_findings else FAINT for place in range(len(ranked))]
+    ax.barh(range(len(ranked)), [finding.log_evidence_gain for finding in ranked], color=shades)
+    ax.set_yticks(range(len(ranked)), [finding.effect.replace("_", " ") for finding in ranked])
     ax.invert_yaxis()
-    return label_axes(ax, "Gain of log evidence, nats", "", legend=False)
+    return label_axes(ax, "Log Bayes factor", "", legend=False)
 
 
 def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
@@ -97,8 +97,8 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     place = np.arange(len(steps))
     for rank, (name, values) in enumerate(
         (
-            ("fitted", [one.training for one in steps.values()]),
-            (f"held out ({diagnosis.held})", [one.held_out for one in steps.values()]),
+            ("fitted", [misfit.training for misfit in steps.values()]),
+            (f"held out ({diagnosis.held})", [misfit.held_out for misfit in steps.values()]),
         )
     ):
         hatch = "//" if rank else ""
@@ -109,7 +109,7 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_law(law: LawInTime, *, ax: Axes | None = None) -> Axes:
-    """Draw a blow as measured, with a force law and without it; the law's force, where no blow was simulated.
+    """Draw a record as measured, with a force law and without it; the law's force, where none was simulated.
 
     Parameters
     ----------
@@ -121,12 +121,12 @@ def plot_law(law: LawInTime, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
-        Responses over time, or the force over the motion of its place.
+        Responses over time, or the force over the motion at its location.
     """
     ax = axes_or_new(ax)
     if not law.record:
         ax.plot(law.motion_m, law.force_N, color=UPDATED, linewidth=0.8)
-        return label_axes(ax, "Motion of the place, m", "Force of the law, N", legend=False)
+        return label_axes(ax, "Motion, m", "Force of the law, N", legend=False)
     ax.plot(law.time_s, law.measured, color=MEASURED, linewidth=2.2, label=f"{law.channel} in {law.record}")
     ax.plot(law.time_s, law.without, color=FAINT, linestyle="--", linewidth=0.8, label="without the law")
     ax.plot(law.time_s, law.simulated, color=UPDATED, linewidth=0.8, label="with the law")
@@ -134,12 +134,12 @@ def plot_law(law: LawInTime, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:
-    """Draw the change of each mode's frequency over the level of the blows, with 95 % bars.
+    """Draw the change of each mode's frequency over the level of excitation, with 95 % bars.
 
     Parameters
     ----------
     levels : LevelDependence
-        Weak beside strong blows.
+        Weak beside strong records.
     ax : Axes, optional
         Where to draw.
 
@@ -157,4 +157,4 @@ def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:
         style: dict[str, Any] = {"color": colour(place), "linestyle": dash(place), "marker": "o", "markersize": 3}
         ax.errorbar(ordered["level_N"], 100 * (hertz / hertz[-1] - 1), bars, label=name, capsize=2, **style)
     ax.set_xscale("log")
-    return label_axes(ax, "Largest force of the blow, N", "Change of frequency, %")
+    return label_axes(ax, "Peak force, N", "Change of frequency, %")

@@ -79,7 +79,7 @@ def plot_coherence(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
-        With the picture; FRFs of one blow have no coherence.
+        With the picture; FRFs of one record have no coherence.
     """
     ax = axes_or_new(ax)
     for place, label in enumerate(frfs.labels):

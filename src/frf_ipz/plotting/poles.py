@@ -64,9 +64,9 @@ def plot_stabilization(fit: ModalFit, frfs: FrfSet | None = None, *, ax: Axes | 
     for rank, (name, style) in enumerate(LEVELS):
         here = poles[level == rank]
         _points(ax, here["frequency_hz"], here["order"], label=name, markersize=4, **style)
-    taken = poles[poles["taken"].to_numpy(bool)]
+    starts = poles[poles["taken"].to_numpy(bool)]
     ring = {"marker": "o", "color": BAD, "markerfacecolor": "none", "markersize": 9}
-    _points(ax, taken["frequency_hz"], taken["order"], label="taken", **ring)
+    _points(ax, starts["frequency_hz"], starts["order"], label="taken", **ring)
     ax.set_xlim(*fit.band_hz)
     return label_axes(ax, "Frequency, Hz", "Model order")
 

@@ -1,4 +1,4 @@
-"""FrfEstimate and the structure that they were made on."""
+"""Records and the structure that they were made on."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.structure import Geometry
 
-MARKS = {"sensor": ("s", CYCLE[0]), "excitation": ("v", CYCLE[1]), "point of interest": ("*", CYCLE[2])}
+MARKS = {"sensor": ("s", CYCLE[0]), "input": ("v", CYCLE[1]), "point of interest": ("*", CYCLE[2])}
 
 
-def plot_records(recordings: FrfEstimate, *, ax: Axes | None = None) -> Axes:
-    """Draw the forces of all blows; those left out are dotted.
+def plot_records(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
+    """Draw the forces of all records; those left out are dotted.
 
     Parameters
     ----------
-    recordings : FrfEstimate
+    estimate : FrfEstimate
         The result of ingest.
     ax : Axes, optional
         Where to draw.
@@ -37,9 +37,9 @@ def plot_records(recordings: FrfEstimate, *, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     ax = axes_or_new(ax)
-    used = dict(zip(recordings.records["record"], recordings.records["used"].astype(bool), strict=True))
-    channel = recordings.traces[0].channel if recordings.traces else ""
-    forces = [trace for trace in recordings.traces if trace.channel == channel]
+    used = dict(zip(estimate.records["record"], estimate.records["used"].astype(bool), strict=True))
+    channel = estimate.traces[0].channel if estimate.traces else ""
+    forces = [trace for trace in estimate.traces if trace.channel == channel]
     for place, trace in enumerate(forces):
         style = dash(place) if used.get(trace.name, True) else ":"
         ax.plot(trace.time_s, trace.values, style, color=colour(place), linewidth=0.9, label=trace.name)
@@ -51,17 +51,17 @@ def plot_structure(
     geometry: Geometry,
     *,
     sensors: Sequence[Dof] = (),
-    records: Sequence[Dof] = (),
+    inputs: Sequence[Dof] = (),
     points: Sequence[Dof] = (),
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a structure with sensors, blows and points of interest.
+    """Draw a structure with sensors, inputs and points of interest.
 
     Parameters
     ----------
     geometry : Geometry
         Of the FE model.
-    sensors, blows, points : sequence of Dof
+    sensors, inputs, points : sequence of Dof
         What to mark.
     ax : Axes, optional
         Where to draw.
@@ -82,7 +82,7 @@ def plot_structure(
     ax.plot(
         positions[held, 0], positions[held, 1], "X", color=MEASURED, markersize=8, label="support" if held else None
     )
-    for (name, (mark, edge)), dofs in zip(MARKS.items(), (sensors, records, points), strict=True):
+    for (name, (mark, edge)), dofs in zip(MARKS.items(), (sensors, inputs, points), strict=True):
         rows = [place[dof.node] for dof in dofs if dof.node in place]
         if rows:
             ax.plot(positions[rows, 0], positions[rows, 1], mark, color=edge, markersize=8, label=name, zorder=3)

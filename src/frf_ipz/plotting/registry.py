@@ -41,13 +41,13 @@ class _Entry:
 
 PICTURES: dict[str, _Entry] = {
     "records": _Entry(("ingest",), plot_records),
-    "frfs": _Entry(("ingest",), lambda recordings: plot_frfs(recordings.frfs)),
-    "phases": _Entry(("ingest",), lambda recordings: plot_phases(recordings.frfs)),
-    "coherence": _Entry(("ingest",), lambda recordings: plot_coherence(recordings.frfs)),
-    "stabilization": _Entry(("fit", "ingest"), lambda fit, recordings: plot_stabilization(fit, recordings.frfs)),
+    "frfs": _Entry(("ingest",), lambda estimate: plot_frfs(estimate.frfs)),
+    "phases": _Entry(("ingest",), lambda estimate: plot_phases(estimate.frfs)),
+    "coherence": _Entry(("ingest",), lambda estimate: plot_coherence(estimate.frfs)),
+    "stabilization": _Entry(("fit", "ingest"), lambda fit, estimate: plot_stabilization(fit, estimate.frfs)),
     "poles": _Entry(("fit",), plot_pole_zero_map),
-    "fit": _Entry(("ingest", "fit"), lambda recordings, fit: plot_fit(recordings.frfs, fit)),
-    "misfit": _Entry(("ingest", "fit"), lambda recordings, fit: plot_misfit(recordings.frfs, fit)),
+    "fit": _Entry(("ingest", "fit"), lambda estimate, fit: plot_fit(estimate.frfs, fit)),
+    "misfit": _Entry(("ingest", "fit"), lambda estimate, fit: plot_misfit(estimate.frfs, fit)),
     "pairs": _Entry(("pair", "fit"), lambda pairs, fit: plot_pairs(pairs, fit.labels)),
     "targets": _Entry(
         ("update", "pair", "fit"), lambda updated, pairs, fit: plot_targets(target_rows(updated, pairs, fit.labels))
@@ -55,7 +55,7 @@ PICTURES: dict[str, _Entry] = {
     "convergence": _Entry(("update",), plot_convergence),
     "change": _Entry(("update",), lambda updated: _change(updated)),
     "prediction": _Entry(("predict",), lambda prediction: _predictions(prediction)),
-    "structure": _Entry(("model", "ingest"), lambda model, recordings: _structure(model, recordings)),
+    "structure": _Entry(("model", "ingest"), lambda model, estimate: _structure(model, estimate)),
     "mismatch": _Entry(("diagnose",), plot_mismatch),
     "ranking": _Entry(("diagnose",), plot_ranking),
     "proof": _Entry(("diagnose",), plot_proof),
@@ -132,10 +132,10 @@ def _law(diagnosis: Diagnosis) -> Axes:
 
 def _levels(levels: LevelDependence) -> Axes:
     if not len(levels.modes):
-        raise InputError("no place was struck at several levels, so there is no such picture")
+        raise InputError("no input was excited at several levels, so there is no such picture")
     return plot_levels(levels)
 
 
-def _structure(model: Any, recordings: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them
+def _structure(model: Any, estimate: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them
     geometry = getattr(model, "geometry", model)
-    return plot_structure(geometry, sensors=recordings.frfs.output_dofs, records=recordings.frfs.input_dofs)
+    return plot_structure(geometry, sensors=estimate.frfs.output_dofs, inputs=estimate.frfs.input_dofs)

@@ -1,4 +1,4 @@
-"""Where along the structure an update has changed the model: a line for beams, coloured places for the rest."""
+"""Where along the structure an update has changed the model: a line for beams, coloured points for the rest."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.plotting.projection import project
 from frf_ipz.report.picture import Axis, Picture, Trace, band, line, markers, panels
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Table
 from frf_ipz.report.wording import counted, number
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 LEAST_EIGENVALUE = 1e-9  # of the largest one: a rigid-body mode has no stiffness to change
-MOST_PLACES = 400  # drawn along the structure
-STIFF = 0.01  # of the largest flexibility: at places below, a ratio says nothing
+MOST_POINTS = 400  # drawn along the structure
+STIFF = 0.01  # of the largest flexibility: at points below, a ratio says nothing
 BLUE_TO_ORANGE = [[0.0, "#0072b2"], [0.5, "#f2f2f2"], [1.0, "#d55e00"]]
 HINT = "The smallest change that meets the targets: a hint where the model is off, no diagnosis of what is wrong there."
 
@@ -80,7 +80,7 @@ def _line_of_parts(
 
 
 def coloured(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple[Trace, dict[str, Any]]:
-    """Draw places coloured by a change.
+    """Draw points coloured by a change.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def coloured(positions: FloatArray, change: FloatArray, names: list[str]) -> tup
     change : (n,) array
         Percent.
     names : list of str
-        Of the places.
+        Of the points.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def coloured(positions: FloatArray, change: FloatArray, names: list[str]) -> tup
 
 
 def pictures_of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Picture]:
-    """Draw how much further every place gives way to a force at rest than the nominal model says.
+    """Draw how much further every point yields to a static force than the nominal model says.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def pictures_of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Pic
     place = {int(node): row for row, node in enumerate(geometry.nodes)}
     dofs = enumerate(updated.nominal.expanded_dofs)
     rows = np.array([row for row, dof in dofs if dof.direction in directions and dof.node in place], int)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_PLACES).astype(int))] if len(rows) else rows
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_POINTS).astype(int))] if len(rows) else rows
     before, after = (_flexibility(model, rows) for model in (updated.nominal, updated.model))
     moving = before > STIFF * before.max(initial=0.0)
     rows, change = rows[moving], 100 * (after[moving] / before[moving] - 1)
@@ -142,8 +142,8 @@ def pictures_of_flexibility(run: RunContents, updated: UpdatedModel) -> list[Pic
     return [
         Picture(
             name="flexibility",
-            title="Change along the structure: how much further each place gives way to a force on it",
-            alt=f"Change of the static flexibility at {counted(len(rows), 'place')}: {extremes}.",
+            title="Change of the flexibility at each point of the structure",
+            alt=f"Change of the static flexibility at {counted(len(rows), 'point')}: {extremes}.",
             traces=(traces,),
             layout=layout,
             note=f"Updated over nominal model, without motions as a rigid body. {HINT}",
@@ -159,7 +159,7 @@ def _along(positions: FloatArray, change: FloatArray, names: list[str]) -> tuple
 
 
 def _flexibility(model: ReducedModel, rows: IntArray) -> FloatArray:
-    """Give the static deflection under a unit force on the same place, (n_rows,), m/N."""
+    """Give the static deflection under a unit force at the same point, (n_rows,), m/N."""
     values, shapes = eigh((model.stiffness + model.stiffness.T) / 2, model.mass)
     flexible = values > LEAST_EIGENVALUE * values[-1]
     return np.asarray(((model.expansion[rows] @ shapes[:, flexible]) ** 2 / values[flexible]).sum(axis=1))

@@ -40,12 +40,12 @@ class RunContents:
     ----------
     manifest : mapping
         What `run.json` says.
-    recordings, fit, reduced, pairs, updated, prediction, state_space : results of stages
+    estimate, fit, reduced, pairs, updated, prediction, state_space : results of stages
         As the stages gave them.
     diagnosis : Diagnosis, optional
         What is missing from the model.
     levels : LevelDependence, optional
-        Weak beside strong blows.
+        Weak beside strong records.
     geometry : Geometry, optional
         Where the nodes of the FE model are.
     reference : FrfSet, optional
@@ -55,7 +55,7 @@ class RunContents:
     """
 
     manifest: Mapping[str, Any]
-    recordings: FrfEstimate | None = None
+    estimate: FrfEstimate | None = None
     fit: ModalFit | None = None
     reduced: ReducedModel | None = None
     pairs: Pairs | None = None
@@ -81,7 +81,7 @@ class RunContents:
     @property
     def frfs(self) -> FrfSet | None:
         """The measured FRFs."""
-        return None if self.recordings is None else self.recordings.frfs
+        return None if self.estimate is None else self.estimate.frfs
 
     @property
     def labels(self) -> tuple[FrfLabel, ...]:
@@ -176,7 +176,7 @@ def read_contents(folder: RunFolder) -> RunContents:
     model = folder.load("model") if "model" in stages else None
     return RunContents(
         manifest=folder.manifest,
-        recordings=folder.load("ingest"),
+        estimate=folder.load("ingest"),
         fit=folder.load("fit"),
         reduced=folder.load("reduce") if has_model else None,
         pairs=folder.load("pair") if has_model else None,

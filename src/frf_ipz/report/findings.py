@@ -32,16 +32,16 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     pair of str
         The verdict, or what was found first; and the findings' other statements.
     """
-    statements = [plain_signs(finding.statement) for finding in diagnosis.findings if finding.statement]
+    statements = [typeset(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
-    more = [f"What is not explained: {plain_signs(diagnosis.remains)}."] if diagnosis.remains else []
-    more += [f"A part of it is explained: {' '.join(statements)}"] if statements else []
-    return SENTENCES.get(diagnosis.verdict, ""), " ".join([*more, *place_of_mismatch(diagnosis)])
+    additions = [f"What is not explained: {typeset(diagnosis.remains)}."] if diagnosis.remains else []
+    additions += [f"A part of it is explained: {' '.join(statements)}"] if statements else []
+    return SENTENCES.get(diagnosis.verdict, ""), " ".join([*additions, *mismatch_sentence(diagnosis)])
 
 
-def place_of_mismatch(diagnosis: Diagnosis) -> list[str]:
-    """Say where the cause of what nothing explains seems to sit.
+def mismatch_sentence(diagnosis: Diagnosis) -> list[str]:
+    """State where the cause of an unexplained mismatch seems to sit.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def place_of_mismatch(diagnosis: Diagnosis) -> list[str]:
     Returns
     -------
     list of str
-        A sentence; empty where there is no such place.
+        A sentence; empty where no location is known.
     """
     if diagnosis.verdict != "unexplained" or not diagnosis.mismatch_location:
         return []
@@ -59,7 +59,7 @@ def place_of_mismatch(diagnosis: Diagnosis) -> list[str]:
     return [f"An unknown force at {' and '.join(named)} would explain most of the mismatch."]
 
 
-def plain_signs(text: str) -> str:
+def typeset(text: str) -> str:
     """Set signs and numbers as people write them in a text that was made for a terminal.
 
     Parameters
@@ -72,10 +72,10 @@ def plain_signs(text: str) -> str:
     str
         With the sign for plus or minus, and 120.
     """
-    return ROUNDED.sub(lambda found: f"{float(found[0]):.0f}", text.replace("+-", "±"))
+    return ROUNDED.sub(lambda match: f"{float(match[0]):.0f}", text.replace("+-", "±"))
 
 
-def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:
+def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
     """Give the figure and the text of the card on the first screen.
 
     Parameters
@@ -98,11 +98,11 @@ def said_in_short(diagnosis: Diagnosis) -> tuple[str, str]:
     names = " and ".join(effect if count == 1 else f"{effect} ({count})" for effect, count in counts.items())
     if diagnosis.verdict == "unexplained":
         return "unknown", f"nothing in the catalogue explains it; best in part: {names}"
-    sure = min(finding.probability for finding in diagnosis.findings)
-    return names, f"probability {sure:.3g}" if sure < 0.999 else "probability above 0.999"
+    probability = min(finding.probability for finding in diagnosis.findings)
+    return names, f"probability {probability:.3g}" if probability < 0.999 else "probability above 0.999"
 
 
-def marked_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
+def finding_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
     """Give the nodes at which something is missing.
 
     Parameters
@@ -117,16 +117,16 @@ def marked_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, 
     dict of int to str
         What is missing at each node.
     """
-    marked: dict[int, str] = {}
+    missing: dict[int, str] = {}
     for finding in () if diagnosis is None else diagnosis.findings:
         text = finding.effect.replace("_", " ")
         for node in _nodes(finding.location, frfs):
-            marked[node] = text
-    return marked
+            missing[node] = text
+    return missing
 
 
 def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
-    """Give the nodes at which the cause of what nothing explains seems to sit.
+    """Give the nodes at which the cause of an unexplained mismatch seems to sit.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int
     """
     if diagnosis is None or diagnosis.verdict != "unexplained":
         return {}
-    return dict.fromkeys(_nodes(diagnosis.mismatch_location, frfs), "place of the mismatch: the cause is unknown")
+    return dict.fromkeys(_nodes(diagnosis.mismatch_location, frfs), "location of the mismatch: the cause is unknown")
 
 
 def _in_words(location: Mapping[str, object]) -> list[tuple[str, str]]:

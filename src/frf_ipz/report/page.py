@@ -18,6 +18,7 @@ from frf_ipz.report.packing import Packer, to_json
 from frf_ipz.report.picture import colour_of
 from frf_ipz.report.section import Section, pictures_of, render_section
 from frf_ipz.report.sections import (
+    diagnosis,
     fit,
     frfs,
     overview,
@@ -30,7 +31,6 @@ from frf_ipz.report.sections import (
     state_space,
     updating,
 )
-from frf_ipz.report.sections.diagnosis import section as diagnosis
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -67,7 +67,7 @@ def write_report(folder: RunFolder, path: Path, *, progress: Progress = silent) 
     path : Path
         File to write.
     progress : Progress
-        Told how far it is.
+        Called with the fraction done and what is being done.
 
     Raises
     ------
@@ -175,22 +175,23 @@ def page_tools(run: RunContents) -> str:
 
 
 def _chooser(run: RunContents) -> str:
-    """Offer a matrix of boxes, sensors by blows: which FRFs the pictures show."""
+    """Offer a matrix of boxes, outputs by inputs: which FRFs the pictures show."""
     rows = dict.fromkeys(label.output_dof for label in run.labels)
     columns = dict.fromkeys(label.input_dof for label in run.labels)
-    place: dict[object, list[int]] = {}
+    numbers: dict[object, list[int]] = {}
     for number, label in enumerate(run.labels):
-        place.setdefault((label.output_dof, label.input_dof), []).append(number)
+        numbers.setdefault((label.output_dof, label.input_dof), []).append(number)
     head = "".join(f'<th scope="col">{escape(str(dof))}</th>' for dof in columns)
     body = ""
     for row in rows:
-        cells = "".join(f"<td>{_boxes(run, place.get((row, column), []))}</td>" for column in columns)
+        cells = "".join(f"<td>{_boxes(run, numbers.get((row, column), []))}</td>" for column in columns)
         body += f'<tr><th scope="row">{escape(str(row))}</th>{cells}</tr>'
-    shown = len(run.labels) - len(run.hidden_frfs)
+    n_visible = len(run.labels) - len(run.hidden_frfs)
     return (
-        f'<details class="chooser"><summary class="button">FRFs: <span id="shown">{shown} of {len(run.labels)}</span>'
-        '</summary><div><p><button type="button" data-all="1">All</button><button type="button" data-all="0">None'
-        f'</button></p><table><thead><tr><th scope="col">sensor \\ blow</th>{head}</tr></thead>'
+        f'<details class="chooser"><summary class="button">FRFs: <span id="shown">{n_visible} of {len(run.labels)}'
+        '</span></summary><div><p><button type="button" data-all="1">All</button>'
+        f'<button type="button" data-all="0">None</button></p>'
+        f'<table><thead><tr><th scope="col">output \\ input</th>{head}</tr></thead>'
         f"<tbody>{body}</tbody></table></div></details>"
     )
 

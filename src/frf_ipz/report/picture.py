@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.report.table import Table
+    from frf_ipz.report.section import Table
 
 Trace: TypeAlias = "dict[str, Any]"
 
@@ -98,7 +98,7 @@ def frequency_axis(low_hz: float, high_hz: float) -> dict[str, Any]:
     return {"title": {"text": "Frequency, Hz"}, "range": [float(low_hz), float(high_hz)]}
 
 
-def panels(x: dict[str, Any], *axes: Axis, **more: Any) -> dict[str, Any]:  # noqa: ANN401  any property of a layout
+def panels(x: dict[str, Any], *axes: Axis, **options: Any) -> dict[str, Any]:  # noqa: ANN401  any property of a layout
     """Lay out panels above each other that share the horizontal axis.
 
     Parameters
@@ -107,7 +107,7 @@ def panels(x: dict[str, Any], *axes: Axis, **more: Any) -> dict[str, Any]:  # no
         The horizontal axis.
     *axes : Axis
         Vertical axes from the top down; the k-th is ``y``, ``y2``, ... of the traces.
-    **more : object
+    **options : object
         Further properties of the layout.
 
     Returns
@@ -117,7 +117,7 @@ def panels(x: dict[str, Any], *axes: Axis, **more: Any) -> dict[str, Any]:  # no
     """
     shares = np.array([axis.share for axis in axes]) / sum(axis.share for axis in axes)
     free = 1 - GAP * (len(axes) - 1)
-    layout: dict[str, Any] = {**more}
+    layout: dict[str, Any] = {**options}
     top = 1.0
     for number, (axis, share) in enumerate(zip(axes, shares, strict=True)):
         bottom = max(top - share * free, 0.0)
@@ -133,7 +133,7 @@ def panels(x: dict[str, Any], *axes: Axis, **more: Any) -> dict[str, Any]:  # no
     return layout
 
 
-def line(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: Any) -> Trace:  # noqa: ANN401  arrays or lists
+def line(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **options: Any) -> Trace:  # noqa: ANN401  arrays or lists
     """Draw a curve.
 
     Parameters
@@ -146,7 +146,7 @@ def line(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: Any
         A name of the themes.
     hover : str
         A plotly hover template without the name; where it is empty, nothing is said.
-    **more : object
+    **options : object
         Further properties; ``width`` and ``dash`` of the line among them.
 
     Returns
@@ -154,11 +154,11 @@ def line(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: Any
     dict
         A plotly trace.
     """
-    style = {"color": colour, "width": more.pop("width", 1.6), "dash": more.pop("dash", "solid")}
-    return {"type": "scatter", "mode": "lines", "x": x, "y": y, "name": name, "line": style, **_hover(hover), **more}
+    style = {"color": colour, "width": options.pop("width", 1.6), "dash": options.pop("dash", "solid")}
+    return {"type": "scatter", "mode": "lines", "x": x, "y": y, "name": name, "line": style, **_hover(hover), **options}
 
 
-def markers(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: Any) -> Trace:  # noqa: ANN401  as above
+def markers(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **options: Any) -> Trace:  # noqa: ANN401  as above
     """Draw points.
 
     Parameters
@@ -171,7 +171,7 @@ def markers(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: 
         A name of the themes.
     hover : str
         A plotly hover template without the name; where it is empty, nothing is said.
-    **more : object
+    **options : object
         Further properties; ``symbol`` and ``size`` of the markers among them.
 
     Returns
@@ -179,11 +179,13 @@ def markers(x: Any, y: Any, name: str, colour: str, *, hover: str = "", **more: 
     dict
         A plotly trace.
     """
-    symbol = more.pop("symbol", "circle")
-    style: dict[str, Any] = {"color": colour, "size": more.pop("size", 8), "symbol": symbol}
+    symbol = options.pop("symbol", "circle")
+    style: dict[str, Any] = {"color": colour, "size": options.pop("size", 8), "symbol": symbol}
     if str(symbol).endswith("-open") or symbol in {"x-thin", "cross-thin"}:
         style["line"] = {"width": 1.8, "color": colour}
-    return {"type": "scatter", "mode": "markers", "x": x, "y": y, "name": name, "marker": style} | _hover(hover) | more
+    return (
+        {"type": "scatter", "mode": "markers", "x": x, "y": y, "name": name, "marker": style} | _hover(hover) | options
+    )
 
 
 def band(
@@ -191,7 +193,7 @@ def band(
     limits: tuple[Any, Any],
     name: str,
     colour: str,
-    **more: Any,  # noqa: ANN401  any property of a trace
+    **options: Any,  # noqa: ANN401  any property of a trace
 ) -> list[Trace]:
     """Fill the space between two curves.
 
@@ -205,7 +207,7 @@ def band(
         In the legend.
     colour : str
         A name of the themes with an opacity.
-    **more : object
+    **options : object
         Further properties of both traces.
 
     Returns
@@ -214,10 +216,10 @@ def band(
         Two plotly traces.
     """
     bare = {"line": {"width": 0, "color": colour}, "hoverinfo": "skip", "mode": "lines", "type": "scatter"}
-    group = more.pop("legendgroup", name)
-    low = {**bare, "x": x, "y": limits[0], "showlegend": False, "legendgroup": group, "name": name, **more}
+    group = options.pop("legendgroup", name)
+    low = {**bare, "x": x, "y": limits[0], "showlegend": False, "legendgroup": group, "name": name, **options}
     high = {**bare, "x": x, "y": limits[1], "fill": "tonexty", "fillcolor": colour, "legendgroup": group, "name": name}
-    return [low, {**high, **more}]
+    return [low, {**high, **options}]
 
 
 def colour_of(number: int) -> str:
@@ -252,8 +254,8 @@ def dash_of(number: int) -> str:
     return DASHES[(number // COLOURS) % len(DASHES)]
 
 
-def outline(x: Sequence[float], low: float, high: float, colour: str, **more: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Shade a stretch of the horizontal axis over the whole height.
+def shaded_span(x: Sequence[float], low: float, high: float, colour: str, **options: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Shade a range of the horizontal axis over the whole height.
 
     Parameters
     ----------
@@ -263,7 +265,7 @@ def outline(x: Sequence[float], low: float, high: float, colour: str, **more: An
         Of the height, 0 to 1.
     colour : str
         A name of the themes with an opacity.
-    **more : object
+    **options : object
         Further properties.
 
     Returns
@@ -272,7 +274,7 @@ def outline(x: Sequence[float], low: float, high: float, colour: str, **more: An
         A plotly shape.
     """
     place = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(x[0]), "x1": float(x[1]), "y0": low, "y1": high}
-    return {**place, "fillcolor": colour, "line": {"width": 0}, "layer": "below", **more}
+    return {**place, "fillcolor": colour, "line": {"width": 0}, "layer": "below", **options}
 
 
 def _hover(text: str) -> Trace:

@@ -31,24 +31,24 @@ def measured_at(prediction: Prediction, frfs: FrfSet | None) -> dict[int, Comple
     if frfs is None:
         return {}
     known = {_key(label): number for number, label in enumerate(frfs.labels)}
-    found = {}
+    measured = {}
     for number, label in enumerate(prediction.labels):
-        place = known.get(_key(label))
-        if place is not None and frfs.labels[place].quantity is label.quantity:
-            sign = label.sign * frfs.labels[place].sign
-            found[number] = sign * _at(frfs, place, prediction)
-    return found
+        column = known.get(_key(label))
+        if column is not None and frfs.labels[column].quantity is label.quantity:
+            sign = label.sign * frfs.labels[column].sign
+            measured[number] = sign * _at(frfs, column, prediction)
+    return measured
 
 
 def _key(label: FrfLabel) -> tuple[str, str]:
     return label.output_dof.name, label.input_dof.name
 
 
-def _at(frfs: FrfSet, place: int, prediction: Prediction) -> ComplexArray:
-    wanted, lines = prediction.frequency_hz, frfs.frequency_hz
-    nearest = np.clip(np.searchsorted(lines, wanted), 1, len(lines) - 1)
-    nearest -= wanted - lines[nearest - 1] < lines[nearest] - wanted
+def _at(frfs: FrfSet, column: int, prediction: Prediction) -> ComplexArray:
+    predicted_hz, lines = prediction.frequency_hz, frfs.frequency_hz
+    nearest = np.clip(np.searchsorted(lines, predicted_hz), 1, len(lines) - 1)
+    nearest -= predicted_hz - lines[nearest - 1] < lines[nearest] - predicted_hz
     step = float(np.median(np.diff(lines)))
-    values: ComplexArray = frfs.values[nearest, place].copy()
-    values[np.abs(lines[nearest] - wanted) > step / 2] = np.nan
+    values: ComplexArray = frfs.values[nearest, column].copy()
+    values[np.abs(lines[nearest] - predicted_hz) > step / 2] = np.nan
     return values

@@ -1,4 +1,4 @@
-"""The structure as a drawing in the plane: nodes, supports, sensors, blows, points of interest, and what is missing."""
+"""The structure as a drawing in the plane: nodes, supports, sensors, inputs, points of interest, what is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_LABELS = 24  # DOFs of a kind that are labelled; more would cover each othe
 ABOVE_MARK, BELOW_MARK = 0.1, 0.16  # from a mark to its label, on a structure that is a line
 MOST_JOINED = 4  # labels in a row; of more the first and the last
 CHARACTER = 0.0085  # of the structure's length: width of a character on a page of the usual width
-SHELF = {"sensor": 0.2, "blow": 0.62, "point": -0.34, "missing": 0.0}  # above and below a structure that is a line
+SHELF = {"sensor": 0.2, "input": 0.62, "point": -0.34, "missing": 0.0}  # above and below a structure that is a line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,18 +31,18 @@ class Marks:
 
     Parameters
     ----------
-    sensors, blows, points : sequence of Dof
+    sensors, inputs, points : sequence of Dof
         DOFs of the test, and points of interest.
     missing : mapping of int to str
         Nodes at which something is missing in the model, and what.
     mismatch : mapping of int to str
-        Nodes at which the cause of what nothing explains seems to sit, and what is said of them.
+        Nodes at which the cause of an unexplained mismatch seems to sit, and what is said of them.
     across : str
         Title of the axis under a structure that is a line.
     """
 
     sensors: Sequence[Dof] = ()
-    records: Sequence[Dof] = ()
+    inputs: Sequence[Dof] = ()
     points: Sequence[Dof] = ()
     missing: Mapping[int, str] = field(default_factory=dict)
     mismatch: Mapping[int, str] = field(default_factory=dict)
@@ -72,10 +72,10 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
     traces = [_body(positions, lines, place), _nodes(nodes, positions)]
     traces += _supports(geometry, positions, place)
     traces += _dofs("sensor", marks.sensors, positions, place, is_line=is_line)
-    traces += _dofs("blow", marks.records, positions, place, is_line=is_line)
+    traces += _dofs("input", marks.inputs, positions, place, is_line=is_line)
     traces += _dofs("point", marks.points, positions, place, is_line=is_line)
     traces += _rings("missing in the model", marks.missing, positions, place)
-    traces += _rings("place of the mismatch", marks.mismatch, positions, place)
+    traces += _rings("location of the mismatch", marks.mismatch, positions, place)
     note = "" if geometry is not None else "No model gives positions: the nodes stand in a row by their numbers."
     return Picture(
         name="structure",
@@ -91,7 +91,7 @@ def draw_structure(geometry: Geometry | None, marks: Marks) -> Picture | None:
 def _plan(geometry: Geometry | None, marks: Marks) -> tuple[IntArray, FloatArray, IntArray]:
     """Nodes, their positions on the drawing, and lines as pairs of nodes."""
     if geometry is None:
-        dofs = (*marks.sensors, *marks.records, *marks.points)
+        dofs = (*marks.sensors, *marks.inputs, *marks.points)
         nodes = np.array(sorted({dof.node for dof in dofs if dof.node > 0}), int)
         positions = np.stack([nodes, np.zeros(len(nodes))], 1).astype(float)
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
@@ -127,12 +127,12 @@ def _supports(geometry: Geometry | None, positions: FloatArray, place: Mapping[i
 
 KINDS = {
     "sensor": ("sensor", "@c0", "square", "top center"),
-    "blow": ("blow", "@c1", "triangle-down", "top center"),
+    "input": ("input", "@c1", "triangle-down", "top center"),
     "point": ("point of interest", "@c2", "star", "bottom center"),
 }
 
 
-BESIDE = {"sensor": "top left", "blow": "bottom right", "point": "bottom left"}  # labels of one node side by side
+BESIDE = {"sensor": "top left", "input": "bottom right", "point": "bottom left"}  # labels of one node side by side
 
 
 def _dofs(
@@ -155,9 +155,9 @@ def _dofs(
     extent = float(np.ptp(positions[:, 0])) or 1.0
     labels = _side_by_side([(float(positions[place[dof.node], 0]), str(dof)) for dof in known], extent)
     words: Trace = {"mode": "text", "text": [text for _, text in labels], "textposition": where, "textfont": font}
-    quiet: Trace = {**words, "showlegend": False, "legendgroup": name}
+    unlisted: Trace = {**words, "showlegend": False, "legendgroup": name}
     height = heights[0] + (ABOVE_MARK if where.startswith("top") else -BELOW_MARK)
-    at = markers([x for x, _ in labels], np.full(len(labels), height), name, colour, **quiet)
+    at = markers([x for x, _ in labels], np.full(len(labels), height), name, colour, **unlisted)
     return [{**points, "legendgroup": name}, at]
 
 
@@ -188,11 +188,11 @@ def _side_by_side(labels: Sequence[tuple[float, str]], extent: float) -> list[tu
 
 def _joined(group: Sequence[tuple[float, str]]) -> tuple[float, str]:
     texts = [text for _, text in group]
-    shown = texts if len(texts) <= MOST_JOINED else [texts[0], "…", texts[-1]]
-    return (group[0][0] + group[-1][0]) / 2, " ".join(shown)
+    names = texts if len(texts) <= MOST_JOINED else [texts[0], "…", texts[-1]]
+    return (group[0][0] + group[-1][0]) / 2, " ".join(names)
 
 
-RINGS = {"missing in the model": "circle-open", "place of the mismatch": "diamond-open"}
+RINGS = {"missing in the model": "circle-open", "location of the mismatch": "diamond-open"}
 
 
 def _rings(name: str, nodes: Mapping[int, str], positions: FloatArray, place: Mapping[int, int]) -> list[Trace]:
@@ -221,7 +221,7 @@ def _in_words(geometry: Geometry | None, marks: Marks) -> str:
         extent = " by ".join(f"{number(value, 3)} m" for value in np.ptp(geometry.coordinates_m, axis=0) if value > 0)
         parts.append(f"{len(geometry.nodes)} nodes over {extent}")
         parts += [f"node {node} {how}" for node, how in list(geometry.supports.items())[:4]]
-    for name, dofs in (("sensors", marks.sensors), ("blows", marks.records), ("points of interest", marks.points)):
+    for name, dofs in (("sensors", marks.sensors), ("inputs", marks.inputs), ("points of interest", marks.points)):
         parts += [f"{name} at {listed([str(dof) for dof in dofs])}"] if dofs else []
     parts += [f"{text} at node {node}" for node, text in list(marks.missing.items())[:4]]
     parts += [f"{text} (node {node})" for node, text in list(marks.mismatch.items())[:4]]

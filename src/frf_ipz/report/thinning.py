@@ -35,7 +35,7 @@ def bins_for(n_curves: int) -> int:
 def thin(frequency_hz: FloatArray, curves: Sequence[FloatArray], n_bins: int) -> IntArray:
     """Choose the lines to draw: of every bin those with the smallest and the largest value of each curve.
 
-    Bins are narrow at low frequencies too, so that the choice serves linear and logarithmic axes alike.
+    Bins are narrow at low frequencies too, so that the choice serves linear and logarithmic axes equally well.
 
     Parameters
     ----------
@@ -48,25 +48,25 @@ def thin(frequency_hz: FloatArray, curves: Sequence[FloatArray], n_bins: int) ->
 
     Returns
     -------
-    (n_kept,) int array
+    (n_thinned,) int array
         Lines to draw, ascending; all of them where there are few.
 
     Examples
     --------
     >>> f = np.arange(10_000.0)
     >>> peak = np.where(f == 7_777, 1.0, 0.0)
-    >>> kept = thin(f, [peak], 100)
-    >>> 7_777 in kept, len(kept) <= 202
+    >>> lines = thin(f, [peak], 100)
+    >>> 7_777 in lines, len(lines) <= 202
     (True, True)
     """
     n_lines = len(frequency_hz)
     if n_lines <= 2 * n_bins:
         return np.arange(n_lines)
     starts = _starts(frequency_hz, n_bins)
-    kept = [np.zeros(1, int)]  # the last line is a bin of its own
+    lines = [np.zeros(1, int)]  # the last line is a bin of its own
     for curve in curves:
-        kept += [_extreme(curve, starts), _extreme(-curve, starts)]
-    return np.unique(np.concatenate(kept))
+        lines += [_extreme(curve, starts), _extreme(-curve, starts)]
+    return np.unique(np.concatenate(lines))
 
 
 def _starts(frequency_hz: FloatArray, n_bins: int) -> IntArray:

@@ -133,22 +133,22 @@ def counted(count: int, noun: str, plural: str = "") -> str:
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
-def listed(items: Sequence[str], most: int = 6) -> str:
+def listed(items: Sequence[str], n_listed: int = 6) -> str:
     """Join a few items into a phrase.
 
     Parameters
     ----------
     items : sequence of str
         The items.
-    most : int
-        More are only counted.
+    n_listed : int
+        Further ones are only counted.
 
     Returns
     -------
     str
         For example ``a, b and 3 more``.
     """
-    shown = list(items[:most])
-    if len(items) > most:
-        return f"{', '.join(shown)} and {len(items) - most} more"
-    return " and ".join(filter(None, [", ".join(shown[:-1]), *shown[-1:]]))
+    names = list(items[:n_listed])
+    if len(items) > n_listed:
+        return f"{', '.join(names)} and {len(items) - n_listed} more"
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))

@@ -19,10 +19,9 @@ from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import render_choices, render_page
-from frf_ipz.show.pictures.shape_drawing import draw_shape
-from frf_ipz.show.pictures.shapes import mode_shape, operating_shape
-from frf_ipz.show.pictures.zoom import zoomed_traces
+from frf_ipz.show.shapes import draw_shape, mode_shape, operating_shape
 from frf_ipz.show.workbench import Workbench
+from frf_ipz.show.zoom import zoomed_traces
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
@@ -110,25 +109,25 @@ def _choices(bench: Workbench, request: Request) -> Response:
 
 
 def _shape(bench: Workbench, request: Request) -> Response:
-    asked, run = request.query_params, bench.contents()
+    query, run = request.query_params, bench.contents()
     try:
-        if asked.get("mode"):
-            shape = mode_shape(run, int(asked["mode"]))
+        if query.get("mode"):
+            shape = mode_shape(run, int(query["mode"]))
         else:
-            shape = operating_shape(run, float(asked.get("hz", "nan")), asked.get("input", ""))
+            shape = operating_shape(run, float(query.get("hz", "nan")), query.get("input", ""))
     except ValueError as error:
         raise InputError(str(error)) from None
     return JSONResponse(draw_shape(shape, run.geometry))
 
 
 def _zoom(bench: Workbench, request: Request) -> Response:
-    asked = request.query_params
+    query = request.query_params
     try:
-        stretch = float(asked.get("low", "nan")), float(asked.get("high", "nan"))
-        shown = [int(place) for place in asked.get("frfs", "").split(",")]
+        range_hz = float(query.get("low", "nan")), float(query.get("high", "nan"))
+        frfs = [int(place) for place in query.get("frfs", "").split(",")]
     except ValueError as error:
         raise InputError(str(error)) from None
-    return JSONResponse({"traces": zoomed_traces(bench.contents(), stretch, shown)})
+    return JSONResponse({"traces": zoomed_traces(bench.contents(), range_hz, frfs)})
 
 
 def _change(bench: Workbench, request: Request) -> Response:

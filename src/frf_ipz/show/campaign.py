@@ -1,7 +1,7 @@
 """What a folder holds to look at and to work on: one run, or a campaign with its pipelines and their runs.
 
 A campaign is a folder of test, model and pipeline files with their recordings, or a folder of such folders. A pipeline
-that has not been run yet gets a place for its results beside it: ``results/NAME`` for ``NAME.toml``.
+that has not been run yet gets a folder for its results beside it: ``results/NAME`` for ``NAME.toml``.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ DEEPEST = 3  # folders below the one that is given: campaign, its results, a run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """A run, or the place of one that has not been made yet.
+class RunPaths:
+    """Where a run is, or will be once it has been made.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Place:
     pipeline: Path
 
 
-def find_places(folder: Path) -> tuple[Place, ...]:
+def find_runs(folder: Path) -> tuple[RunPaths, ...]:
     """Look for runs and pipelines in a folder.
 
     Parameters
@@ -48,7 +48,7 @@ def find_places(folder: Path) -> tuple[Place, ...]:
 
     Returns
     -------
-    tuple of Place
+    tuple of RunPaths
         One where the folder is itself a run; else the runs of each pipeline, and pipelines without a run.
 
     Raises
@@ -62,27 +62,27 @@ def find_places(folder: Path) -> tuple[Place, ...]:
         runs += [_run_in(here)] if (here / MANIFEST).is_file() else []
         pipelines += [file for file in sorted(here.glob("*.toml")) if _is_pipeline(file)]
     ran = {run.pipeline for run in runs}
-    new = [Place(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
+    new = [RunPaths(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
     if not runs and not new:
         raise InputError(
             f"{folder}: there is no run here (no {MANIFEST}) and no pipeline; write one with 'frf-ipz init {folder}', "
             f"or make a run with 'frf-ipz run PIPELINE --out {folder}'"
         )
-    return tuple(sorted((*runs, *new), key=lambda place: (str(place.pipeline), str(place.folder))))
+    return tuple(sorted((*runs, *new), key=lambda run: (str(run.pipeline), str(run.folder))))
 
 
 def _folders(folder: Path) -> Iterator[Path]:
-    """Give the folders that may hold a run or a pipeline, from the top; what lies inside a run is its own affair."""
+    """Give the folders that may hold a run or a pipeline, from the top; nothing is searched inside a run."""
     for path, below, _ in os.walk(folder):
         here = Path(path)
         is_run, depth = (here / MANIFEST).is_file(), len(here.relative_to(folder).parts)
-        kept = [] if is_run or depth >= DEEPEST else [name for name in sorted(below) if not name.startswith(".")]
-        below[:] = kept
+        names = [] if is_run or depth >= DEEPEST else [name for name in sorted(below) if not name.startswith(".")]
+        below[:] = names
         yield here
 
 
-def _run_in(folder: Path) -> Place:
-    return Place(folder=folder, pipeline=Path(str(read_manifest(folder).get("pipeline", ""))))
+def _run_in(folder: Path) -> RunPaths:
+    return RunPaths(folder=folder, pipeline=Path(str(read_manifest(folder).get("pipeline", ""))))
 
 
 def _is_pipeline(file: Path) -> bool:

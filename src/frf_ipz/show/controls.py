@@ -81,7 +81,7 @@ def command_line(pipeline: Path, folder: Path) -> str:
 
 
 def pole_controls(fit: ModalFit) -> str:
-    """Forms to pin and strike poles and to leave stretches out.
+    """Forms to pin and reject poles and to leave frequency ranges out.
 
     Parameters
     ----------
@@ -97,24 +97,24 @@ def pole_controls(fit: ModalFit) -> str:
     rows = "".join(
         f'<tr><th scope="row">{place + 1}</th><td class="n">{number(hertz, 6)}</td><td class="n">{percent(ratio)}</td>'
         f'<td><button type="button" data-fill="{hertz:.8g}" '
-        f'aria-label="Pin or strike the mode at {number(hertz, 5)} Hz">Pin or strike …</button> '
+        f'aria-label="Pin or reject the mode at {number(hertz, 5)} Hz">Pin or reject …</button> '
         f'<button type="button" data-mode="{place}">Show shape</button></td></tr>'
         for place, (hertz, ratio) in enumerate(zip(natural_frequency_hz(poles), damping_ratio(poles), strict=True))
     )
     return (
         '<div class="work"><p class="tools-of-picture" role="group" aria-label="What dragging does">'
         '<button type="button" data-drag="zoom" aria-pressed="true">Drag: zoom</button> '
-        '<button type="button" data-drag="select" aria-pressed="false">Drag: choose a stretch</button></p>'
+        '<button type="button" data-drag="select" aria-pressed="false">Drag: choose a range</button></p>'
         '<form id="pole-form"><h3>A pole</h3>'
         "<p>Click one in the diagram (triangles: the modes of the fit), or write its frequency. A pin where there is "
         "no pole adds one.</p>"
         '<p><label>at <input name="hz" type="number" step="any" min="0" required> Hz</label> '
         f'{REASON}</p><p><button name="kind" value="pin">Pin: a mode is here</button> '
-        '<button name="kind" value="strike">Strike: no mode</button></p></form>'
-        '<form id="band-form"><h3>A stretch of lines</h3><p>Drag over it in the diagram, or write its ends.</p>'
+        '<button name="kind" value="reject">Reject: no mode</button></p></form>'
+        '<form id="band-form"><h3>A frequency range</h3><p>Drag over it in the diagram, or write its ends.</p>'
         '<p><label>from <input name="low_hz" type="number" step="any" min="0" required></label> '
         '<label>to <input name="high_hz" type="number" step="any" min="0" required> Hz</label></p>'
-        '<p><button name="kind" value="leave">Leave it out</button> '
+        '<p><button name="kind" value="exclude">Leave it out</button> '
         '<button name="kind" value="band">Fit only this band</button></p></form></div>'
         f'<div class="scroll" tabindex="0" role="region" aria-label="Modes of the fit"><table id="modes">'
         "<caption>Modes of the fit</caption><thead><tr><th>mode</th><th>frequency, Hz</th><th>damping</th><th></th>"
@@ -122,8 +122,8 @@ def pole_controls(fit: ModalFit) -> str:
     )
 
 
-def blow_controls(run: RunContents, choices: PipelineFile) -> str:
-    """Let the user keep or drop each blow.
+def record_controls(run: RunContents, choices: PipelineFile) -> str:
+    """Let the user keep or drop each record.
 
     Parameters
     ----------
@@ -135,29 +135,27 @@ def blow_controls(run: RunContents, choices: PipelineFile) -> str:
     Returns
     -------
     str
-        HTML; empty where there are no blows.
+        HTML; empty where there are no records.
     """
-    recordings = run.recordings
-    if recordings is None or not len(recordings.records):
+    estimate = run.estimate
+    if estimate is None or not len(estimate.records):
         return ""
     rows = ""
-    for name, used in zip(
-        recordings.records["record"].astype(str), recordings.records["used"].astype(bool), strict=True
-    ):
-        kept, dropped = is_named(name, choices.ingest.keep), is_named(name, choices.ingest.drop)
-        chosen = "drop" if dropped else "keep" if kept else "checks"
+    for name, used in zip(estimate.records["record"].astype(str), estimate.records["used"].astype(bool), strict=True):
+        is_kept, is_dropped = is_named(name, choices.ingest.keep), is_named(name, choices.ingest.drop)
+        chosen = "drop" if is_dropped else "keep" if is_kept else "checks"
         options = "".join(
             f'<option value="{use}"{" selected" if use == chosen else ""}>{text}</option>' for use, text in USES.items()
         )
-        shown = escape(name, quote=True)
+        label = escape(name, quote=True)
         rows += (
-            f'<tr><th scope="row">{shown}</th><td>{"used" if used else "left out"}</td>'
-            f'<td><select data-blow="{shown}" aria-label="Use of {shown}">{options}</select></td></tr>'
+            f'<tr><th scope="row">{label}</th><td>{"used" if used else "left out"}</td>'
+            f'<td><select data-record="{label}" aria-label="Use of {label}">{options}</select></td></tr>'
         )
     return (
-        '<details class="work-list" id="blow-choices"><summary>Keep or drop blows</summary><div class="scroll"><table>'
-        f"<thead><tr><th>blow</th><th>now</th><th>your choice</th></tr></thead><tbody>{rows}</tbody></table></div>"
-        "</details>"
+        '<details class="work-list" id="record-choices"><summary>Keep or drop records</summary><div class="scroll">'
+        f"<table><thead><tr><th>record</th><th>now</th><th>your choice</th></tr></thead>"
+        f"<tbody>{rows}</tbody></table></div></details>"
     )
 
 
@@ -244,15 +242,18 @@ def _fit_entries(choices: PipelineFile) -> list[tuple[str, dict[str, object]]]:
         low, high = fit.band_hz
         entries.append((f"fit {low:g} to {high:g} Hz only", {"kind": "band", "on": False}))
     entries += [
-        (f"a mode pinned at {one.hz:g} Hz{one.why and ': '}{one.why}", {"kind": "pin", "hz": one.hz, "on": False})
-        for one in fit.pinned
+        (f"a mode pinned at {pin.hz:g} Hz{pin.why and ': '}{pin.why}", {"kind": "pin", "hz": pin.hz, "on": False})
+        for pin in fit.pinned
     ]
     entries += [
-        (f"the pole at {one.hz:g} Hz struck: {one.why}", {"kind": "strike", "hz": one.hz, "on": False})
-        for one in fit.strike
+        (
+            f"the pole at {pole.hz:g} Hz rejected: {pole.why}",
+            {"kind": "reject", "hz": pole.hz, "on": False},
+        )
+        for pole in fit.strike
     ]
     entries += [
-        (f"{low:g} to {high:g} Hz left out", {"kind": "leave", "low_hz": low, "high_hz": high, "on": False})
+        (f"{low:g} to {high:g} Hz left out", {"kind": "exclude", "low_hz": low, "high_hz": high, "on": False})
         for low, high in fit.exclude_hz
     ]
     return entries

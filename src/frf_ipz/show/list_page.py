@@ -53,8 +53,8 @@ def _row(number: int, bench: Workbench, top: Path) -> str:
     name = str(manifest.get("name", "")) or _name_in_file(bench)
     when = str(manifest.get("when", ""))[:16].replace("T", " ")
     computed = f"{when} UTC" if when else "at work" if bench.status.running else "not yet"
-    said = _verdict(bench.folder) if manifest else ""
-    cells = [_below(bench.pipeline, top), _below(bench.folder, top), computed, said]
+    verdict = _verdict(bench.folder) if manifest else ""
+    cells = [_below(bench.pipeline, top), _below(bench.folder, top), computed, verdict]
     return (
         f'<tr><th scope="row"><a href="{number}/">{escape(name)}</a></th>'
         + "".join(f"<td>{escape(str(cell))}</td>" for cell in cells)
@@ -76,7 +76,7 @@ def _name_in_file(bench: Workbench) -> str:
 def _verdict(folder: Path) -> str:
     """Take the sentence of a diagnosis, where one was made."""
     try:
-        said = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-        return str(said.get("statement") or SENTENCES[said["verdict"]])
+        diagnosis = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+        return str(diagnosis.get("statement") or SENTENCES[diagnosis["verdict"]])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return "no diagnosis was run"

@@ -11,14 +11,14 @@ from frf_ipz.report.page import SECTIONS, page_data, page_tools
 from frf_ipz.report.picture import Picture
 from frf_ipz.report.section import Markup, Section, render_section
 from frf_ipz.show.controls import (
-    blow_controls,
     choices_panel,
     command_line,
     dof_controls,
     pole_controls,
+    record_controls,
     shape_controls,
 )
-from frf_ipz.show.pictures.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
+from frf_ipz.show.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
 from frf_ipz.show.setup import read_setup
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
         ]
         blocks.insert(1, Markup(html=pole_controls(run.fit)))
     if section.anchor == "recordings":
-        blocks.append(Markup(html=blow_controls(run, choices)))
+        blocks.append(Markup(html=record_controls(run, choices)))
     if section.anchor == "overview" and (run.geometry is not None or run.labels):
         return _pickable(section, run, choices)
     return replace(section, blocks=tuple(blocks))

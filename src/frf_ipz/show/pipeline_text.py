@@ -16,7 +16,7 @@ from frf_ipz.toml_files import to_options
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.show.changes.change import Change
+    from frf_ipz.show.changes import Change
 
 BESIDE = ".frf-ipz-new"  # ending of the file that becomes the pipeline file once it is whole
 

@@ -10,7 +10,7 @@ import uvicorn
 
 from frf_ipz.errors import InputError
 from frf_ipz.show.app import build_app
-from frf_ipz.show.campaign import find_places
+from frf_ipz.show.campaign import find_runs
 from frf_ipz.show.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -40,20 +40,20 @@ def serve(
     port : int
         Where to listen on the loopback; 0 for any that is free.
     announce : callable
-        Told the address of the page as soon as the server listens.
+        Called with the address of the page as soon as the server listens.
 
     Raises
     ------
     InputError
         If there is no run and no pipeline in the folder, or the port is taken.
     """
-    benches = [Workbench(place, run, read) for place in find_places(folder)]
+    benches = [Workbench(paths, run, read) for paths in find_runs(folder)]
     with listen(port) as listener:
-        taken = int(listener.getsockname()[1])
+        bound_port = int(listener.getsockname()[1])
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        app = build_app(benches, port=taken, token=token)
+        app = build_app(benches, port=bound_port, token=token)
         config = uvicorn.Config(app, log_level="warning", lifespan="off", ws="none", timeout_graceful_shutdown=2)
-        announce(f"http://{ADDRESS}:{taken}/{token}/")
+        announce(f"http://{ADDRESS}:{bound_port}/{token}/")
         try:
             uvicorn.Server(config).run(sockets=[listener])
         finally:

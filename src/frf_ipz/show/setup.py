@@ -1,4 +1,4 @@
-"""What is seen of a pipeline before its first run: the structure with sensors, blows and points, and what was read."""
+"""What is seen of a pipeline before its first run: the structure with sensors, inputs and points, and what was read."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
 from frf_ipz.report.contents import RunContents
-from frf_ipz.report.section import Block, Section
+from frf_ipz.report.section import Block, Section, Table
 from frf_ipz.report.structure_drawing import Marks, draw_structure
-from frf_ipz.report.table import Table
 from frf_ipz.report.wording import counted, listed
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     run = RunContents(
         manifest={"name": inputs.pipeline.name}, geometry=None if inputs.model is None else inputs.model.geometry
     )
-    marks = Marks(sensors=inputs.test.output_dofs, records=inputs.test.input_dofs, points=inputs.points)
+    marks = Marks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
     drawing = draw_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
     blocks: list[Block] = [_what_was_read(inputs)] if drawing is None else [drawing, _what_was_read(inputs)]
@@ -56,14 +55,14 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
 
 def _what_was_read(inputs: PipelineInputs) -> Table:
     test, model = inputs.test, inputs.model
-    found = "none: the run ends with the fit"
+    model_text = "none: the run ends with the fit"
     if model is not None:
-        found = f"{model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}"
+        model_text = f"{model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}"
     rows = [
         ["test", f"{test.name} ({test.kind}), {counted(len(test.files), 'file')}"],
-        ["model", found],
+        ["model", model_text],
         ["sensors", _names(test.output_dofs)],
-        ["blows", _names(test.input_dofs)],
+        ["inputs", _names(test.input_dofs)],
         ["points of interest", _names(inputs.points)],
     ]
     return Table(caption="What was read", columns=("", "in the files"), rows=rows)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.contents import RunContents, read_contents
 from frf_ipz.runs.folder import MANIFEST, RunFolder, read_manifest, read_run
-from frf_ipz.show.changes.registry import to_change
+from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
 from frf_ipz.toml_files import read_text
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
-    from frf_ipz.show.campaign import Place
+    from frf_ipz.show.campaign import RunPaths
     from frf_ipz.show.worker import Status
 
 STOP_S = 5.0  # how long a run gets to notice that the server ends
@@ -39,7 +39,7 @@ class Run(Protocol):
         out : Path
             The run's folder.
         progress : Progress
-            Told how far it is.
+            Called with the fraction done and what is being done.
 
         Returns
         -------
@@ -56,7 +56,7 @@ class Workbench:
 
     Parameters
     ----------
-    place : Place
+    paths : RunPaths
         The run's folder and its pipeline file.
     run : Run
         Runs a pipeline.
@@ -64,9 +64,9 @@ class Workbench:
         Reads a pipeline file and all that it names, as `pipeline.inputs.read_inputs` does.
     """
 
-    def __init__(self, place: Place, run: Run, read: Callable[[Path], PipelineInputs]) -> None:
-        self.folder = place.folder.resolve()
-        self.pipeline = place.pipeline
+    def __init__(self, paths: RunPaths, run: Run, read: Callable[[Path], PipelineInputs]) -> None:
+        self.folder = paths.folder.resolve()
+        self.pipeline = paths.pipeline
         self.read = read
         self._run = run
         self._changing = Lock()
@@ -186,16 +186,16 @@ class Workbench:
 
     def _work(self, progress: Progress) -> None:
         with self._changing:
-            asked = self._written
+            requested = self._written
         try:
             self._run(self.pipeline, self.folder, progress=progress)
         except FrfIpzError as error:
             raise InputError(f"{error}{self._take_back()}") from None
         with self._changing:
-            if self._written == asked:
+            if self._written == requested:
                 self._before = self._written = None
             else:
-                self._before = asked
+                self._before = requested
 
     def _take_back(self) -> str:
         """Restore the pipeline file, unless somebody else has changed it since."""

@@ -1,4 +1,4 @@
-"""One piece of work at a time beside the server; a newer wish stops the one at work and begins anew."""
+"""One task at a time beside the server; a newer wish stops the one at work and begins anew."""
 
 from __future__ import annotations
 
@@ -107,13 +107,13 @@ class Worker:
                     return
 
     def _try(self, wish: int) -> str:
-        def tell(fraction: float, text: str) -> None:
+        def report_status(fraction: float, text: str) -> None:
             if self._wish != wish:
                 raise Superseded
             self._status = replace(self._status, fraction=min(max(fraction, 0.0), 1.0), text=text)
 
         try:
-            self._work(tell)
+            self._work(report_status)
         except Superseded:
             return ""
         except FrfIpzError as error:

@@ -27,15 +27,15 @@ def call(monkeypatch, capsys, tmp_path):
             command.main()
         except SystemExit as stop:
             status = stop.code or 0
-        said = capsys.readouterr()
-        return status, said.out, said.err
+        output = capsys.readouterr()
+        return status, output.out, output.err
 
     return run
 
 
 def test_every_picture_that_is_named_draws(call, out, tmp_path):
-    status, said, _ = call("plot", out)
-    names = said.splitlines()[1:]
+    status, output, _ = call("plot", out)
+    names = output.splitlines()[1:]
     assert status == 0
     assert len(names) >= 10
     for name in sorted(set(names) - OF_DIAGNOSIS):
@@ -60,13 +60,13 @@ def test_the_format_is_the_one_asked_for(call, out, tmp_path, kind):
     ids=str,
 )
 def test_what_is_wrong_is_said_in_a_line(call, out, arguments, message):
-    status, _, said = call("plot", out, *arguments)
-    assert (status, said.count("\n")) == (2, 1)
-    assert message in said
+    status, _, output = call("plot", out, *arguments)
+    assert (status, output.count("\n")) == (2, 1)
+    assert message in output
 
 
 def test_a_folder_without_a_run_is_refused(call, tmp_path):
     for arguments in (("plot", tmp_path), ("plot", tmp_path, "poles"), ("show", tmp_path)):
-        status, _, said = call(*arguments)
+        status, _, output = call(*arguments)
         assert status == 2, arguments
-        assert "there is no run here" in said
+        assert "there is no run here" in output

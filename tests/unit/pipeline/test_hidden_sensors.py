@@ -33,19 +33,19 @@ def sensors(frfs):
 
 def test_the_frfs_of_the_others_stay_as_they_were(campaign):
     test = read_test(campaign / "test.toml")
-    both = estimate_frfs(test, OPTIONS).frfs
-    left = estimate_frfs(read_inputs(hiding(campaign, "1:z")).test, OPTIONS).frfs
-    assert (sensors(both), sensors(left)) == (["1:+z", "2:+z"], ["2:+z"])
-    assert (left.values[:, 0] == both.values[:, 1]).all()
+    whole_frfs = estimate_frfs(test, OPTIONS).frfs
+    remaining = estimate_frfs(read_inputs(hiding(campaign, "1:z")).test, OPTIONS).frfs
+    assert (sensors(whole_frfs), sensors(remaining)) == (["1:+z", "2:+z"], ["2:+z"])
+    assert (remaining.values[:, 0] == whole_frfs.values[:, 1]).all()
 
 
-def test_a_diagnosis_sees_blows_without_it(campaign):
+def test_a_diagnosis_sees_records_without_it(campaign):
     test = without_sensors(read_test(campaign / "test.toml"), ["1:+z"])
-    seen = observe(test, OPTIONS, estimate_frfs(test, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    observations = observe(test, OPTIONS, estimate_frfs(test, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
     whole = read_test(campaign / "test.toml")
-    both = observe(whole, OPTIONS, estimate_frfs(whole, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
-    assert [[sensor.channel for sensor in blow.sensors] for blow in seen.records] == [["acc_2"]] * 3
-    assert (seen.records[0].responses[0] == both.records[0].responses[1]).all()
+    unreduced = observe(whole, OPTIONS, estimate_frfs(whole, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    assert [[sensor.channel for sensor in record.sensors] for record in observations.records] == [["acc_2"]] * 3
+    assert (observations.records[0].responses[0] == unreduced.records[0].responses[1]).all()
 
 
 def test_a_known_mass_stays_where_it_is(campaign):
@@ -65,9 +65,9 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("dofs", "said"),
+    ("dofs", "message"),
     [(["3:+z"], "there is no sensor at '3:[+]z'"), (["1:z", "2:z"], "leaves no sensor"), (["tip"], "no DOF label")],
 )
-def test_what_makes_no_sense_is_refused(campaign, dofs, said):
-    with pytest.raises(FileFormatError, match=f"ingest.hide.*{said}"):
+def test_what_makes_no_sense_is_refused(campaign, dofs, message):
+    with pytest.raises(FileFormatError, match=f"ingest.hide.*{message}"):
         read_inputs(hiding(campaign, *dofs))

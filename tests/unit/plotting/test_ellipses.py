@@ -57,6 +57,6 @@ def test_a_flat_structure_is_seen_from_its_thin_side():
 
 def test_nodes_of_a_solid_do_not_fall_on_each_other():
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1.3) for z in (0, 0.7)], float)
-    seen = project(corners)
-    distance = np.linalg.norm(seen[:, None] - seen[None], axis=2) + np.eye(8)
+    projected = project(corners)
+    distance = np.linalg.norm(projected[:, None] - projected[None], axis=2) + np.eye(8)
     assert distance.min() > 0.05

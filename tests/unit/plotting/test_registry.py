@@ -18,9 +18,9 @@ STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
 
 @pytest.fixture(scope="module")
 def folder():
-    made = synthetic_folder(diagnosed=True)
-    made.results["diagnose"] = replace(made.results["diagnose"], at_work=synthetic_law())
-    return made
+    synthetic = synthetic_folder(diagnosed=True)
+    synthetic.results["diagnose"] = replace(synthetic.results["diagnose"], at_work=synthetic_law())
+    return synthetic
 
 
 @pytest.mark.parametrize("name", sorted(PICTURES))
@@ -55,9 +55,9 @@ def test_a_missing_stage_is_named(name):
 
 
 def test_a_run_with_one_level_has_no_picture_of_levels(folder):
-    one = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
-    with pytest.raises(InputError, match="no place was struck at several levels"):
-        draw("levels", Folder(results={"levels": one}, manifest={}, stale=()))
+    levels = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
+    with pytest.raises(InputError, match="no input was excited at several levels"):
+        draw("levels", Folder(results={"levels": levels}, manifest={}, stale=()))
 
 
 def test_a_run_without_a_law_has_no_picture_of_one():
@@ -65,7 +65,7 @@ def test_a_run_without_a_law_has_no_picture_of_one():
         draw("law", synthetic_folder(diagnosed=True))
 
 
-def test_the_force_of_a_law_is_drawn_where_no_blow_was_simulated(folder):
+def test_the_force_of_a_law_is_drawn_where_no_record_was_simulated(folder):
     force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), record=""))
     figure = draw("law", Folder(results={"diagnose": force_alone}, manifest={}, stale=()))
     assert figure.axes[0].get_ylabel() == "Force of the law, N"

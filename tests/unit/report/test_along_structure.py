@@ -20,7 +20,7 @@ def run():
 
 
 def trace(picture, name):
-    return [one for one in picture.traces if one["name"] == name][-1]
+    return [item for item in picture.traces if item["name"] == name][-1]
 
 
 def test_ratios_are_drawn_as_changes_in_percent(run):
@@ -34,7 +34,7 @@ def test_ratios_are_drawn_as_changes_in_percent(run):
 def test_without_a_band_none_is_claimed(run):
     none = run.parts.assign(stiffness_ratio_low=np.nan, stiffness_ratio_high=np.nan)
     picture = picture_of_parts(none)
-    assert [one["name"] for one in picture.traces] == ["change"]
+    assert [item["name"] for item in picture.traces] == ["change"]
     assert "band" not in picture.title
 
 
@@ -47,7 +47,7 @@ def test_a_structure_in_the_plane_is_coloured(run):
     assert points["marker"]["cmin"] == -points["marker"]["cmax"]
 
 
-def test_stretches_beyond_their_band_are_named(run):
+def test_parts_beyond_their_band_are_named(run):
     notes = build(run).notes
     assert any("softer than modelled" in note for note in notes)
 

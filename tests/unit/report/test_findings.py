@@ -8,11 +8,11 @@ import pytest
 from frf_ipz.diagnosis.result import Ambiguity
 from frf_ipz.pipeline.summary import diagnosis_lines
 from frf_ipz.report.contents import read_contents
-from frf_ipz.report.findings import marked_nodes, mismatch_nodes, plain_signs, said_in_short, verdict_of
+from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, typeset, verdict_of
 from frf_ipz.report.picture import Picture
-from frf_ipz.report.sections.diagnosis.section import build
+from frf_ipz.report.section import Table
+from frf_ipz.report.sections.diagnosis import build
 from frf_ipz.report.sections.overview import build as overview
-from frf_ipz.report.table import Table
 from synthetic_run import synthetic_folder
 
 
@@ -23,52 +23,52 @@ def run():
 
 def block(run, kind, name):
     return next(
-        one
-        for one in build(run).blocks
-        if isinstance(one, kind) and name in {getattr(one, "name", ""), getattr(one, "caption", "")}
+        item
+        for item in build(run).blocks
+        if isinstance(item, kind) and name in {getattr(item, "name", ""), getattr(item, "caption", "")}
     )
 
 
 def test_findings_are_the_verdict(run):
-    first, others = verdict_of(run.diagnosis)
-    assert first.startswith("A mass of 12.3 g (± 0.4 g) sits at node")
-    assert others == "The sensor's sign is flipped."
+    sentence, addition = verdict_of(run.diagnosis)
+    assert sentence.startswith("A mass of 12.3 g (± 0.4 g) sits at node")
+    assert addition == "The sensor's sign is flipped."
 
 
 def test_the_least_certain_finding_is_stated(run):
-    assert said_in_short(run.diagnosis) == ("added mass and sensor gain", "probability 0.98")
+    assert card_texts(run.diagnosis) == ("added mass and sensor gain", "probability 0.98")
 
 
 def test_nothing_missing_is_said(run):
     diagnosis = replace(run.diagnosis, verdict="consistent", findings=())
     assert verdict_of(diagnosis) == ("Nothing significant is missing from the model.", "")
-    assert said_in_short(diagnosis)[0] == "nothing"
+    assert card_texts(diagnosis)[0] == "nothing"
 
 
 def test_what_nothing_explains_is_unknown(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained")
     assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
     assert verdict_of(diagnosis)[1].startswith("A part of it is explained: A mass")
-    told = verdict_of(replace(diagnosis, remains="damping is 2 % (+- 1 %)"))[1]
-    assert told.startswith("What is not explained: damping is 2 % (± 1 %). A part of it is explained: A mass")
-    assert said_in_short(diagnosis)[0] == "unknown"
-    assert said_in_short(replace(diagnosis, findings=()))[0] == "unknown"
+    addition = verdict_of(replace(diagnosis, remains="damping is 2 % (+- 1 %)"))[1]
+    assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it is explained: A mass")
+    assert card_texts(diagnosis)[0] == "unknown"
+    assert card_texts(replace(diagnosis, findings=()))[0] == "unknown"
 
 
 def test_places_of_findings_are_marked_on_the_structure(run):
     nodes = run.geometry.nodes.tolist()
     sensor = run.labels[0].output_dof.node
-    assert marked_nodes(run.diagnosis, run.frfs) == {nodes[1]: "added mass", sensor: "sensor gain"}
+    assert finding_nodes(run.diagnosis, run.frfs) == {nodes[1]: "added mass", sensor: "sensor gain"}
 
 
-def test_the_place_of_what_nothing_explains_is_told_and_marked(run):
+def test_the_location_of_an_unexplained_mismatch_is_stated_and_marked(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained", findings=(), mismatch_location={"nodes": [4]})
     sentence = "An unknown force at node 4 would explain most of the mismatch."
     assert verdict_of(diagnosis)[1] == sentence
     assert sentence in build(replace(run, diagnosis=diagnosis)).notes
     assert list(mismatch_nodes(diagnosis, run.frfs)) == [4]
-    drawn = next(one for one in overview(replace(run, diagnosis=diagnosis)).blocks if isinstance(one, Picture))
-    (ring,) = [one for one in drawn.traces if one["name"] == "place of the mismatch"]
+    drawn = next(item for item in overview(replace(run, diagnosis=diagnosis)).blocks if isinstance(item, Picture))
+    (ring,) = [trace for trace in drawn.traces if trace["name"] == "location of the mismatch"]
     assert "(node 4)" in drawn.alt
     at = run.geometry.coordinates_m[run.geometry.nodes == 4, 0]
     np.testing.assert_array_equal(ring["x"], at)
@@ -83,7 +83,7 @@ def test_no_place_is_marked_where_there_is_none(run, verdict, location):
 
 def test_elements_are_marked_at_all_their_nodes(run):
     finding = replace(run.diagnosis.findings[0], location={"elements": (3, 5)})
-    assert sorted(marked_nodes(replace(run.diagnosis, findings=(finding,)), run.frfs)) == [3, 4, 5, 6]
+    assert sorted(finding_nodes(replace(run.diagnosis, findings=(finding,)), run.frfs)) == [3, 4, 5, 6]
 
 
 def test_the_map_holds_misfits_before_and_after(run):
@@ -114,7 +114,7 @@ def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
 def test_numbers_of_a_few_digits_are_written_out(run):
     diagnosis = replace(run.diagnosis, warnings=("Blows differ, 3.28e+03 times more than noise.",))
     assert "Blows differ, 3280 times more than noise." in build(replace(run, diagnosis=diagnosis)).notes
-    assert plain_signs("658.1 N/m (+- 1.2e+02) and 4.2e+09 N/m") == "658.1 N/m (± 120) and 4.2e+09 N/m"
+    assert typeset("658.1 N/m (+- 1.2e+02) and 4.2e+09 N/m") == "658.1 N/m (± 120) and 4.2e+09 N/m"
 
 
 def test_findings_come_before_alternatives(run):
@@ -129,21 +129,21 @@ def test_proof_on_held_out_data_is_in_percent(run):
     assert picture.table.rows[2][2] == "2 %"
 
 
-def test_what_cannot_be_told_apart_is_a_note_with_its_remedy(run):
+def test_what_cannot_be_distinguished_is_a_note_with_its_remedy(run):
     assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in build(run).notes
 
 
-def test_what_cannot_be_told_apart_is_said_on_the_command_line(run):
-    said = [text for _, text in diagnosis_lines(run.diagnosis)]
-    assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in said
+def test_what_cannot_be_distinguished_is_printed_on_the_command_line(run):
+    lines = [text for _, text in diagnosis_lines(run.diagnosis)]
+    assert "These data cannot tell apart: added mass and local stiffness. Strike 4:+z." in lines
 
 
-def test_three_that_cannot_be_told_apart_are_a_list():
+def test_three_indistinguishable_effects_are_a_list():
     alike = Ambiguity(effects=("axial_load", "added_mass", "time_delay"), separation_nats=1.0, resolve_by="")
     assert alike.statement == "These data cannot tell apart: axial load, added mass and time delay."
 
 
 def test_checks_that_could_not_be_made_are_only_in_the_table(run):
-    picture = block(run, Picture, "gates")
+    picture = block(run, Picture, "data-checks")
     assert picture.traces[0]["y"] == ["homogeneity"]
     assert [row[0] for row in picture.table.rows] == ["homogeneity", "reciprocity"]

@@ -1,15 +1,15 @@
-"""A force law is drawn at work: its force, and a blow as measured, with it and without it."""
+"""A force law is drawn at work: its force, and a record as measured, with it and without it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from frf_ipz.report.sections.diagnosis.law import law_pictures
+from frf_ipz.report.sections.diagnosis import law_pictures
 from synthetic_run import synthetic_law
 
 
-def test_a_blow_is_drawn_with_the_law_and_without_it_and_what_is_left_said():
+def test_a_record_is_drawn_with_the_law_and_without_it_and_the_misfit_is_stated():
     _, response = law_pictures(synthetic_law())
     assert [trace["name"] for trace in response.traces] == [
         "measured",
@@ -26,7 +26,7 @@ def test_a_few_periods_are_seen_where_the_law_does_most():
     _, response = law_pictures(synthetic_law())
     low, high = response.layout["xaxis"]["range"]
     assert high - low == pytest.approx(12 / 20, rel=0.05)
-    assert low == 0.0  # the blow is strongest at its start
+    assert low == 0.0  # the response is strongest at its start
 
 
 def test_the_force_is_drawn_over_motion_and_velocity():
@@ -38,6 +38,6 @@ def test_the_force_is_drawn_over_motion_and_velocity():
     assert over_velocity["xaxis"] == "x2"
 
 
-def test_where_blows_start_in_motion_the_force_is_all_there_is():
+def test_where_records_start_in_motion_the_force_is_all_there_is():
     assert [picture.name for picture in law_pictures(replace(synthetic_law(), record=""))] == ["law-force"]
     assert law_pictures(None) == []

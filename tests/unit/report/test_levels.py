@@ -1,9 +1,9 @@
-"""Weak and strong blows are drawn side by side, and modes over the level."""
+"""Weak and strong records are drawn side by side, and modes over the level."""
 
 import numpy as np
 import pytest
 
-from frf_ipz.report.sections.diagnosis.levels import level_pictures
+from frf_ipz.report.sections.diagnosis import level_pictures
 from synthetic_run import synthetic_folder
 
 
@@ -12,7 +12,7 @@ def folder():
     return synthetic_folder(diagnosed=True)
 
 
-def test_weak_and_strong_blows_of_every_frf_are_drawn_and_their_difference_said(folder):
+def test_weak_and_strong_records_of_every_frf_are_drawn_and_their_difference_stated(folder):
     levels, labels = folder.results["levels"], folder.results["fit"].labels
     curves, _ = level_pictures(levels, labels, (10.0, 100.0))
     assert len(curves.traces) == 2 * len(labels)

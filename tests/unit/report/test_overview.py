@@ -52,8 +52,8 @@ def test_roots_that_the_model_lacks_are_counted(run):
 
 
 def test_unknown_gains_are_fitted_before_errors_are_stated(run):
-    frfs = replace(run.recordings.frfs, values=3.0 * run.recordings.frfs.values, unknown_scale="per_channel")
-    scaled = replace(run, recordings=replace(run.recordings, frfs=frfs), prediction=None)
+    frfs = replace(run.estimate.frfs, values=3.0 * run.estimate.frfs.values, unknown_scale="per_channel")
+    scaled = replace(run, estimate=replace(run.estimate, frfs=frfs), prediction=None)
     exact = replace(run, prediction=None)
     figure = html(exact).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
     refit = html(scaled).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
@@ -66,6 +66,6 @@ def test_a_worst_target_that_came_no_closer_stands_apart_from_the_others(run):
     assert "worst" not in verdict(run)[0]
     worse = run.updated.after.copy()
     worse[0] *= 1.5
-    said = verdict(replace(run, updated=replace(run.updated, after=worse)))[0]
-    assert "in the median (before: " in said
-    assert ", but the worst 50 %" in said
+    sentence = verdict(replace(run, updated=replace(run.updated, after=worse)))[0]
+    assert "in the median (before: " in sentence
+    assert ", but the worst 50 %" in sentence

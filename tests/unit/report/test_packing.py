@@ -17,8 +17,8 @@ def unpacked(packer, reference):
 def test_long_arrays_come_back_in_single_precision():
     packer = Packer()
     values = np.geomspace(1e-12, 1e6, 100)
-    found = unpacked(packer, packer.pack({"x": values})["x"])
-    np.testing.assert_allclose(found, values, rtol=SINGLE, atol=0)
+    arrays = unpacked(packer, packer.pack({"x": values})["x"])
+    np.testing.assert_allclose(arrays, values, rtol=SINGLE, atol=0)
 
 
 def test_equal_arrays_are_stored_once():

@@ -26,11 +26,11 @@ class Reader(HTMLParser):
         self.ids, self.links, self.sources, self.alts = [], [], [], []
 
     def handle_starttag(self, tag, attributes):
-        found = dict(attributes, tag=tag)
-        self.ids += [found["id"]] if "id" in found else []
-        self.links += [found["href"]] if "href" in found else []
-        self.sources += [found[key] for key in ("src", "srcset") if key in found]
-        self.alts += [found["aria-label"]] if found.get("aria-roledescription") == "picture" else []
+        values = dict(attributes, tag=tag)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values["href"]] if "href" in values else []
+        self.sources += [values[key] for key in ("src", "srcset") if key in values]
+        self.alts += [values["aria-label"]] if values.get("aria-roledescription") == "picture" else []
 
 
 def page_of(folder, tmp_path):

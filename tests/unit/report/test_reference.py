@@ -17,29 +17,29 @@ def results():
 
 
 def test_the_frf_kept_aside_is_found(results):
-    found = measured_at(results["predict"], results["reference"])
-    np.testing.assert_array_equal(found[0], results["reference"].values[:, 0])
+    measured = measured_at(results["predict"], results["reference"])
+    np.testing.assert_array_equal(measured[0], results["reference"].values[:, 0])
 
 
 def test_signs_of_sensors_turn_the_values(results):
     reference = results["reference"]
     label = reference.labels[0]
     turned = replace(label, output_dof=Dof(label.output_dof.node, label.output_dof.direction, -1))
-    found = measured_at(results["predict"], replace(reference, labels=(turned,)))
-    np.testing.assert_array_equal(found[0], -reference.values[:, 0])
+    measured = measured_at(results["predict"], replace(reference, labels=(turned,)))
+    np.testing.assert_array_equal(measured[0], -reference.values[:, 0])
 
 
 def test_another_quantity_is_no_counterpart(results):
     reference = results["reference"]
-    other = replace(reference.labels[0], quantity=FrfQuantity.ACCELERANCE)
-    assert measured_at(results["predict"], replace(reference, labels=(other,))) == {}
+    accelerance = replace(reference.labels[0], quantity=FrfQuantity.ACCELERANCE)
+    assert measured_at(results["predict"], replace(reference, labels=(accelerance,))) == {}
 
 
 def test_lines_that_were_not_measured_are_not_known(results):
     reference = results["reference"]
     known = np.arange(reference.n_lines) < 500
-    found = measured_at(results["predict"], reference.select_lines(known))[0]
-    np.testing.assert_array_equal(np.isfinite(found), known)
+    measured = measured_at(results["predict"], reference.select_lines(known))[0]
+    np.testing.assert_array_equal(np.isfinite(measured), known)
 
 
 def test_other_points_are_no_counterpart(results):

@@ -8,7 +8,7 @@ from frf_ipz.report.structure_drawing import Marks, draw_structure
 from frf_ipz.structure import Geometry
 
 MARKS = Marks(
-    sensors=(parse_dof("3:+z"),), records=(parse_dof("2:-z"),), points=(parse_dof("1:+z"),), missing={2: "added mass"}
+    sensors=(parse_dof("3:+z"),), inputs=(parse_dof("2:-z"),), points=(parse_dof("1:+z"),), missing={2: "added mass"}
 )
 
 
@@ -23,21 +23,21 @@ def frame():
 
 
 def trace(picture, name):
-    return next(one for one in picture.traces if one["name"] == name)
+    return next(item for item in picture.traces if item["name"] == name)
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("sensor", (1, 2)), ("blow", (1, 0)), ("point of interest", (0, 0)), ("support", (0, 0))]
+    ("name", "place"), [("sensor", (1, 2)), ("input", (1, 0)), ("point of interest", (0, 0)), ("support", (0, 0))]
 )
 def test_marks_stand_at_their_nodes(frame, name, place):
-    found = trace(draw_structure(frame, MARKS), name)
-    assert (found["x"][0], found["y"][0]) == place
+    mark = trace(draw_structure(frame, MARKS), name)
+    assert (mark["x"][0], mark["y"][0]) == place
 
 
 def test_what_is_missing_is_ringed_and_named(frame):
-    found = trace(draw_structure(frame, MARKS), "missing in the model")
-    assert (found["x"][0], found["y"][0]) == (1, 0)
-    assert found["text"] == ["added mass"]
+    mark = trace(draw_structure(frame, MARKS), "missing in the model")
+    assert (mark["x"][0], mark["y"][0]) == (1, 0)
+    assert mark["text"] == ["added mass"]
 
 
 def test_lines_join_the_nodes_they_name(frame):
@@ -65,9 +65,9 @@ def test_without_anything_nothing_is_drawn():
     assert draw_structure(None, Marks()) is None
 
 
-def test_the_drawing_is_told_in_words(frame):
+def test_the_drawing_is_described_in_words(frame):
     alt = draw_structure(frame, MARKS).alt
-    for words in ("3 nodes", "node 1 clamped", "sensors at 3:+z", "blows at 2:-z", "added mass at node 2"):
+    for words in ("3 nodes", "node 1 clamped", "sensors at 3:+z", "inputs at 2:-z", "added mass at node 2"):
         assert words in alt
 
 
@@ -86,7 +86,7 @@ def test_labels_that_would_cover_each_other_are_written_side_by_side(nodes, labe
         nodes=np.arange(1, 101), coordinates_m=along, lines=np.stack([np.arange(1, 100), np.arange(2, 101)], 1)
     )
     picture = draw_structure(beam, Marks(sensors=tuple(parse_dof(f"{node}:+z") for node in nodes)))
-    words = next(one for one in picture.traces if one["mode"] == "text")
+    words = next(item for item in picture.traces if item["mode"] == "text")
     assert list(words["text"]) == labels
     joined = [node for node in nodes if str(node) in labels[-1]]
     np.testing.assert_allclose(

@@ -20,32 +20,32 @@ def lines_with_extremes(rng):
 @pytest.mark.parametrize("seed", range(5))
 def test_every_peak_and_notch_that_is_the_largest_in_its_neighbourhood_is_kept(seed):
     frequency, curve, peaks, notches = lines_with_extremes(np.random.default_rng(seed))
-    kept = thin(frequency, [curve], N_BINS)
+    lines = thin(frequency, [curve], N_BINS)
     widest = 2 * len(frequency) // N_BINS  # lines of the widest bin: the others are spread over the logarithm
     for sign, extremes in ((1, peaks), (-1, notches)):
         for line in extremes:
-            near = (sign * curve)[max(line - widest, 0) : line + widest + 1]
-            assert line in kept or near.max() > sign * curve[line]
+            window = (sign * curve)[max(line - widest, 0) : line + widest + 1]
+            assert line in lines or window.max() > sign * curve[line]
 
 
 def test_few_points_are_left_and_they_ascend():
     frequency, curve, *_ = lines_with_extremes(np.random.default_rng(2))
-    kept = thin(frequency, [curve], N_BINS)
-    assert N_BINS < len(kept) <= 2 * N_BINS + 2
-    assert np.all(np.diff(kept) > 0)
+    lines = thin(frequency, [curve], N_BINS)
+    assert N_BINS < len(lines) <= 2 * N_BINS + 2
+    assert np.all(np.diff(lines) > 0)
 
 
 def test_both_ends_are_kept():
     frequency = np.linspace(1, 2, 10_000)
-    kept = thin(frequency, [np.random.default_rng(3).standard_normal(10_000)], N_BINS)
-    assert kept[0] == 0
-    assert kept[-1] == 9_999
+    lines = thin(frequency, [np.random.default_rng(3).standard_normal(10_000)], N_BINS)
+    assert lines[0] == 0
+    assert lines[-1] == 9_999
 
 
 def test_low_frequencies_keep_lines_for_a_logarithmic_axis():
     frequency = np.linspace(0.1, 10_000.0, 100_000)
-    kept = thin(frequency, [np.sin(frequency)], N_BINS)
-    assert np.count_nonzero(frequency[kept] < 10) > 0.05 * len(kept)
+    lines = thin(frequency, [np.sin(frequency)], N_BINS)
+    assert np.count_nonzero(frequency[lines] < 10) > 0.05 * len(lines)
 
 
 def test_values_that_are_not_known_count_as_none():

@@ -51,9 +51,9 @@ def test_a_file_that_was_deleted_is_written_again(tmp_path):
 
 
 def test_a_file_that_its_stage_no_longer_writes_goes_and_one_of_another_stage_stays(tmp_path):
-    both = {"fit.txt": write_text("1"), "more.txt": write_text("2"), "shared.txt": write_text("3")}
+    writers = {"fit.txt": write_text("1"), "more.txt": write_text("2"), "shared.txt": write_text("3")}
     with open_run(tmp_path) as folder:
-        folder.stage("fit", "a", lambda: 1, lambda _: both)
+        folder.stage("fit", "a", lambda: 1, lambda _: writers)
         folder.stage("pair", "a", lambda: 1, lambda _: {"shared.txt": write_text("4")})
     (tmp_path / "own.txt").write_text("the user's")
     with open_run(tmp_path) as folder:

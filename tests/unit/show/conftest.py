@@ -4,10 +4,10 @@ from demo_case import copy_demo, make_demo
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory):
+def original(tmp_path_factory):
     return make_demo(tmp_path_factory.mktemp("made"))
 
 
 @pytest.fixture
-def demo(made, tmp_path):
-    return copy_demo(made, tmp_path)
+def demo(original, tmp_path):
+    return copy_demo(original, tmp_path)

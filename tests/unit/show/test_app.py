@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 from frf_ipz.errors import InputError
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.show.app import build_app
-from frf_ipz.show.campaign import Place
+from frf_ipz.show.campaign import RunPaths
 from frf_ipz.show.workbench import Workbench
 
 PORT, TOKEN = 8765, "drawn-at-random"
@@ -25,7 +25,7 @@ def runs():
 @pytest.fixture
 def bench(demo, runs):
     return Workbench(
-        Place(folder=demo / "out", pipeline=demo / "pipeline.toml"),
+        RunPaths(folder=demo / "out", pipeline=demo / "pipeline.toml"),
         lambda path, _, **__: runs.append(path),
         read_inputs,
     )
@@ -40,7 +40,7 @@ def client(bench):
 def test_the_page_holds_the_report_and_the_forms_and_asks_nothing_of_the_network(client):
     page = client.get(HOME)
     assert page.status_code == 200
-    for part in ('id="stabilisation"', 'id="structure"', 'id="pole-form"', 'id="point-form"', 'id="blow-choices"'):
+    for part in ('id="stabilisation"', 'id="structure"', 'id="pole-form"', 'id="point-form"', 'id="record-choices"'):
         assert part in page.text
     addresses = re.findall(r'(?:src|href)="([^"#]+)"', page.text)
     assert not [address for address in addresses if re.match(r"\w+:|//|/", address) and address != "data:,"]
@@ -68,7 +68,7 @@ def test_running_again_changes_nothing(client, bench, runs):
 
 def test_a_wrong_change_is_answered_with_a_sentence(client, bench):
     text = bench.text()
-    answer = client.post(HOME + "change", json={"kind": "strike", "hz": 101.8})
+    answer = client.post(HOME + "change", json={"kind": "reject", "hz": 101.8})
     assert (answer.status_code, bench.text()) == (400, text)
     assert answer.json()["error"].startswith("say why")
 
@@ -82,7 +82,7 @@ def test_shapes_of_a_mode_and_at_a_frequency(client):
         assert client.get(HOME + "shape", params=wrong).status_code == 400, wrong
 
 
-def test_frfs_of_a_stretch_come_with_all_their_lines(client, bench):
+def test_frfs_of_a_frequency_range_come_with_all_their_lines(client, bench):
     frfs = bench.contents().frfs
     inside = (frfs.frequency_hz >= 99.9) & (frfs.frequency_hz <= 104.1)
     answer = client.get(HOME + "zoom", params={"low": "100", "high": "104", "frfs": "1"}).json()
@@ -92,8 +92,8 @@ def test_frfs_of_a_stretch_come_with_all_their_lines(client, bench):
         answer["traces"]
     )
     for wrong in ({"frfs": "2"}, {"frfs": "-1"}, {"frfs": ""}, {"frfs": "x"}, {"frfs": "0", "low": "nan"}, {}):
-        asked = {"low": "100", "high": "104", **wrong} if wrong else {}
-        assert client.get(HOME + "zoom", params=asked).status_code == 400, wrong
+        query = {"low": "100", "high": "104", **wrong} if wrong else {}
+        assert client.get(HOME + "zoom", params=query).status_code == 400, wrong
     assert client.get(HOME + "zoom", params={"low": "1e6", "high": "2e6", "frfs": "0"}).status_code == 400
 
 
@@ -192,7 +192,7 @@ def test_a_run_without_its_pipeline_file_is_shown_without_forms(client, bench):
 
 
 def test_what_the_page_shows_of_the_file_is_escaped(client):
-    wish = {"kind": "strike", "hz": 101.8, "why": "<img src=x onerror=alert(1)>"}
+    wish = {"kind": "reject", "hz": 101.8, "why": "<img src=x onerror=alert(1)>"}
     assert client.post(HOME + "change", json=wish).status_code == 200
     page = client.get(HOME).text
     assert "<img" not in page

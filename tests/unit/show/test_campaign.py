@@ -9,7 +9,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.run import run_pipeline
 from frf_ipz.show.app import build_app
-from frf_ipz.show.campaign import find_places
+from frf_ipz.show.campaign import find_runs
 from frf_ipz.show.workbench import Workbench
 from synthetic_campaign import hammer_campaign
 
@@ -19,7 +19,7 @@ SOON_S = 120.0  # a whole run takes seconds
 
 
 def client_of(folder, run=None):
-    benches = [Workbench(place, run, read_inputs) for place in find_places(folder)]
+    benches = [Workbench(place, run, read_inputs) for place in find_runs(folder)]
     app = build_app(benches, port=PORT, token=TOKEN)
     return TestClient(app, base_url=f"http://127.0.0.1:{PORT}", raise_server_exceptions=True), benches
 
@@ -46,21 +46,21 @@ def campaign(tmp_path):
 def test_a_run_is_itself_and_nothing_inside_it_is_looked_at(tmp_path):
     pretend_run(tmp_path / "out", "/elsewhere/pipeline.toml")
     pretend_run(tmp_path / "out" / "stages" / "old", "/elsewhere/pipeline.toml")
-    (place,) = find_places(tmp_path / "out")
+    (place,) = find_runs(tmp_path / "out")
     assert (place.folder, str(place.pipeline)) == (tmp_path.resolve() / "out", "/elsewhere/pipeline.toml")
 
 
 def test_a_pipeline_without_a_run_has_its_results_beside_it(campaign):
-    (place,) = find_places(campaign)
+    (place,) = find_runs(campaign)
     assert (place.pipeline, place.folder) == (campaign / "pipeline.toml", campaign / "results" / "pipeline")
 
 
 def test_a_pipeline_is_known_by_its_section_and_its_runs_by_their_manifest(campaign):
-    other = write_pipeline(campaign, "other")
-    pretend_run(campaign / "results" / "a", other)
-    pretend_run(campaign / "results" / "b", other)
-    pretend_run(campaign / ".hidden" / "c", other)
-    places = find_places(campaign)
+    second = write_pipeline(campaign, "other")
+    pretend_run(campaign / "results" / "a", second)
+    pretend_run(campaign / "results" / "b", second)
+    pretend_run(campaign / ".hidden" / "c", second)
+    places = find_runs(campaign)
     assert [(place.pipeline.name, place.folder.name) for place in places] == [
         ("other.toml", "a"),
         ("other.toml", "b"),
@@ -72,13 +72,13 @@ def test_a_folder_of_campaigns_lists_them_all(tmp_path):
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         write_pipeline(tmp_path / name)
-    assert [place.pipeline.parent.name for place in find_places(tmp_path)] == ["one", "two"]
+    assert [place.pipeline.parent.name for place in find_runs(tmp_path)] == ["one", "two"]
 
 
 def test_a_folder_with_neither_is_refused(tmp_path):
     hammer_campaign(tmp_path)
     with pytest.raises(InputError, match="frf-ipz init"):
-        find_places(tmp_path)
+        find_runs(tmp_path)
 
 
 def test_the_first_run_can_be_started_from_the_page(campaign):
@@ -94,7 +94,7 @@ def test_the_first_run_can_be_started_from_the_page(campaign):
     for part in ('id="stabilisation"', ">Run again</button>", "run/report.html"):
         assert part in page
     assert client.get(HOME + "run/report.html").status_code == 200
-    assert find_places(campaign)[0].folder == campaign / "results" / "pipeline"
+    assert find_runs(campaign)[0].folder == campaign / "results" / "pipeline"
 
 
 def test_a_pipeline_that_is_wrong_is_said_and_shown(campaign):

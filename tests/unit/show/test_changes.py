@@ -7,7 +7,7 @@ import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.identification.options import PinnedPole
-from frf_ipz.show.changes.registry import to_change
+from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 
 PATH = Path("pipeline.toml")
@@ -37,21 +37,21 @@ def fit_of(text):
     return parse(text, PATH).fit
 
 
-def test_a_strike_is_added_and_every_other_line_stays():
-    text = after({"kind": "strike", "hz": 143.21987654, "why": "mains "})
-    assert [(one.hz, one.why) for one in fit_of(text).strike] == [(143.22, "mains")]
+def test_a_rejection_is_added_and_every_other_line_stays():
+    text = after({"kind": "reject", "hz": 143.21987654, "why": "mains "})
+    assert [(pole.hz, pole.why) for pole in fit_of(text).strike] == [(143.22, "mains")]
     assert [line for line in text.splitlines() if "strike" not in line] == TEXT.splitlines()
 
 
-def test_a_strike_needs_a_reason():
+def test_a_rejection_needs_a_reason():
     with pytest.raises(InputError, match="say why"):
-        after({"kind": "strike", "hz": 143.2, "why": "  "})
+        after({"kind": "reject", "hz": 143.2, "why": "  "})
 
 
-def test_a_strike_takes_the_pin_beside_it_away_and_a_pin_the_strike():
-    struck = after({"kind": "strike", "hz": 100.5, "why": "no mode"})
-    assert fit_of(struck).pin_hz == ()
-    pinned = fit_of(after({"kind": "pin", "hz": 101.0}, text=struck))
+def test_a_rejection_removes_the_pin_beside_it_and_a_pin_the_rejection():
+    rejected = after({"kind": "reject", "hz": 100.5, "why": "no mode"})
+    assert fit_of(rejected).pin_hz == ()
+    pinned = fit_of(after({"kind": "pin", "hz": 101.0}, text=rejected))
     assert (pinned.pin_hz, pinned.strike) == ((101.0,), ())
 
 
@@ -71,7 +71,7 @@ def test_a_pin_keeps_its_reason_and_needs_none():
 
 
 @pytest.mark.parametrize(
-    "wish", [{"kind": "pin", "hz": 250.0, "on": False}, {"kind": "strike", "hz": 251.0, "why": "no"}]
+    "wish", [{"kind": "pin", "hz": 250.0, "on": False}, {"kind": "reject", "hz": 251.0, "why": "no"}]
 )
 def test_a_pin_with_a_reason_is_taken_away_as_any_other(wish):
     assert fit_of(after({"kind": "pin", "hz": 250.0, "why": "seen"}, wish)).pin_hz == (100.0,)
@@ -85,49 +85,49 @@ def test_pins_written_as_tables_are_kept_as_tables():
 
 
 @pytest.mark.parametrize(
-    ("pin", "said"),
+    ("pin", "message"),
     [
         ('{ hz = 1.0, wy = "x" }', r"'fit\.pin_hz\.\[1\]\.wy'.*unknown key 'wy'; did you mean 'why'"),
         ('"high"', r"'fit\.pin_hz\.\[1\]'.*number"),
     ],
 )
-def test_a_pin_that_is_none_is_named(pin, said):
-    with pytest.raises(InputError, match=said):
+def test_a_pin_that_is_none_is_named(pin, message):
+    with pytest.raises(InputError, match=message):
         parse(f'[pipeline]\ntest = "t.toml"\n[fit]\npin_hz = [{pin}]\n', PATH)
 
 
 def test_taking_back_takes_only_that_entry():
-    strikes = [{"kind": "strike", "hz": hz, "why": "x"} for hz in (50.0, 50.4)]
-    text = after(*strikes, {"kind": "strike", "hz": 50.4, "on": False})
-    assert [one.hz for one in fit_of(text).strike] == [50.0]
+    wishes = [{"kind": "reject", "hz": hz, "why": "x"} for hz in (50.0, 50.4)]
+    text = after(*wishes, {"kind": "reject", "hz": 50.4, "on": False})
+    assert [pole.hz for pole in fit_of(text).strike] == [50.0]
 
 
 def test_taking_all_back_gives_the_text_that_was_there():
-    wish = {"kind": "strike", "hz": 143.2, "why": "mains"}
+    wish = {"kind": "reject", "hz": 143.2, "why": "mains"}
     assert after(wish, {**wish, "on": False}) == TEXT
 
 
-def test_strikes_written_as_tables_are_kept_as_tables():
+def test_rejections_written_as_tables_are_kept_as_tables():
     text = TEXT.replace("[predict]", '[[fit.strike]]\nhz = 60.0 # hum\nwhy = "mains"\n\n[predict]')
-    changed = after({"kind": "strike", "hz": 143.2, "why": "a cable"}, text=text)
-    assert [one.hz for one in fit_of(changed).strike] == [60.0, 143.2]
+    changed = after({"kind": "reject", "hz": 143.2, "why": "a cable"}, text=text)
+    assert [pole.hz for pole in fit_of(changed).strike] == [60.0, 143.2]
     assert changed.count("[[fit.strike]]") == 2
     assert "# hum" in changed
-    left = after(*({"kind": "strike", "hz": hz, "on": False} for hz in (60.0, 143.2)), text=changed)
-    assert fit_of(left).strike == ()
+    emptied = after(*({"kind": "reject", "hz": hz, "on": False} for hz in (60.0, 143.2)), text=changed)
+    assert fit_of(emptied).strike == ()
 
 
-def test_stretches_and_the_band():
-    text = after({"kind": "leave", "low_hz": 49.5, "high_hz": 50.5}, {"kind": "band", "low_hz": 0, "high_hz": 300})
+def test_ranges_and_the_band():
+    text = after({"kind": "exclude", "low_hz": 49.5, "high_hz": 50.5}, {"kind": "band", "low_hz": 0, "high_hz": 300})
     assert fit_of(text).exclude_hz == ((49.5, 50.5),)
     assert fit_of(text).band_hz == (0.0, 300.0)
     text = after(
-        {"kind": "leave", "low_hz": 49.5, "high_hz": 50.5, "on": False}, {"kind": "band", "on": False}, text=text
+        {"kind": "exclude", "low_hz": 49.5, "high_hz": 50.5, "on": False}, {"kind": "band", "on": False}, text=text
     )
     assert (fit_of(text).exclude_hz, fit_of(text).band_hz) == ((), None)
 
 
-def test_blows_are_kept_dropped_and_left_to_the_checks():
+def test_records_are_kept_dropped_and_left_to_the_checks():
     drop = {"kind": "record", "name": "hits/p18_03.csv", "use": "drop"}
     text = after(drop)
     assert parse(text, PATH).ingest.drop == ("hits/p18_03.csv",)
@@ -165,7 +165,7 @@ def test_a_section_that_is_missing_is_made():
 
 def test_text_of_others_cannot_break_out_of_its_string():
     why = 'x"\n[pipeline]\ntest = "/etc/passwd" \u0000 # \\'
-    text = after({"kind": "strike", "hz": 5.0, "why": why})
+    text = after({"kind": "reject", "hz": 5.0, "why": why})
     assert tomllib.loads(text)["pipeline"] == {"test": "test.toml"}
     assert tomllib.loads(text)["fit"]["strike"][0]["why"] == " ".join(why.split())
 
@@ -173,14 +173,14 @@ def test_text_of_others_cannot_break_out_of_its_string():
 @pytest.mark.parametrize(
     ("wish", "message"),
     [
-        ({"kind": "strik", "hz": 1.0}, "did you mean 'strike'"),
-        ("strike", "there is no change"),
+        ({"kind": "rejec", "hz": 1.0}, "did you mean 'reject'"),
+        ("reject", "there is no change"),
         ({"kind": "pin", "hz": 1.0, "command": "rm"}, "unknown key 'command'"),
         ({"kind": "pin"}, "'hz' is missing"),
         ({"kind": "pin", "hz": "high"}, "number"),
         ({"kind": "pin", "hz": float("nan")}, "is no frequency"),
         ({"kind": "pin", "hz": -3.0}, "is no frequency"),
-        ({"kind": "leave", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
+        ({"kind": "exclude", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
         ({"kind": "record", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
         ({"kind": "point", "dof": "tip"}, "is no DOF label"),
         ({"kind": "sensor", "dof": "tip"}, "is no DOF label"),
@@ -200,4 +200,4 @@ def test_a_file_keeps_its_line_ends_and_its_mode(tmp_path):
     write_text(path, after({"kind": "pin", "hz": 250.0}))
     assert path.read_bytes().count(b"\r\n") == path.read_bytes().count(b"\n") > 1
     assert path.stat().st_mode & 0o777 == 0o640
-    assert [left.name for left in tmp_path.iterdir()] == ["pipeline.toml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["pipeline.toml"]

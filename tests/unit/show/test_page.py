@@ -11,8 +11,8 @@ from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.section import pictures_of, render_section
 from frf_ipz.show.controls import choices_panel
+from frf_ipz.show.marks import with_choices, with_retained
 from frf_ipz.show.page import page_sections
-from frf_ipz.show.pictures.marks import with_choices, with_retained
 from synthetic_run import synthetic_folder
 
 OF_MODEL = ("model", "reduce", "pair", "update", "predict", "export", "reference")
@@ -45,7 +45,7 @@ def test_all_that_is_chosen_is_listed_with_a_button_each():
         "5 to 500 Hz",
         "pinned at 20 Hz ",
         "pinned at 33 Hz: seen by eye",
-        "at 50 Hz struck: mains",
+        "at 50 Hz rejected: mains",
         "49 to 51 Hz left out",
         "p_02",
         "p_04",
@@ -59,15 +59,15 @@ def test_all_that_is_chosen_is_listed_with_a_button_each():
 
 def test_forms_stand_beside_the_pictures(run):
     html = html_of(run)
-    for part in ("pole-form", "band-form", "point-form", "reduce-form", "shape-form", "blow-choices", "modes"):
+    for part in ("pole-form", "band-form", "point-form", "reduce-form", "shape-form", "record-choices", "modes"):
         assert html.count(f'id="{part}"') == 1
     assert html.count("data-fill=") == run.fit.n_modes
 
 
-def test_the_list_of_blows_shows_what_was_chosen_and_what_is_used(run):
+def test_the_list_of_records_shows_what_was_chosen_and_what_is_used(run):
     html = html_of(run)
     for name, use in (("p_02", "keep"), ("p_04", "drop"), ("p_01", "checks")):
-        row = html.split(f'data-blow="hits/{name}.csv"')[1].split("</tr>")[0]
+        row = html.split(f'data-record="hits/{name}.csv"')[1].split("</tr>")[0]
         assert f'value="{use}" selected' in row
         assert row.count("selected") == 1
 
@@ -79,31 +79,31 @@ def test_the_list_of_blows_shows_what_was_chosen_and_what_is_used(run):
         (("fit", *OF_MODEL), {"reduce-form", "pole-form", "modes"}),
         (
             ("ingest", "fit", *OF_MODEL),
-            {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "blow-choices"},
+            {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "record-choices"},
         ),
     ],
     ids=["no model", "no fit", "nothing"],
 )
 def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
     html = html_of(read_contents(synthetic_folder(without=without)))
-    forms = {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "blow-choices"}
+    forms = {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "record-choices"}
     assert {form for form in forms if f'id="{form}"' not in html} == missing
 
 
 def test_choices_and_handles_are_drawn_into_the_diagram(run):
-    diagram = next(one for one in pictures_of(page_sections(run, None)) if one.name == "stabilisation")
+    diagram = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "stabilisation")
     marked = with_choices(diagram, run.fit, CHOICES.fit)
     names = {trace["name"]: trace for trace in marked.traces}
     assert sorted(set(names["pinned"]["x"][np.isfinite(names["pinned"]["x"])])) == [20.0, 33.0]
     assert names["pinned"]["text"][::3] == ["pinned", "pinned: seen by eye"]
-    assert names["struck"]["text"][0] == "struck: mains"
+    assert names["rejected"]["text"][0] == "rejected: mains"
     assert [(shape["x0"], shape["x1"]) for shape in marked.layout["shapes"]] == [(49.0, 51.0)]
     handles = names["handles of the modes"]
     assert list(handles["x"]) == list(run.fit.model.natural_frequency_hz[: run.fit.n_modes])
     low, high = marked.layout["yaxis"]["range"]
     assert all(low < place < diagram.layout["yaxis"]["range"][0] for place in handles["y"])
     assert high == diagram.layout["yaxis"]["range"][1]
-    assert "2 pinned, 1 struck, 1 stretch left out" in marked.note
+    assert "2 pinned, 1 rejected, 1 range left out" in marked.note
 
 
 def test_without_a_pipeline_file_there_is_the_report_alone(run):
@@ -113,12 +113,12 @@ def test_without_a_pipeline_file_there_is_the_report_alone(run):
 
 
 def test_nodes_that_the_model_is_reduced_to_are_ringed(run):
-    drawing = next(one for one in pictures_of(page_sections(run, None)) if one.name == "structure")
+    drawing = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "structure")
     ringed = with_retained(drawing, run.geometry, run.reduced.dofs)
     rings = ringed.traces[-1]
     nodes = next(trace for trace in drawing.traces if trace["name"] == "nodes")
     for dof, x in zip(run.reduced.dofs, rings["x"], strict=True):
         assert x == nodes["x"][nodes["text"].index(f"node {dof.node}")]
     assert list(rings["text"]) == [dof.name for dof in run.reduced.dofs]
-    names = [trace["name"] for trace in next(one for one in pictures_of(page_sections(run, CHOICES))).traces]
-    assert "kept in the reduction" in names
+    names = [trace["name"] for trace in next(picture for picture in pictures_of(page_sections(run, CHOICES))).traces]
+    assert "retained in the reduction" in names

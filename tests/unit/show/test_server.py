@@ -1,4 +1,4 @@
-"""The command itself: it listens on the loopback only, says where, and ends when told."""
+"""The command itself: it listens on the loopback only, says where, and ends when asked."""
 
 import http.client
 import signal
@@ -44,9 +44,9 @@ def test_the_command_serves_the_page_on_the_loopback_and_stops(served, demo):
     (demo / "secret.txt").write_text("secret", encoding="utf-8")
     for path in ("run/../../secret.txt", "run/..%2f..%2fsecret.txt", "../secret.txt", "run//etc/passwd"):
         assert get(address, address.path + path)[0] in {403, 404}, path
-    with socket.socket() as other, pytest.raises(OSError, match=r"refused|unreachable|timed out"):
-        other.settimeout(5)
-        other.connect((_address_of_this_machine(), address.port))
+    with socket.socket() as outsider, pytest.raises(OSError, match=r"refused|unreachable|timed out"):
+        outsider.settimeout(5)
+        outsider.connect((_address_of_this_machine(), address.port))
     process.send_signal(signal.SIGINT)
     assert process.wait(SOON_S) in {0, 130}
     assert "Traceback" not in process.stderr.read()

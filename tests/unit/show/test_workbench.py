@@ -9,34 +9,34 @@ import pytest
 from frf_ipz.errors import InputError
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.run import run_pipeline
-from frf_ipz.show.campaign import Place
+from frf_ipz.show.campaign import RunPaths
 from frf_ipz.show.workbench import Workbench
 
 SOON_S = 120.0  # a whole run takes seconds
-STRIKE = {"kind": "strike", "hz": 101.83, "why": "to see it go"}
+REJECT = {"kind": "reject", "hz": 101.83, "why": "to see it go"}
 
 
 def place_of(demo):
-    return Place(folder=demo / "out", pipeline=demo / "pipeline.toml")
+    return RunPaths(folder=demo / "out", pipeline=demo / "pipeline.toml")
 
 
 def frequencies(folder):
     return pq.read_table(folder / "poles.parquet")["frequency_hz"].to_pylist()
 
 
-def test_a_struck_pole_is_gone_and_the_command_line_repeats_it(demo, tmp_path):
+def test_a_rejected_pole_is_gone_and_the_command_line_repeats_it(demo, tmp_path):
     out, pipeline = demo / "out", demo / "pipeline.toml"
     before, text = frequencies(out), pipeline.read_text(encoding="utf-8")
     bench = Workbench(place_of(demo), run_pipeline, read_inputs)
-    bench.change(STRIKE)
+    bench.change(REJECT)
     bench.wait(SOON_S)
     assert bench.status.error == ""
-    struck = frequencies(out)
+    remaining = frequencies(out)
     assert any(abs(hz / 101.83 - 1) < 0.02 for hz in before)
-    assert not any(abs(hz / 101.83 - 1) < 0.02 for hz in struck)
+    assert not any(abs(hz / 101.83 - 1) < 0.02 for hz in remaining)
     assert text.splitlines()[0] in pipeline.read_text(encoding="utf-8")
-    again = run_pipeline(pipeline, tmp_path / "again")
-    assert frequencies(again.path) == struck
+    repeated = run_pipeline(pipeline, tmp_path / "again")
+    assert frequencies(repeated.path) == remaining
 
 
 def test_only_what_depends_on_a_change_is_computed_anew(demo):
@@ -73,7 +73,7 @@ def test_a_refused_change_leaves_what_another_program_wrote_meanwhile(demo):
         raise InputError("no")
 
     bench = Workbench(place_of(demo), refuse, read_inputs)
-    bench.change(STRIKE)
+    bench.change(REJECT)
     bench.wait(SOON_S)
     assert pipeline.read_text(encoding="utf-8") == "# mine\n"
 
@@ -90,7 +90,7 @@ def test_a_change_during_a_run_is_refused_without_the_one_before_it(demo):
             raise InputError("no")
 
     bench = Workbench(place_of(demo), run, read_inputs)
-    bench.change(STRIKE)
+    bench.change(REJECT)
     assert begun.wait(SOON_S)
     bench.change({"kind": "pin", "hz": 300.0})
     go_on.set()
@@ -103,7 +103,7 @@ def test_nothing_is_written_for_a_change_that_makes_no_sense(demo):
     text = (demo / "pipeline.toml").read_bytes()
     bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     with pytest.raises(InputError, match="say why"):
-        bench.change({"kind": "strike", "hz": 101.8})
+        bench.change({"kind": "reject", "hz": 101.8})
     assert (demo / "pipeline.toml").read_bytes() == text
     assert not bench.status.running
 
@@ -113,4 +113,4 @@ def test_without_its_pipeline_file_a_run_can_be_read_only(demo):
     bench = Workbench(place_of(demo), run_pipeline, read_inputs)
     assert bench.contents().fit is not None
     with pytest.raises(InputError, match="is gone"):
-        bench.change(STRIKE)
+        bench.change(REJECT)

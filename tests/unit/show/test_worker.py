@@ -11,16 +11,16 @@ SOON_S = 20.0  # far beyond what any of this takes, so that a fault ends the tes
 
 
 def test_progress_can_be_read_while_it_works():
-    told, go_on = Event(), Event()
+    started, go_on = Event(), Event()
 
     def work(progress):
         progress(0.4, "fitting")
-        told.set()
+        started.set()
         assert go_on.wait(SOON_S)
 
     worker = Worker(work)
     worker.start()
-    assert told.wait(SOON_S)
+    assert started.wait(SOON_S)
     assert (worker.status.running, worker.status.fraction, worker.status.text) == (True, 0.4, "fitting")
     go_on.set()
     worker.wait(SOON_S)
@@ -49,13 +49,13 @@ def test_a_newer_wish_stops_the_work_and_begins_anew():
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "message"),
     [
         (InputError("the file is wrong"), "the file is wrong"),
         (KeyError("x"), "a fault of the program: KeyError: 'x'"),
     ],
 )
-def test_a_failure_is_said_and_the_next_wish_is_worked_on(fault, said):
+def test_a_failure_is_said_and_the_next_wish_is_worked_on(fault, message):
     faults = [fault, None]
 
     def work(progress):
@@ -66,7 +66,7 @@ def test_a_failure_is_said_and_the_next_wish_is_worked_on(fault, said):
     worker = Worker(work)
     worker.start()
     worker.wait(SOON_S)
-    assert worker.status.error == said
+    assert worker.status.error == message
     worker.start()
     worker.wait(SOON_S)
     assert worker.status.error == ""

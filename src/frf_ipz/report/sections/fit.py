@@ -19,8 +19,7 @@ from frf_ipz.report.picture import (
     markers,
     panels,
 )
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, number
 
@@ -90,17 +89,17 @@ def _frf(fit: ModalFit, used: FrfSet, fitted: ComplexArray, place: int, bins: in
     tiny = np.finfo(float).tiny
     label, colour = used.labels[place], colour_of(place)
     measured, curve = np.abs(used.values[:, place]), np.maximum(np.abs(fitted[:, place]), tiny)
-    kept = thin(used.frequency_hz, [np.log10(np.maximum(measured, tiny)), np.log10(curve)], bins // 2)
-    x, std = used.frequency_hz[kept], fit.value_std[kept, place] / np.sqrt(2)
+    lines = thin(used.frequency_hz, [np.log10(np.maximum(measured, tiny)), np.log10(curve)], bins // 2)
+    x, std = used.frequency_hz[lines], fit.value_std[lines, place] / np.sqrt(2)
     group: Trace = {"meta": {"frf": place}, "legendgroup": str(label)}
     hover = f"%{{x:.6g}} Hz: %{{y:.4g}} {label.unit}"
-    quiet: Trace = {**group, "showlegend": False}
+    unlisted: Trace = {**group, "showlegend": False}
     traces: list[Trace] = []
     if _has_band(fit):
-        traces += band(x, confidence_band(curve[kept], std), f"{label} 95 %", f"{colour}/0.3", **quiet)
+        traces += band(x, confidence_band(curve[lines], std), f"{label} 95 %", f"{colour}/0.3", **unlisted)
     points: Trace = {"size": 3.5, "opacity": 0.55, "hover": hover}
-    traces.append(markers(x, measured[kept], f"{label} measured", colour, **points, **quiet))
-    traces.append(line(x, curve[kept], f"{label} fitted", colour, hover=hover, dash=dash_of(place), **group))
+    traces.append(markers(x, measured[lines], f"{label} measured", colour, **points, **unlisted))
+    traces.append(line(x, curve[lines], f"{label} fitted", colour, hover=hover, dash=dash_of(place), **group))
     return traces + _misfit(used, np.abs(fitted[:, place] - used.values[:, place]), place, bins)
 
 
@@ -112,11 +111,11 @@ def _misfit(used: FrfSet, misfit: np.ndarray, place: int, bins: int) -> list[Tra
     tiny = np.finfo(float).tiny
     label, colour = used.labels[place], colour_of(place)
     style = {"meta": {"frf": place}, "legendgroup": str(label), "showlegend": False, "yaxis": "y2", "width": 1.1}
-    kept = thin(used.frequency_hz, [np.log10(np.maximum(misfit, tiny))], bins // 2)
+    lines = thin(used.frequency_hz, [np.log10(np.maximum(misfit, tiny))], bins // 2)
     hover = f"%{{x:.6g}} Hz: %{{y:.3g}} {label.unit}"
-    x = used.frequency_hz[kept]
-    traces = [line(x, np.maximum(misfit[kept], tiny), f"{label} misfit", colour, hover=hover, **style)]
-    noise = np.sqrt(used.variance[kept, place])
+    x = used.frequency_hz[lines]
+    traces = [line(x, np.maximum(misfit[lines], tiny), f"{label} misfit", colour, hover=hover, **style)]
+    noise = np.sqrt(used.variance[lines, place])
     if np.isfinite(noise).any():
         traces.append(line(x, noise, f"{label} noise", f"{colour}/0.7", hover=hover, dash="dot", **style))
     return traces
@@ -132,5 +131,5 @@ def _table(misfit: pd.DataFrame) -> Table:
         for row in misfit.to_dict("records")
     ]
     large = frozenset(np.flatnonzero(misfit["ratio"].to_numpy(float) > LARGE).tolist())
-    columns = ("FRF (sensor / blow)", "band, Hz", "misfit, SI", "noise, SI", "misfit over noise")
+    columns = ("FRF (output / input)", "band, Hz", "misfit, SI", "noise, SI", "misfit over noise")
     return Table(caption="Misfit against noise", columns=columns, rows=rows, marked=large, file="fit.parquet")

@@ -16,11 +16,10 @@ from frf_ipz.report.picture import (
     dash_of,
     frequency_axis,
     line,
-    outline,
     panels,
+    shaded_span,
 )
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, number
 
@@ -74,7 +73,7 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
     ]
     axes += [Axis(title="Coherence", share=0.8, options={"range": [-0.02, 1.05]})] if has_coherence else []
     low, high = float(frfs.frequency_hz[0]), float(frfs.frequency_hz[-1])
-    shapes = [] if run.fit is None else [outline(run.fit.band_hz, 0, 1, "@updated/0.06")]
+    shapes = [] if run.fit is None else [shaded_span(run.fit.band_hz, 0, 1, "@updated/0.06")]
     return Picture(
         name="frf",
         title="Measured FRFs: magnitude"
@@ -84,7 +83,7 @@ def _picture(run: RunContents, frfs: FrfSet) -> Picture:
         f"{number(high)} Hz on logarithmic magnitude axes.",
         traces=tuple(traces),
         layout=panels(frequency_axis(*run.band_hz), *axes, shapes=shapes),
-        note=("The band is ±1.96 standard deviations from the scatter between blows. " if has_band else NO_VARIANCE)
+        note=("The band is ±1.96 standard deviations from the scatter between records. " if has_band else NO_VARIANCE)
         + ("Shaded: the band that is fitted. " if shapes else "")
         + "All pictures over frequency zoom together; 'FRFs' at the top chooses what they show.",
         table=_table(frfs),
@@ -102,23 +101,23 @@ def _shown(frfs: FrfSet, band_hz: tuple[float, float]) -> dict[str, list[float]]
 
 def _frf(frfs: FrfSet, place: int, bins: int, *, has_coherence: bool) -> list[Trace]:
     magnitude = np.maximum(np.abs(frfs.values[:, place]), np.finfo(float).tiny)
-    kept = thin(frfs.frequency_hz, [np.log10(magnitude)], bins)
-    x, label = frfs.frequency_hz[kept], frfs.labels[place]
+    lines = thin(frfs.frequency_hz, [np.log10(magnitude)], bins)
+    x, label = frfs.frequency_hz[lines], frfs.labels[place]
     style = {"meta": {"frf": place}, "legendgroup": str(label), "dash": dash_of(place)}
     colour = colour_of(place)
-    std = np.sqrt(frfs.variance[kept, place] / 2)
+    std = np.sqrt(frfs.variance[lines, place] / 2)
     traces: list[Trace] = []
     if np.isfinite(std).any():
         shade = {"meta": {"frf": place}, "legendgroup": str(label), "showlegend": False}
-        traces += band(x, confidence_band(magnitude[kept], std), f"{label} 95 %", f"{colour}/0.25", **shade)
+        traces += band(x, confidence_band(magnitude[lines], std), f"{label} 95 %", f"{colour}/0.25", **shade)
     hover = f"%{{x:.6g}} Hz: %{{y:.4g}} {label.unit}"
-    traces.append(line(x, magnitude[kept], str(label), colour, hover=hover, **style))
-    phase = phase_degrees(frfs.values[kept, place])
+    traces.append(line(x, magnitude[lines], str(label), colour, hover=hover, **style))
+    phase = phase_degrees(frfs.values[lines, place])
     below = {**style, "showlegend": False, "width": 1.1}
     traces.append(line(x, phase, str(label), colour, hover="%{x:.6g} Hz: %{y:.1f}°", yaxis="y2", **below))
     if has_coherence:
-        lines = thin(frfs.frequency_hz, [frfs.coherence[:, place]], bins)
-        points = frfs.frequency_hz[lines], frfs.coherence[lines, place]
+        sampled = thin(frfs.frequency_hz, [frfs.coherence[:, place]], bins)
+        points = frfs.frequency_hz[sampled], frfs.coherence[sampled, place]
         traces.append(line(*points, str(label), colour, hover="%{x:.6g} Hz: %{y:.5f}", yaxis="y3", **below))
     return traces
 
@@ -143,5 +142,5 @@ def _table(frfs: FrfSet) -> Table:
                 f"{number(100 * float(noise), 2)} %",
             ]
         )
-    columns = ("sensor", "blow", "quantity", "unit", "averages", "median coherence", "noise, of the RMS value")
+    columns = ("output", "input", "quantity", "unit", "averages", "median coherence", "noise, of the RMS value")
     return Table(caption="Measured FRFs", columns=columns, rows=rows, file="frf.parquet")

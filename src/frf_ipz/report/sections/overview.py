@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.prediction.agreement import compare_frfs
-from frf_ipz.report.findings import marked_nodes, mismatch_nodes, said_in_short, verdict_of
+from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, verdict_of
 from frf_ipz.report.reference import measured_at
 from frf_ipz.report.section import Markup, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
@@ -49,20 +49,22 @@ def build(run: RunContents) -> Section:
         The section.
     """
     cards = _cards(run)
-    shown = "".join(
+    items = "".join(
         f'<div class="card"><dt>{escape(card.title)}</dt><dd>{escape(card.figure)}</dd>'
         f"<dd>{escape(card.meaning)}</dd></div>"
         for card in cards
     )
-    first, more = verdict(run)
-    said = f'<p class="verdict">{escape(first)}</p>' + (f'<p class="lead">{escape(more)}</p>' if more else "")
-    head = Markup(html=f'{said}<dl class="cards">{shown}</dl>')
+    sentence, addition = verdict(run)
+    text = f'<p class="verdict">{escape(sentence)}</p>' + (
+        f'<p class="lead">{escape(addition)}</p>' if addition else ""
+    )
+    head = Markup(html=f'{text}<dl class="cards">{items}</dl>')
     frfs = run.frfs
     marks = Marks(
         sensors=() if frfs is None else frfs.output_dofs,
-        records=() if frfs is None else frfs.input_dofs,
+        inputs=() if frfs is None else frfs.input_dofs,
         points=run.points,
-        missing=marked_nodes(run.diagnosis, frfs),
+        missing=finding_nodes(run.diagnosis, frfs),
         mismatch=mismatch_nodes(run.diagnosis, frfs),
         across="Masses in a row" if run.is_lumped else "Position, m",
     )
@@ -102,8 +104,8 @@ def verdict(run: RunContents) -> tuple[str, str]:
         parts.append(f"{modes} found between {number(low)} and {number(high)} Hz in {frfs}.")
     elif run.frfs is not None:
         parts.append(f"{counted(run.frfs.n_frfs, 'FRF')} estimated; nothing fitted yet.")
-    first, *others = parts or ["This run holds no results yet."]
-    return first, " ".join(filter(None, others))
+    sentence, *additions = parts or ["This run holds no results yet."]
+    return sentence, " ".join(filter(None, additions))
 
 
 def _of_update(run: RunContents) -> str:
@@ -208,7 +210,7 @@ def _target_card(run: RunContents) -> Card:
 
 def _missing_card(run: RunContents) -> Card:
     if run.diagnosis is not None:
-        figure, meaning = said_in_short(run.diagnosis)
+        figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
     rows = () if run.pairs is None else run.pairs.rows
     counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}

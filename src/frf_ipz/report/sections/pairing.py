@@ -10,8 +10,7 @@ from frf_ipz.pairing.pairs import Pair, Verdict
 from frf_ipz.plotting.targets import root_name
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.picture import Axis, Picture, Trace, frequency_axis, line, markers, panels
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.wording import number, percent
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.plotting.ellipses import error_ellipses, root_covariances, root_deviations, shown_zeros
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, frequency_axis, line, markers, panels
-from frf_ipz.report.section import Block, Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Block, Section, Table
 from frf_ipz.report.wording import counted, number, with_error
 
 if TYPE_CHECKING:
@@ -38,7 +37,6 @@ def build(run: RunContents) -> Section | None:
     if fit is None:
         return None
     known = int(np.count_nonzero(fit.zeros.identifiable))
-    len(fit.zeros.values) - known
     lead = (
         f"{counted(fit.n_modes, 'pole')} shared by all FRFs, and {counted(known, 'zero')} of single FRFs with a number"
         + (
@@ -47,7 +45,7 @@ def build(run: RunContents) -> Section | None:
             else "."
         )
     )
-    where = {"recordings": "the scatter between blows", "misfit": "the misfit of the fit"}.get(
+    where = {"recordings": "the scatter between records", "misfit": "the misfit of the fit"}.get(
         fit.noise_from, fit.noise_from
     )
     blocks: list[Block] = [_picture(fit, where), _mode_table(fit)]
@@ -96,10 +94,10 @@ def _zeros_of(fit: ModalFit, frf: int, label: str, hover: str) -> list[Trace]:
         return []
     kinds = [f"zero of {label} ({fit.zeros.kind[place]})" for place in np.flatnonzero(here)]
     colour = colour_of(frf)
-    more: Trace = {"meta": {"frf": frf}}
-    style: Trace = {"symbol": "circle-open", "size": 9, "text": kinds, "hover": hover, **more}
+    meta: Trace = {"meta": {"frf": frf}}
+    style: Trace = {"symbol": "circle-open", "size": 9, "text": kinds, "hover": hover, **meta}
     dots = markers(natural_frequency_hz(values), 100 * damping_ratio(values), f"zeros {label}", colour, **style)
-    return [*_ellipses(values, root_covariances(fit)[fit.n_modes :][here], f"zeros {label}", colour, **more), dots]
+    return [*_ellipses(values, root_covariances(fit)[fit.n_modes :][here], f"zeros {label}", colour, **meta), dots]
 
 
 def _ellipses(
@@ -107,7 +105,7 @@ def _ellipses(
     covariance: FloatArray,
     name: str,
     colour: str,
-    **more: Any,  # noqa: ANN401  any property of a trace
+    **options: Any,  # noqa: ANN401  any property of a trace
 ) -> list[Trace]:
     rows = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)))[:MOST_ELLIPSES]
     if not len(rows):
@@ -115,7 +113,7 @@ def _ellipses(
     outlines = error_ellipses(roots[rows], covariance[rows])
     hertz, ratio = (np.pad(part, ((0, 0), (0, 1)), constant_values=np.nan) for part in outlines)
     style: Trace = {"width": 1, "showlegend": False, "fill": "toself", "fillcolor": f"{colour}/0.12"}
-    return [line(hertz.ravel(), 100 * ratio.ravel(), name, colour, **style, **more)]
+    return [line(hertz.ravel(), 100 * ratio.ravel(), name, colour, **style, **options)]
 
 
 def _mode_table(fit: ModalFit) -> Table:
@@ -125,9 +123,9 @@ def _mode_table(fit: ModalFit) -> Table:
     rows = []
     for place, pole in enumerate(poles):
         hertz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
-        more = [_cell(fit.modes[name].iloc[place]) for name in extra]
+        quality = [_cell(fit.modes[name].iloc[place]) for name in extra]
         cells = [with_error(hertz, hertz_std[place], 7), with_error(100 * ratio, 100 * ratio_std[place], 5)]
-        rows.append([str(place + 1), *cells, *more])
+        rows.append([str(place + 1), *cells, *quality])
     columns = (
         "pole",
         "frequency, Hz",
@@ -156,6 +154,6 @@ def _zero_table(fit: ModalFit) -> Table:
                 damping = f"{'left' if root.real < 0 else 'right'} half plane"
             numbers = [with_error(hertz, hertz_std[place], 7), damping]
         rows.append([str(fit.labels[zeros.frf[place]]), zeros.kind[place], *numbers, zeros.reason[place]])
-    columns = ("FRF (sensor / blow)", "kind", "frequency, Hz", "damping ratio, %", "why without a number")
+    columns = ("FRF (output / input)", "kind", "frequency, Hz", "damping ratio, %", "why without a number")
     marked = frozenset(np.flatnonzero(~zeros.identifiable[order]).tolist())
     return Table(caption="Zeros", columns=columns, rows=rows, marked=marked, file="zeros.parquet")

@@ -10,9 +10,8 @@ from frf_ipz.plotting.curves import LEAST, magnitude_title, phase_degrees
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.picture import Axis, Picture, Trace, band, frequency_axis, line, panels
 from frf_ipz.report.reference import measured_at
-from frf_ipz.report.section import Section
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.sections.frfs import PHASE_AXIS
-from frf_ipz.report.table import Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, listed, number
 
@@ -60,9 +59,9 @@ def build(run: RunContents) -> Section | None:
 def _picture(prediction: Prediction, place: int, measured: ComplexArray | None) -> Picture:
     label, frequency = prediction.labels[place], prediction.frequency_hz
     values, nominal = prediction.values[:, place], prediction.nominal[:, place]
-    kept = thin(frequency, [_log(values), _log(nominal)], bins_for(4 * len(prediction.labels)))
-    x = frequency[kept]
-    traces = _band(prediction, place, kept)
+    lines = thin(frequency, [_log(values), _log(nominal)], bins_for(4 * len(prediction.labels)))
+    x = frequency[lines]
+    traces = _band(prediction, place, lines)
     hover = f"%{{x:.6g}} Hz: %{{y:.4g}} {label.unit}"
     if measured is not None:
         traces += _measured(frequency, measured, hover)
@@ -71,9 +70,9 @@ def _picture(prediction: Prediction, place: int, measured: ComplexArray | None) 
         ("updated model", values, {"colour": "@updated", "dash": "solid", "width": 2}),
     )
     for name, curve, style in styles:
-        traces.append(line(x, np.abs(curve[kept]), name, hover=hover, **style))
+        traces.append(line(x, np.abs(curve[lines]), name, hover=hover, **style))
         below = {**style, "showlegend": False, "legendgroup": name, "yaxis": "y2"}
-        traces.append(line(x, phase_degrees(curve[kept]), name, hover="%{x:.6g} Hz: %{y:.1f}°", **below))
+        traces.append(line(x, phase_degrees(curve[lines]), name, hover="%{x:.6g} Hz: %{y:.1f}°", **below))
     axes = Axis(title=magnitude_title([label]), share=2.2, scale="log"), Axis(title="Phase, °", options=PHASE_AXIS)
     return Picture(
         name=f"prediction-{place}",
@@ -88,18 +87,18 @@ def _picture(prediction: Prediction, place: int, measured: ComplexArray | None) 
     )
 
 
-def _band(prediction: Prediction, place: int, kept: IntArray) -> list[Trace]:
-    low, high = prediction.magnitude_low[kept, place], prediction.magnitude_high[kept, place]
+def _band(prediction: Prediction, place: int, lines: IntArray) -> list[Trace]:
+    low, high = prediction.magnitude_low[lines, place], prediction.magnitude_high[lines, place]
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         return []
-    floor = LEAST * np.abs(prediction.values[kept, place])
-    return band(prediction.frequency_hz[kept], (np.maximum(low, floor), high), "90 % band", "@updated/0.28")
+    floor = LEAST * np.abs(prediction.values[lines, place])
+    return band(prediction.frequency_hz[lines], (np.maximum(low, floor), high), "90 % band", "@updated/0.28")
 
 
 def _measured(frequency: FloatArray, measured: ComplexArray, hover: str) -> list[Trace]:
     good = np.isfinite(measured)
-    kept = np.flatnonzero(good)[thin(frequency[good], [_log(measured[good])], bins_for(4) // 2)]
-    x, values, style = frequency[kept], measured[kept], {"width": 5, "legendgroup": "measured"}
+    lines = np.flatnonzero(good)[thin(frequency[good], [_log(measured[good])], bins_for(4) // 2)]
+    x, values, style = frequency[lines], measured[lines], {"width": 5, "legendgroup": "measured"}
     below: Trace = {"yaxis": "y2", "showlegend": False, "hover": "%{x:.6g} Hz: %{y:.1f}°", **style}
     return [
         line(x, np.abs(values), "measured", "@reference/0.35", hover=hover, **style),
@@ -117,7 +116,7 @@ def _table(prediction: Prediction, known: dict[int, ComplexArray]) -> Table:
         cells = [str(label), number(float(np.median(width)), 3), number(float(width.max()), 3)]
         cells.append(number(float(moved.median_db[place]), 3))
         rows.append(cells + _errors(prediction, place, known.get(place)))
-    columns = ["FRF (sensor / blow)", "band ± dB, median", "band ± dB, largest", "moved by the update, dB (median)"]
+    columns = ["FRF (output / input)", "band ± dB, median", "band ± dB, largest", "moved by the update, dB (median)"]
     columns += (
         ["error before, dB", "error after, dB", "correlation of shape, after", "of amplitude, after"] if known else []
     )

@@ -6,8 +6,7 @@ import json
 from html import escape
 from typing import TYPE_CHECKING
 
-from frf_ipz.report.section import Markup, Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Markup, Section, Table
 from frf_ipz.report.wording import number
 
 if TYPE_CHECKING:

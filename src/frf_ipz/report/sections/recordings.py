@@ -1,4 +1,4 @@
-"""Blows or records: the forces as recorded, and what is wrong with which."""
+"""Records: the forces as recorded, and what is wrong with which."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.report.picture import Axis, Picture, Trace, colour_of, dash_of, line, panels
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.wording import counted, number, percent
 
 if TYPE_CHECKING:
@@ -22,12 +21,12 @@ if TYPE_CHECKING:
 
 MOST_TRACES = 40  # drawn; more cover each other and make the page large
 MOST_PANELS = 4  # channels with a panel each; more share one
-LEGEND_NOTE = "Click a name in the legend to hide or show a blow; dotted: left out. Drag to zoom."
-SHOWN_AT_FIRST = 12  # blows; the others are a click in the legend away
+LEGEND_NOTE = "Click a name in the legend to hide or show a record; dotted: left out. Drag to zoom."
+SHOWN_AT_FIRST = 12  # records; the others are a click in the legend away
 
 
 def build(run: RunContents) -> Section | None:
-    """Give the section on blows and their quality.
+    """Give the section on records and their quality.
 
     Parameters
     ----------
@@ -39,30 +38,30 @@ def build(run: RunContents) -> Section | None:
     Section or None
         None for FRFs that were estimated elsewhere.
     """
-    recordings = run.recordings
-    if recordings is None or not len(recordings.records):
+    estimate = run.estimate
+    if estimate is None or not len(estimate.records):
         return None
-    records = recordings.records
+    records = estimate.records
     used = int(records["used"].astype(bool).sum())
-    lead = f"{counted(len(records), 'blow or record', 'blows or records')}, {used} used."
+    lead = f"{counted(len(records), 'record')}, {used} used."
     return Section(
         anchor="recordings",
-        title="Blows",
+        title="Records",
         lead=lead,
-        blocks=(*_pictures(recordings), _table(records)),
-        notes=recordings.warnings,
-        choices=recordings.choices,
+        blocks=(*_pictures(estimate), _table(records)),
+        notes=estimate.warnings,
+        choices=estimate.choices,
     )
 
 
-def _pictures(recordings: FrfEstimate) -> list[Picture]:
-    traces = recordings.traces[:MOST_TRACES]
+def _pictures(estimate: FrfEstimate) -> list[Picture]:
+    traces = estimate.traces[:MOST_TRACES]
     if not traces:
         return []
     force = traces[0].channel
     pulses = [trace for trace in traces if trace.channel == force]
     responses = [trace for trace in traces if trace.channel != force]
-    return [_pulses(pulses, recordings.records), *([_responses(responses, recordings.records)] if responses else [])]
+    return [_pulses(pulses, estimate.records), *([_responses(responses, estimate.records)] if responses else [])]
 
 
 def _pulses(traces: Sequence[Recorded], records: pd.DataFrame) -> Picture:
@@ -77,7 +76,7 @@ def _pulses(traces: Sequence[Recorded], records: pd.DataFrame) -> Picture:
     return Picture(
         name="records",
         title="Forces as recorded" + (", aligned where they set in" if aligned else ""),
-        alt=f"Force over time of {counted(len(traces), 'blow or record', 'blows or records')}: {names}.",
+        alt=f"Force over time of {counted(len(traces), 'record')}: {names}.",
         traces=tuple(drawn),
         layout=panels({"title": {"text": "Time, ms"}}, Axis(title=f"{traces[0].channel}, {traces[0].unit}")),
         note=LEGEND_NOTE,
@@ -102,7 +101,7 @@ def _responses(traces: Sequence[Recorded], records: pd.DataFrame) -> Picture:
     return Picture(
         name="responses",
         title="Responses as recorded",
-        alt=f"Responses over time: {', '.join(channels)}; {counted(len(names), 'blow or record', 'blows or records')}.",
+        alt=f"Responses over time: {', '.join(channels)}; {counted(len(names), 'record')}.",
         traces=tuple(drawn),
         layout=panels(x, *axes),
         note=LEGEND_NOTE,
@@ -115,7 +114,7 @@ def _curve(trace: Recorded, place: int, records: pd.DataFrame, *, shift_s: float
     out = not used.get(trace.name, True)
     name = f"{trace.name} (left out)" if out else trace.name
     factor = 1e3 if unit == "ms" else 1.0
-    shown = True if place < SHOWN_AT_FIRST else "legendonly"
+    visible = True if place < SHOWN_AT_FIRST else "legendonly"
     return line(
         factor * (np.asarray(trace.time_s) - shift_s),
         np.asarray(trace.values),
@@ -125,17 +124,17 @@ def _curve(trace: Recorded, place: int, records: pd.DataFrame, *, shift_s: float
         dash="dot" if out else dash_of(place),
         width=1.2,
         legendgroup=trace.name,
-        visible=shown,
+        visible=visible,
     )
 
 
 def _table(records: pd.DataFrame) -> Table:
     columns: dict[str, tuple[str, Callable[[Any], str]]] = {
-        "input_dof": ("struck at", str),
+        "input_dof": ("input", str),
         "peak_force_N": ("peak force, N", number),
         "pulse_s": ("pulse, ms", lambda value: number(1e3 * value, 3)),
         "snr_db": ("signal to noise, dB", lambda value: number(value, 3)),
-        "remaining_amplitude": ("left at the end", lambda value: percent(value, 2)),
+        "remaining_amplitude": ("remaining at the end", lambda value: percent(value, 2)),
         "weight": ("weight", lambda value: number(value, 3)),
         "used": ("used", lambda value: "yes" if value else "no"),
         "marks": ("what is wrong", lambda value: str(value or "")),
@@ -147,7 +146,7 @@ def _table(records: pd.DataFrame) -> Table:
     ]
     used = records["used"].astype(bool).to_numpy()
     return Table(
-        caption="Blows and their quality",
+        caption="Records and their quality",
         columns=("record", *[title for title, _ in known.values()]),
         rows=rows,
         marked=frozenset(np.flatnonzero(~used).tolist()),

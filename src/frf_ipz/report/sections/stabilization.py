@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.report.picture import Axis, Picture, Trace, frequency_axis, line, markers, panels
-from frf_ipz.report.section import Block, Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Block, Section, Table
 from frf_ipz.report.thinning import bins_for, thin
 from frf_ipz.report.wording import counted, listed, number, percent
 
@@ -43,10 +42,10 @@ def build(run: RunContents) -> Section | None:
     fit = run.fit
     if fit is None or not len(fit.stabilization):
         return None
-    taken = int(fit.stabilization["taken"].astype(bool).sum())
+    n_taken = int(fit.stabilization["taken"].astype(bool).sum())
     orders = fit.stabilization["order"].nunique()
     lead = (
-        f"{counted(len(fit.stabilization), 'pole')} of {counted(orders, 'model order')}; {taken} of them were where "
+        f"{counted(len(fit.stabilization), 'pole')} of {counted(orders, 'model order')}; {n_taken} of them were where "
         f"the fit started, and {counted(fit.n_modes, 'mode')} remained."
     )
     blocks: list[Block] = [_picture(fit, run.frfs)]
@@ -79,7 +78,7 @@ def _picture(fit: ModalFit, frfs: FrfSet | None) -> Picture:
 
 def _poles(poles: pd.DataFrame) -> list[Trace]:
     frequency, damping = poles["frequency_hz"].to_numpy(float), poles["damping_ratio"].to_numpy(float)
-    order, taken = poles["order"].to_numpy(float), poles["taken"].astype(bool).to_numpy()
+    order, is_start = poles["order"].to_numpy(float), poles["taken"].astype(bool).to_numpy()
     flags = [poles[name].astype(bool).to_numpy() for name in ("stable_frequency", "stable_damping", "stable_shape")]
     level = np.cumprod(np.stack(flags).astype(int), axis=0).sum(axis=0)
     hover = "%{x:.6g} Hz, order %{y}, damping %{customdata:.4f} %"
@@ -88,8 +87,8 @@ def _poles(poles: pd.DataFrame) -> list[Trace]:
         here = level == number_of
         style: Trace = {"symbol": symbol, "size": size, "hover": hover, "customdata": 100 * damping[here]}
         traces.append(markers(frequency[here], order[here], name, colour, **style))
-    ring: Trace = {"symbol": "circle-open", "size": 14, "hover": hover, "customdata": 100 * damping[taken]}
-    return [*traces, markers(frequency[taken], order[taken], "taken", "@bad", **ring)]
+    ring: Trace = {"symbol": "circle-open", "size": 14, "hover": hover, "customdata": 100 * damping[is_start]}
+    return [*traces, markers(frequency[is_start], order[is_start], "taken", "@bad", **ring)]
 
 
 def _modes(fit: ModalFit, span: list[float]) -> list[Trace]:
@@ -103,9 +102,9 @@ def _sum_of_frfs(frfs: FrfSet | None) -> list[Trace]:
     if frfs is None:
         return []
     total = np.maximum(np.abs(frfs.values).sum(axis=1), np.finfo(float).tiny)
-    kept = thin(frfs.frequency_hz, [np.log10(total)], bins_for(1))
+    lines = thin(frfs.frequency_hz, [np.log10(total)], bins_for(1))
     style: Trace = {"yaxis": "y2", "width": 1.2, "hover": "%{x:.6g} Hz: %{y:.4g} (SI)"}
-    return [line(frfs.frequency_hz[kept], total[kept], "sum of the FRFs", "@muted/0.7", **style)]
+    return [line(frfs.frequency_hz[lines], total[lines], "sum of the FRFs", "@muted/0.7", **style)]
 
 
 def _decisions(decisions: pd.DataFrame) -> Table:

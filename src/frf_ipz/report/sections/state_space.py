@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.wording import counted, number
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from scipy.linalg import eigh
 from frf_ipz.plotting.targets import Target
 from frf_ipz.report.along_structure import LEAST_EIGENVALUE, picture_of_parts, pictures_of_flexibility
 from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
-from frf_ipz.report.section import Section
-from frf_ipz.report.table import Table
+from frf_ipz.report.section import Section, Table
 from frf_ipz.report.wording import counted, number, percent, small_percent
 from frf_ipz.updating.along_structure import notable_changes
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 SCALE = "std: "  # how columns of the history begin that say how wide a part of the prior is
 MOST_MODES = 30
-MOST_STRETCHES = 5  # named one by one
+MOST_PARTS = 5  # named one by one
 FEW_STEPS = 20  # iterations that are each named on the axis
 MOST_NAMES = 30  # of targets written under the axis
 
@@ -65,10 +64,10 @@ def build(run: RunContents) -> Section | None:
 
 
 def _notable(parts: pd.DataFrame) -> list[str]:
-    stretches = notable_changes(parts) if len(parts) else ()
-    others = len(stretches) - MOST_STRETCHES
-    more = [f"and {counted(others, 'further stretch', 'further stretches')}"] if others > 0 else []
-    return [*stretches[:MOST_STRETCHES], *more]
+    changes = notable_changes(parts) if len(parts) else ()
+    n_unnamed = len(changes) - MOST_PARTS
+    rest = [f"and {counted(n_unnamed, 'further part')} of the structure"] if n_unnamed > 0 else []
+    return [*changes[:MOST_PARTS], *rest]
 
 
 def _targets(rows: Sequence[Target]) -> Picture:
@@ -161,12 +160,12 @@ def _regularisation(updated: UpdatedModel) -> list[str]:
     scales = [name for name in updated.history.columns if str(name).startswith(SCALE)]
     for phase, rows in updated.history.groupby("phase", sort=False) if scales else ():
         last = {str(name): float(rows[name].iloc[-1]) for name in scales}
-        said = ", ".join(
+        values = ", ".join(
             f"{name.removeprefix(SCALE)} {number(value)}" for name, value in last.items() if np.isfinite(value)
         )
-        if said:
+        if values:
             texts.append(
-                f"regularisation of the {phase} by likelihood and discrepancy principle, standard deviations: {said}"
+                f"regularisation of the {phase} by likelihood and discrepancy principle, standard deviations: {values}"
             )
     return texts
 

@@ -2,7 +2,7 @@
 // What the user does on the page becomes a change of pipeline.toml; the server runs what depends on it, and the page follows.
 (() => {
   const FIELDS = {
-    pin: ["hz", "why"], strike: ["hz", "why"], leave: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
+    pin: ["hz", "why"], reject: ["hz", "why"], exclude: ["low_hz", "high_hz"], band: ["low_hz", "high_hz"], point: ["dof"],
     sensor: ["dof"], retain: ["dofs"],
   };
   const MEMORY = "frf-ipz-show";
@@ -87,7 +87,7 @@
       axis: axis && { type: axis.type, range: axis.range }, dragmode,
       theme: document.documentElement.dataset.theme, scale: find("#scale").textContent,
       hidden: all(".chooser input").filter((box) => !box.checked).map((box) => box.value),
-      shape: form && Object.fromEntries(new FormData(form)), blows: Boolean(find("#blow-choices[open]")),
+      shape: form && Object.fromEntries(new FormData(form)), records: Boolean(find("#record-choices[open]")),
     }));
   }
 
@@ -353,10 +353,10 @@
     document.addEventListener("submit", submit);
     document.addEventListener("click", click);
     document.addEventListener("change", (event) => {
-      const { blow } = event.target.dataset;
-      if (blow) change({ kind: "record", name: blow, use: event.target.value });
+      const { record } = event.target.dataset;
+      if (record) change({ kind: "record", name: record, use: event.target.value });
     });
-    if (remembered.blows && find("#blow-choices")) find("#blow-choices").open = true;
+    if (remembered.records && find("#record-choices")) find("#record-choices").open = true;
     restoreLook();
     whenDrawn("stabilisation", listenToDiagram);
     whenDrawn("structure", listenToStructure);

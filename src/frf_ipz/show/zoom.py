@@ -1,4 +1,4 @@
-"""FRFs of a stretch with all their lines: the page itself holds only what a screen can show of the whole."""
+"""FRFs of a frequency range with all their lines: the page itself holds only what a screen can show of the whole."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 DIGITS = 8  # of a number: neighbouring lines of a long record differ in the sixth
 
 
-def zoomed_traces(run: RunContents, stretch_hz: tuple[float, float], shown: Sequence[int]) -> list[dict[str, Any]]:
-    """Draw some FRFs over a stretch, as the report draws all of them over everything.
+def zoomed_traces(run: RunContents, range_hz: tuple[float, float], selected: Sequence[int]) -> list[dict[str, Any]]:
+    """Draw some FRFs over a frequency range, as the report draws all of them over everything.
 
     Parameters
     ----------
     run : RunContents
         What the run holds.
-    stretch_hz : pair of float
+    range_hz : pair of float
         From, to, Hz; a line on each side of it is drawn too.
-    shown : sequence of int
+    selected : sequence of int
         Which FRFs.
 
     Returns
@@ -41,17 +41,17 @@ def zoomed_traces(run: RunContents, stretch_hz: tuple[float, float], shown: Sequ
     InputError
         If there are no such FRFs or lines.
     """
-    recordings = run.recordings
-    if recordings is None or not shown or not all(0 <= place < recordings.frfs.n_frfs for place in shown):
+    estimate = run.estimate
+    if estimate is None or not selected or not all(0 <= number < estimate.frfs.n_frfs for number in selected):
         raise InputError("this run has no such FRFs")
-    frequency = recordings.frfs.frequency_hz
-    first, last = np.searchsorted(frequency, stretch_hz)
+    frequency = estimate.frfs.frequency_hz
+    first, last = np.searchsorted(frequency, range_hz)
     inside = np.zeros(len(frequency), bool)
     inside[max(int(first) - 1, 0) : int(last) + 1] = True
     if np.count_nonzero(inside) < 2:
-        raise InputError(f"no lines were measured from {stretch_hz[0]:g} to {stretch_hz[1]:g} Hz")
-    part = replace(recordings, frfs=recordings.frfs.select_frfs(shown).select_lines(inside))
-    section = frf_section.build(replace(run, recordings=part, fit=None))
+        raise InputError(f"no lines were measured from {range_hz[0]:g} to {range_hz[1]:g} Hz")
+    part = replace(estimate, frfs=estimate.frfs.select_frfs(selected).select_lines(inside))
+    section = frf_section.build(replace(run, estimate=part, fit=None))
     (picture,) = pictures_of([] if section is None else [section])
     return [{axis: _numbers(trace[axis]) for axis in ("x", "y")} for trace in picture.traces]
 

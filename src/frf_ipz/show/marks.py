@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.plotting.projection import project
 from frf_ipz.rational import natural_frequency_hz
-from frf_ipz.report.picture import Picture, Trace, line, markers, outline
+from frf_ipz.report.picture import Picture, Trace, line, markers, shaded_span
 from frf_ipz.report.wording import counted
 
 if TYPE_CHECKING:
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 DIAGRAM, STRUCTURE = "stabilisation", "structure"
 STRIP = 0.08  # of the height, below the poles: room for the handles
-CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen stretch stay as clear as they were
+CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen range stay as clear as they were
 
 
 def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Picture:
-    """Draw pins, strikes and what is left out into the stabilisation diagram, and a handle for every mode of the fit.
+    """Draw pins, rejections and left-out ranges into the stabilisation diagram, and a handle for every mode of the fit.
 
     Parameters
     ----------
@@ -40,24 +40,24 @@ def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Pictur
     Returns
     -------
     Picture
-        With further lines, handles and shaded stretches.
+        With further lines, handles and shaded ranges.
     """
     low, high = picture.layout["yaxis"]["range"]
-    strikes = [struck.hz for struck in options.strike]
-    reasons = [f"struck: {struck.why}" for struck in options.strike]
-    pins = [f"pinned: {one.why}" if one.why else "pinned" for one in options.pinned]
+    rejected = [rejection.hz for rejection in options.strike]
+    reasons = [f"rejected: {rejection.why}" for rejection in options.strike]
+    pins = [f"pinned: {pin.why}" if pin.why else "pinned" for pin in options.pinned]
     hertz = natural_frequency_hz(fit.model.poles[: fit.n_modes])
     strip = STRIP * (high - low)
-    place, hover = np.full(len(hertz), low - strip / 2), "%{x:.6g} Hz: click to pin or strike"
+    place, hover = np.full(len(hertz), low - strip / 2), "%{x:.6g} Hz: click to pin or reject"
     traces = [
         markers(hertz, place, "handles of the modes", "@ink", hover=hover, symbol="triangle-up", size=12),
-        *_uprights("pinned", "@good", [one.hz for one in options.pinned], pins, (low, high)),
-        *_uprights("struck", "@bad", strikes, reasons, (low, high)),
+        *_vertical_lines("pinned", "@good", [pin.hz for pin in options.pinned], pins, (low, high)),
+        *_vertical_lines("rejected", "@bad", rejected, reasons, (low, high)),
     ]
-    shapes = [outline(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
+    shapes = [shaded_span(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
     words = [f"{len(pins)} pinned"] if pins else []
-    words += [f"{len(strikes)} struck"] if strikes else []
-    left_out = counted(len(options.exclude_hz), "stretch", "stretches")
+    words += [f"{len(rejected)} rejected"] if rejected else []
+    left_out = counted(len(options.exclude_hz), "range")
     words += [f"{left_out} left out (shaded)"] if options.exclude_hz else []
     note = f"{picture.note} Your choices: {', '.join(words)}." if words else picture.note
     below = {**picture.layout["yaxis"], "range": [low - strip, high]}
@@ -91,12 +91,12 @@ def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> 
     hover = "%{text}: the model is reduced to it"
     names = [dof.name for dof in known]
     rings = markers(
-        at[:, 0], at[:, 1], "kept in the reduction", "@c3", hover=hover, symbol="circle-open", size=14, text=names
+        at[:, 0], at[:, 1], "retained in the reduction", "@c3", hover=hover, symbol="circle-open", size=14, text=names
     )
     return replace(picture, traces=(*picture.traces, rings), alt=f"{picture.alt}; reduced to {', '.join(names)}")
 
 
-def _uprights(
+def _vertical_lines(
     name: str, colour: str, frequencies: Sequence[float], texts: Sequence[str], ends: tuple[float, float]
 ) -> list[Trace]:
     if not frequencies:

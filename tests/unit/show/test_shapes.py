@@ -13,8 +13,7 @@ from frf_ipz.fe.response import model_frfs
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.show.pictures.shape_drawing import REACH, draw_shape
-from frf_ipz.show.pictures.shapes import Motion, Shape, mode_shape, operating_shape
+from frf_ipz.show.shapes import REACH, Motion, Shape, draw_shape, mode_shape, operating_shape
 from frf_ipz.structure import Geometry
 
 ROUNDING = 1e-9  # of the largest value: a 5 by 5 solve, and eigenvectors of a lightly damped pencil
@@ -37,20 +36,20 @@ def measured_run(model, nominal):
     frequency = np.linspace(1.0, 80.0, 80)
     s = 2j * np.pi * frequency
     frfs = SimpleNamespace(frequency_hz=frequency, s=s, values=model_frfs(model, LABELS, s), labels=LABELS)
-    roots, others = poles_of(model), poles_of(nominal)
+    roots, nominal_roots = poles_of(model), poles_of(nominal)
     shapes = np.stack(
         [
-            roots.right[[abs(one.output_dof.node) - 1 for one in LABELS]],
-            roots.right[[one.input_dof.node - 1 for one in LABELS]],
+            roots.right[[abs(label.output_dof.node) - 1 for label in LABELS]],
+            roots.right[[label.input_dof.node - 1 for label in LABELS]],
         ]
     ).prod(axis=0)
-    signs = np.array([one.sign for one in LABELS])
-    powers = np.array([one.quantity.power for one in LABELS])
+    signs = np.array([label.sign for label in LABELS])
+    powers = np.array([label.quantity.power for label in LABELS])
     residues = (shapes * signs[:, None]).T * roots.values[:, None] ** powers
     fit = SimpleNamespace(n_modes=5, labels=LABELS, model=SimpleNamespace(poles=roots.values, residues=residues))
     targets = [
         SimpleNamespace(kind="pole", measured=k, computed_value=value, verdict=Verdict.PAIRED)
-        for k, value in enumerate(others.values)
+        for k, value in enumerate(nominal_roots.values)
     ]
     updated = SimpleNamespace(model=model, nominal=nominal, after=roots.values)
     return SimpleNamespace(fit=fit, frfs=frfs, updated=updated, pairs=SimpleNamespace(targets=targets))
@@ -74,7 +73,7 @@ def test_the_operating_shape_of_a_model_is_that_of_its_own_frfs(run):
     assert np.abs(at(nominal, measured.dofs) / measured.values - 1).max() > 0.1
 
 
-def test_a_blow_in_the_negative_direction_turns_the_shape(run):
+def test_an_input_in_the_negative_direction_turns_the_shape(run):
     updated, _, measured = operating_shape(run, 33.2, "1:-x").motions
     assert_allclose(at(updated, measured.dofs), measured.values, rtol=ROUNDING)
 

@@ -1,1 +1,0 @@
-"""The diagnosis on the page."""

@@ -1,1 +1,0 @@
-"""What a user changes on the page, as changes of ``pipeline.toml``."""
