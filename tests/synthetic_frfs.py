@@ -15,7 +15,7 @@ FOUND_DAMPING = (0.5, 2.0)  # times the truth: the same
 
 @dataclass(frozen=True)
 class Modes:
-    """Normal modes and how much each sensor and each blow moves them."""
+    """Normal modes and how much each sensor and each excitation moves with them."""
 
     frequency_hz: np.ndarray
     damping_ratio: np.ndarray
@@ -38,7 +38,7 @@ class Modes:
 
 
 def random_modes(frequency_hz, damping_ratio, *, n_outputs=6, n_inputs=2, seed=0):
-    """Give modes with random shapes; the blows are at the first sensors."""
+    """Give modes with random shapes; the excitation is at the first sensors."""
     rng = np.random.default_rng(seed)
     frequency_hz = np.asarray(frequency_hz, float)
     outputs = rng.standard_normal((n_outputs, len(frequency_hz)))
@@ -48,14 +48,14 @@ def random_modes(frequency_hz, damping_ratio, *, n_outputs=6, n_inputs=2, seed=0
 
 def labels_of(n_outputs, n_inputs, quantity=FrfQuantity.ACCELERANCE):
     return tuple(
-        FrfLabel(Dof(output + 1, "z"), Dof(struck + 1, "z"), quantity)
+        FrfLabel(Dof(output + 1, "z"), Dof(excited + 1, "z"), quantity)
         for output in range(n_outputs)
-        for struck in range(n_inputs)
+        for excited in range(n_inputs)
     )
 
 
 def frf_set(frequency_hz, values, labels, variance=None):
-    """Give an FrfSet; without a variance nobody knows the noise."""
+    """Give an FrfSet; without a variance the noise is unknown."""
     unknown = np.full(values.shape, np.nan)
     return FrfSet(
         frequency_hz=frequency_hz,
@@ -99,13 +99,13 @@ def count(poles, truth, *, frequency=FOUND_FREQUENCY, damping=FOUND_DAMPING):
     ratio = np.abs(poles)[:, None] / np.abs(truth) - 1
     dampings = (poles.real / np.abs(poles))[:, None] / (truth.real / np.abs(truth))
     fits = (np.abs(ratio) < frequency) & (dampings > damping[0]) & (dampings < damping[1])
-    free, found = np.ones(len(truth), bool), 0
+    free, n_found = np.ones(len(truth), bool), 0
     for row in range(len(poles)):
         choice = np.flatnonzero(fits[row] & free)
         if len(choice):
             free[choice[np.argmin(np.abs(ratio[row, choice]))]] = False
-            found += 1
-    return found, len(truth) - found, len(poles) - found
+            n_found += 1
+    return n_found, len(truth) - n_found, len(poles) - n_found
 
 
 def normalised_errors(fit, truth):
@@ -117,6 +117,6 @@ def normalised_errors(fit, truth):
         np.stack([-(truth.imag**2), truth.real * truth.imag], 1) / modulus[:, None] ** 3,
     ]
     blocks = np.stack([fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(fit.n_modes)])
-    std = [np.sqrt(np.einsum("ki,kij,kj->k", one, blocks, one)) for one in gradients]
+    std = [np.sqrt(np.einsum("ki,kij,kj->k", gradient, blocks, gradient)) for gradient in gradients]
     errors = [np.abs(poles) - modulus, -poles.real / np.abs(poles) + truth.real / modulus]
-    return np.array([error / one for error, one in zip(errors, std, strict=True)])
+    return np.array([error / size for error, size in zip(errors, std, strict=True)])

@@ -16,7 +16,7 @@ import pytest
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.identification.stabilization import start_poles
+from frf_ipz.identification.stabilization import find_start_poles
 from synthetic_frfs import of_bench
 
 ROUNDS = 3
@@ -77,7 +77,7 @@ def test_against_sdypy(benchmark, truth_sets, name):
     chosen = sdypy_seconds(truth, ORDERS[name], select=True)
     options = FitOptions()
     lines = measured_lines(frfs, options)
-    poles = cpu_seconds(lambda: start_poles(frfs, lines))
+    poles = cpu_seconds(lambda: find_start_poles(frfs, lines))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     whole = cpu_seconds(lambda: fit_modes(frfs, options))
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024

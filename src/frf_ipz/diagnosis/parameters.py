@@ -10,7 +10,7 @@ from scipy import sparse
 from frf_ipz.diagnosis.apply import corrector
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
-from frf_ipz.fe.eigen import stated_ratios
+from frf_ipz.fe.eigen import stated_damping_ratios
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.regions import motion_of_all_dofs
@@ -112,6 +112,6 @@ def _modal(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
     poles = undamped_poles(reduced.mass, reduced.stiffness)
     squares = np.maximum(poles.values.real, 0.0)
     n_rigid = int(np.count_nonzero(squares < RIGID * squares.max()))
-    ratios, omega = stated_ratios(model.modal_damping, len(squares), n_rigid), np.sqrt(squares)
+    ratios, omega = stated_damping_ratios(model.modal_damping, len(squares), n_rigid), np.sqrt(squares)
     shapes = reduced.mass @ poles.right.real
     return np.asarray((shapes * (2 * ratios * omega)) @ shapes.T)

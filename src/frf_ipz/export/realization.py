@@ -49,7 +49,7 @@ class SecondOrder(NamedTuple):
     flexibility: FloatArray
 
 
-def in_modes(model: ReducedModel, input_rows: FloatArray, output_rows: FloatArray) -> SecondOrder:
+def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatArray) -> SecondOrder:
     """Express a reduced model in its mass-normalised modes.
 
     Parameters
@@ -76,7 +76,7 @@ def in_modes(model: ReducedModel, input_rows: FloatArray, output_rows: FloatArra
     )
 
 
-def condensed(system: SecondOrder, n_modes: int) -> SecondOrder:
+def condense_high_modes(system: SecondOrder, n_modes: int) -> SecondOrder:
     """Keep the lowest modes; the others follow without inertia and damping.
 
     Parameters
@@ -104,7 +104,7 @@ def condensed(system: SecondOrder, n_modes: int) -> SecondOrder:
     )
 
 
-def first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
+def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     """Turn a second-order model into a state space.
 
     Parameters
@@ -145,7 +145,7 @@ def first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     return Matrices(A, B, C, D)
 
 
-def pade(delay_s: float, order: int) -> Matrices:
+def pade_delay(delay_s: float, order: int) -> Matrices:
     """Realise the diagonal Pade approximant of a delay.
 
     Parameters
@@ -200,7 +200,7 @@ def with_delays(system: Matrices, delays_s: Sequence[float], order: int) -> Matr
     late = [place for place, delay in enumerate(delays_s) if delay > 0]
     if not late or not order:
         return system
-    lines = [pade(delays_s[place], order) for place in late]
+    lines = [pade_delay(delays_s[place], order) for place in late]
     A, B, C, D = (block_diag(*(line[part] for line in lines)) for part in range(4))
     own, added = len(system.A), len(A)
     outputs = np.hstack([system.C, np.zeros((len(system.C), added))])
@@ -215,7 +215,7 @@ def with_delays(system: Matrices, delays_s: Sequence[float], order: int) -> Matr
     )
 
 
-def sampled(system: Matrices, sample_time_s: float) -> Matrices:
+def discretise(system: Matrices, sample_time_s: float) -> Matrices:
     """Discretise for inputs that are held between samples.
 
     Parameters

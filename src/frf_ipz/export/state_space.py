@@ -13,7 +13,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, require_shape
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
-from frf_ipz.export.realization import condensed, first_order, in_modes, sampled, with_delays
+from frf_ipz.export.realization import condense_high_modes, discretise, modal_form, to_first_order, with_delays
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,11 +57,11 @@ class StateSpaceModel:
     output_units: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        for name, shape in shapes({name: getattr(self, name) for name in NAMES}).items():
+        for name, shape in matrix_shapes({name: getattr(self, name) for name in NAMES}).items():
             require_shape(name, getattr(self, name), shape)
 
 
-def shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
+def matrix_shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     """Say how large the arrays of a state space are.
 
     Parameters
@@ -185,10 +185,10 @@ def to_control(model: StateSpaceModel) -> control.StateSpace:
 def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
-    system = in_modes(model, *rows)
+    system = modal_form(model, *rows)
     if options.residual == "feedthrough":
-        system = condensed(system, model.n_modes)
-    matrices = first_order(system, [output.quantity.power for output in outputs])
+        system = condense_high_modes(system, model.n_modes)
+    matrices = to_first_order(system, [output.quantity.power for output in outputs])
     names = [
         f"mode {mode + 1} {what}" for mode in range(len(system.stiffness)) for what in ("displacement", "velocity")
     ]
@@ -196,7 +196,7 @@ def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> State
     names += [f"delay of {output.dof} {order + 1}" for output in late for order in range(options.pade_order)]
     matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
     if options.sample_time_s > 0:
-        matrices = sampled(matrices, options.sample_time_s)
+        matrices = discretise(matrices, options.sample_time_s)
     return StateSpaceModel(
         **matrices._asdict(),
         dt=options.sample_time_s,

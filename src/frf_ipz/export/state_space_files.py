@@ -15,7 +15,7 @@ from scipy.io import loadmat, savemat
 from scipy.io.matlab import MatReadError
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, shapes, to_control
+from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def read_state_space(path: Path) -> StateSpaceModel:
     try:
         values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
         names = _names_in(values)
-        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in shapes(names).items()}
+        arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
     except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
@@ -177,7 +177,7 @@ def read_ensemble(path: Path) -> tuple[StateSpaceModel, ...]:
         fields: dict[str, Any] = {**_names_in(values)}
         arrays = {
             name: np.moveaxis(np.array(values[name], float).reshape(*shape, -1), -1, 0)
-            for name, shape in shapes(fields).items()
+            for name, shape in matrix_shapes(fields).items()
         }
         fields["dt"] = float(np.squeeze(values["dt"]))
         return tuple(

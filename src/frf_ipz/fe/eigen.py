@@ -175,14 +175,14 @@ def damping_ratios(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     (n_modes,) array
         0 for rigid-body modes.
     """
-    ratios = stated_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
+    ratios = stated_damping_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
     viscous = np.sum(basis.shapes * multiply(model.damping, basis.shapes), 0)
     elastic = slice(basis.n_rigid, None)
     ratios[elastic] += viscous[elastic] / (2 * np.sqrt(basis.eigenvalues[elastic]))
     return ratios
 
 
-def stated_ratios(modal_damping: FloatArray, n_modes: int, n_rigid: int) -> FloatArray:
+def stated_damping_ratios(modal_damping: FloatArray, n_modes: int, n_rigid: int) -> FloatArray:
     """Damping ratios of modes from those that a model states for its elastic ones.
 
     Parameters

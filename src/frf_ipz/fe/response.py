@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.fe.assembly import multiply
-from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
+from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
 from frf_ipz.fe.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
@@ -162,7 +162,7 @@ def _basis_for(model: StructuralModel, s: ComplexArray) -> ModalBasis:
 
 def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     """Damping in modal coordinates, 2 zeta omega: (n,) where it couples no modes, else (n, n)."""
-    ratios = stated_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
+    ratios = stated_damping_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
     stated = 2 * ratios * np.sqrt(basis.eigenvalues)
     if not model.damping_all.count_nonzero():
         return stated

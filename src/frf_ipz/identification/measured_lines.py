@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.options import FitOptions
 
-LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line tells nothing of the structure
+LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line says nothing of the structure
 LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
-MODEL_ERROR = 1e-3  # the same where nobody has measured the noise: few structures are linear to less
+MODEL_ERROR = 1e-3  # the same where the noise was not measured: few structures are linear to less
 FEWEST_LINES = 16  # what the fit of a single mode needs
 SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
 SHARED_SPREAD = 0.15  # rms relative deviation of weights from profile times gain that costs less than 3 % of efficiency
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Weighted:
-    """FRFs and weights in the form in which they are fitted.
+class WeightedLines:
+    """Receptances and the weights of their lines, as the likelihood takes them.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Weighted:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeasuredLines:
-    """What is fitted.
+    """The lines and FRFs that are fitted, with their noise.
 
     Parameters
     ----------
@@ -101,20 +101,27 @@ class MeasuredLines:
         """Distance of lines, Hz."""
         return float(np.median(np.diff(self.frequency_hz)))
 
-    def weighted(self, *, shared: bool = False) -> Weighted:
-        """Weigh each line by one over the standard deviation of each part of its noise.
+    def weighted(self, *, shared: bool = False) -> WeightedLines:
+        """Weight each line by one over the standard deviation of each part of its noise.
+
+        Parameters
+        ----------
+        shared : bool
+            Allow one profile of weights for all FRFs, which costs a little efficiency and saves much time.
 
         Returns
         -------
-        Weighted
-            With a profile that all FRFs share, where that is good enough.
+        WeightedLines
+            With a profile that all FRFs share where that is asked for and good enough.
         """
         log_weight = -0.5 * np.log(self.variance / 2)
         gain = log_weight.mean(axis=0)
         profile = (log_weight - gain).mean(axis=1)
         spread = log_weight - gain - profile[:, None]
         full = np.exp(log_weight) if not shared and np.sqrt(np.mean(spread**2)) > SHARED_SPREAD else None
-        return Weighted(s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full)
+        return WeightedLines(
+            s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full
+        )
 
 
 def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
@@ -125,17 +132,17 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     frfs : FrfSet
         Measured FRFs.
     options : FitOptions
-        Band and stretches to leave out.
+        Band, and bands to leave out.
 
     Returns
     -------
     MeasuredLines
-        What is fitted.
+        The lines to fit.
 
     Raises
     ------
     InputError
-        If too few lines are left.
+        If too few lines remain.
     """
     known = np.asarray(np.isfinite(frfs.variance).any(axis=0), bool)
     usable = _usable(frfs, known)
@@ -147,12 +154,12 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     used = usable & independent & frfs.in_band(band, options.exclude_hz)
     if used.sum() < FEWEST_LINES:
         raise InputError(
-            f"only {int(used.sum())} usable frequency lines are left in the band {band[0]:g} to {band[1]:g} Hz; "
+            f"only {int(used.sum())} usable frequency lines remain in the band {band[0]:g} to {band[1]:g} Hz; "
             f"a fit needs {FEWEST_LINES}: set a wider [fit] band_hz or a finer frequency resolution"
         )
     lines = frfs.select_lines(used)
     powers = np.array([label.quantity.power for label in frfs.labels])
-    if not known.all():  # once more in the band alone: what lies outside may be of another size
+    if not known.all():  # once more in the band alone: the noise outside may be of another size
         noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])
     variance = noise[used] + (np.where(known, LEAST_NOISE, MODEL_ERROR) * np.abs(lines.values)) ** 2
     variance = np.maximum(variance, np.finfo(float).tiny * 1e40)
@@ -168,13 +175,13 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     )
 
 
-def with_noise_of(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLines:
-    """Take the noise of FRFs whose variance is not known from what a model leaves of them.
+def with_misfit_noise(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLines:
+    """Take the noise of FRFs whose variance is not known from the misfit of a model.
 
     Parameters
     ----------
     lines : MeasuredLines
-        What is fitted.
+        The lines that are fitted.
     misfit : (n_lines, n_frfs) complex array
         Measured minus model, as receptances.
 
@@ -201,12 +208,12 @@ def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
 
 
 def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
-    """Find the lines that carry signal, for a user who has said nothing."""
-    told = np.isfinite(noise) & (noise > 0)
-    ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=told)
-    strong = usable & (np.median(ratio, axis=1) > SIGNAL**2)
-    if not strong.any():
+    """Find the band that carries signal, where the user gives none."""
+    is_known = np.isfinite(noise) & (noise > 0)
+    ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=is_known)
+    has_signal = usable & (np.median(ratio, axis=1) > SIGNAL**2)
+    if not has_signal.any():
         raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")
-    share = np.cumsum(strong) / strong.sum()
+    share = np.cumsum(has_signal) / has_signal.sum()
     first, last = np.searchsorted(share, [1e-9, 1 - 1e-9])
     return float(frfs.frequency_hz[first]), float(frfs.frequency_hz[min(last, frfs.n_lines - 1)])

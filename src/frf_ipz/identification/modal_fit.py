@@ -1,4 +1,4 @@
-"""What identification gives: poles, residues and zeros with their covariance, and how they were found."""
+"""What identification gives: poles, residues and zeros with their covariance, and how they were identified."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ class ModalFit:
         One row a pole of the start: ``order, frequency_hz, damping_ratio, stable_frequency, stable_damping,
         stable_shape, taken``.
     decisions : DataFrame
-        What was added, dropped, pinned and struck: ``frequency_hz, damping_ratio, action, reason``.
+        What was added, dropped, pinned and rejected: ``frequency_hz, damping_ratio, action, reason``.
     modes : DataFrame
         One row a mode: ``pole_id, frequency_hz, damping_ratio, mpc, quality`` and what the quality is made of.
     misfit : DataFrame
         One row an FRF and band: ``frf, output_dof, input_dof, band_low_hz, band_high_hz, misfit, noise, ratio``, and
         what was fitted of the FRF as a whole: ``delay_s, gain, gain_std``.
     gain : (n_frfs,) array
-        Gain of each FRF: as it was measured it is this times the true one. 1 unless gains were asked for.
+        Gain of each FRF: the measured FRF over the true one. 1 unless its gain was estimated.
     channel_gains : DataFrame
-        One row a channel whose gain was asked for: ``channel, gain, gain_std``.
+        One row a channel whose gain was estimated: ``channel, gain, gain_std``.
     noise_from : str
         ``recordings`` or ``misfit``: where the covariance's sigma comes from.
     warnings : tuple of str

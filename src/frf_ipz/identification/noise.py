@@ -1,7 +1,7 @@
-"""How strong the noise on measured FRFs is, where nobody has said so.
+"""How strong the noise on measured FRFs is, where the recordings do not say so.
 
-Noise differs from line to line, a response does not: third differences leave the noise. Their median over some lines
-is not moved by the few lines on which a narrow peak does vary.
+Noise differs from line to line, a response does not: third differences are those of the noise. Their median over some
+lines is not moved by the few lines on which a narrow peak does vary.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 
 DIFFERENCE = 3  # order of the differences: what a parabola can follow over four lines is no noise
 BLOCK_LINES = 48  # lines behind one estimate: its scatter is then some 20 %
-TINY = 1e-300  # keeps the logarithm of a dead channel finite
+TINY = 1e-300  # so that the logarithm of a dead channel stays finite
 
 
 def rough_variance(values: ComplexArray) -> FloatArray:
@@ -34,10 +34,10 @@ def rough_variance(values: ComplexArray) -> FloatArray:
 
 
 def misfit_variance(misfit: ComplexArray, size: FloatArray) -> FloatArray:
-    """Estimate the variance of noise in what a model leaves.
+    """Estimate the variance of the noise in a misfit.
 
     Noise of the response is as strong on a peak as beside it, noise that comes with the force follows the response.
-    Each block of lines takes what explains its differences better.
+    Each block of lines takes the law that explains its differences better.
 
     Parameters
     ----------
@@ -52,15 +52,18 @@ def misfit_variance(misfit: ComplexArray, size: FloatArray) -> FloatArray:
         E of the squared modulus of the noise.
     """
     squares = _squared_differences(misfit)
-    constant = smooth_level(squares)
+    constant_level = smooth_level(squares)
     power = np.maximum(size**2, TINY)
-    following = smooth_level(squares / power) * power
+    proportional_level = smooth_level(squares / power) * power
     block = np.minimum(np.arange(len(misfit)) // BLOCK_LINES, max(0, len(misfit) // BLOCK_LINES - 1))
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     # minus the logarithm of the likelihood of exponentially distributed squares
-    costs = [np.log(np.maximum(level, TINY)) + squares / np.maximum(level, TINY) for level in (constant, following)]
-    better = np.add.reduceat(costs[1] - costs[0], starts, axis=0) < 0
-    return np.asarray(np.where(better[block], following, constant))
+    costs = [
+        np.log(np.maximum(level, TINY)) + squares / np.maximum(level, TINY)
+        for level in (constant_level, proportional_level)
+    ]
+    is_proportional = np.add.reduceat(costs[1] - costs[0], starts, axis=0) < 0
+    return np.asarray(np.where(is_proportional[block], proportional_level, constant_level))
 
 
 def smooth_level(squares: FloatArray) -> FloatArray:
@@ -78,8 +81,10 @@ def smooth_level(squares: FloatArray) -> FloatArray:
     """
     n_lines = len(squares)
     edges = np.linspace(0, n_lines, max(1, n_lines // BLOCK_LINES) + 1).astype(int)
-    inside = edges[:-1, None] + np.arange(np.diff(edges).min())
-    blocks = np.median(squares[inside], axis=1) / log(2)  # an exponential distribution has ln 2 times its mean there
+    block_lines = edges[:-1, None] + np.arange(np.diff(edges).min())
+    blocks = np.median(squares[block_lines], axis=1) / log(
+        2
+    )  # an exponential distribution has ln 2 times its mean there
     middles = (edges[:-1] + edges[1:] - 1) / 2
     levels = np.log(np.maximum(blocks, TINY))
     lines = np.arange(n_lines)
@@ -89,7 +94,7 @@ def smooth_level(squares: FloatArray) -> FloatArray:
 def _squared_differences(values: ComplexArray) -> FloatArray:
     weights = np.array([(-1) ** k * comb(DIFFERENCE, k) for k in range(DIFFERENCE + 1)])
     weights = weights / np.linalg.norm(weights)
-    n_inner = len(values) - DIFFERENCE
-    inner = np.abs(sum(weight * values[k : k + n_inner] for k, weight in enumerate(weights))) ** 2
-    ahead = DIFFERENCE // 2
-    return np.pad(inner, ((ahead, DIFFERENCE - ahead), (0, 0)), mode="edge")
+    count = len(values) - DIFFERENCE
+    squares = np.abs(sum(weight * values[k : k + count] for k, weight in enumerate(weights))) ** 2
+    before = DIFFERENCE // 2
+    return np.pad(squares, ((before, DIFFERENCE - before), (0, 0)), mode="edge")

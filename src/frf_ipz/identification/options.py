@@ -11,14 +11,14 @@ from frf_ipz.toml_files import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RejectedPole:
-    """A pole that the user has struck out.
+    """A pole that the user has rejected, ``[[fit.strike]]``.
 
     Parameters
     ----------
     hz : float
         Its frequency.
     why : str
-        The reason, kept with the results.
+        The reason, stored with the results.
     """
 
     __pydantic_config__ = STRICT
@@ -36,7 +36,7 @@ class PinnedPole:
     hz : float
         The frequency.
     why : str
-        The reason, kept with the results; may be empty.
+        The reason, stored with the results; may be empty.
     """
 
     __pydantic_config__ = STRICT
@@ -52,9 +52,9 @@ class FitOptions:
     Parameters
     ----------
     band_hz : pair of float, optional
-        Band to fit; where it is left out, the whole of the measured band that carries signal.
+        Band to fit; without it the whole measured band that carries signal.
     exclude_hz : tuple of pairs of float
-        Stretches to leave out: mains lines, a band of low coherence.
+        Bands to leave out: mains lines, low coherence.
     pin_hz : tuple of float or PinnedPole
         Frequencies at which a mode must be, with or without the reason: never dropped.
     strike : tuple of RejectedPole
@@ -62,12 +62,12 @@ class FitOptions:
     modes : str
         ``complex`` or ``real`` (normal modes: proportional damping).
     max_order : int, optional
-        Highest model order of the start; chosen from band and lines where it is left out.
+        Highest model order of the start; without it chosen from band and lines.
     delay : bool
         Fit a pure delay for each output channel too.
     gain : tuple of str
-        Channels whose constant gain is in doubt and is found; all others are trusted. A gain shows only where two FRFs
-        must be equal but for gains: with blow and sensor exchanged, or recorded by two channels.
+        Channels whose constant gain is not known and is estimated; all others are trusted. A gain shows only where two
+        FRFs must be equal but for gains: with excitation and sensor exchanged, or recorded by two channels.
 
     Raises
     ------
@@ -98,4 +98,4 @@ class FitOptions:
     @property
     def pinned(self) -> tuple[PinnedPole, ...]:
         """Every pin with its reason, which is empty for a plain number."""
-        return tuple(one if isinstance(one, PinnedPole) else PinnedPole(hz=one) for one in self.pin_hz)
+        return tuple(pin if isinstance(pin, PinnedPole) else PinnedPole(hz=pin) for pin in self.pin_hz)

@@ -1,8 +1,8 @@
 """Joint covariance of poles and zeros that is never formed as a whole.
 
 Errors of all roots share those of the poles; beyond that the zeros of one FRF share that FRF's noise alone. So the
-covariance is ``common common' + own`` with a block-diagonal `own`: hundreds of FRFs with dozens of zeros each need
-megabytes instead of gigabytes.
+covariance is ``common common' + blocks`` with a block-diagonal matrix `blocks`: hundreds of FRFs with dozens of zeros
+each need megabytes instead of gigabytes.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ class RootCovariance:
     Parameters
     ----------
     common : (n_rows, n_sources) array
-        How each real and imaginary part follows errors that all share, rad/s.
-    own : (n_rows, n_rows) sparse array
-        What is left, one block an FRF, (rad/s)^2.
+        How each real and imaginary part follows the errors that all roots share, rad/s.
+    blocks : (n_rows, n_rows) sparse array
+        Covariance beyond that, one block an FRF, (rad/s)^2.
 
     Examples
     --------
     >>> from scipy import sparse
-    >>> covariance = RootCovariance(common=np.array([[1.0], [2.0]]), own=sparse.csr_array(np.eye(2)))
+    >>> covariance = RootCovariance(common=np.array([[1.0], [2.0]]), blocks=sparse.csr_array(np.eye(2)))
     >>> covariance[np.ix_([0, 1], [1])]
     array([[2.],
            [5.]])
@@ -38,7 +38,7 @@ class RootCovariance:
     """
 
     common: FloatArray
-    own: Any
+    blocks: Any
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -52,11 +52,10 @@ class RootCovariance:
 
     def __getitem__(self, key: Any) -> Any:  # noqa: ANN401 - whatever indexes a matrix: numbers, slices, `np.ix_`
         rows, columns = key if isinstance(key, tuple) else (key, slice(None))
-        every = np.arange(len(self.common))
-        row, column = every[rows], every[columns]
-        across = np.ravel(row)[:, None], np.ravel(column)[None, :]
-        block = self.common[across[0].ravel()] @ self.common[across[1].ravel()].T
-        block = block + self.own[across[0].ravel()][:, across[1].ravel()].toarray()
+        indices = np.arange(len(self.common))
+        row, column = indices[rows], indices[columns]
+        block = self.common[np.ravel(row)] @ self.common[np.ravel(column)].T
+        block = block + self.blocks[np.ravel(row)][:, np.ravel(column)].toarray()
         if np.ndim(row) == 0 and np.ndim(column) == 0:
             return block[0, 0]
         if np.ndim(row) == 0 or np.ndim(column) == 0:
@@ -75,7 +74,7 @@ class RootCovariance:
         (n_rows,) array
             (rad/s)^2.
         """
-        return np.asarray(np.einsum("ij,ij->i", self.common, self.common) + self.own.diagonal())
+        return np.asarray(np.einsum("ij,ij->i", self.common, self.common) + self.blocks.diagonal())
 
     def pair_blocks(self) -> FloatArray:
         """Covariance of the real and imaginary part of each root by itself.
@@ -87,8 +86,8 @@ class RootCovariance:
         """
         parts = self.common.reshape(-1, 2, self.common.shape[1])
         blocks = np.einsum("kim,kjm->kij", parts, parts)
-        cross = self.own.diagonal(1)[::2]
-        blocks[:, [0, 1], [0, 1]] += self.own.diagonal().reshape(-1, 2)
+        cross = self.blocks.diagonal(1)[::2]
+        blocks[:, [0, 1], [0, 1]] += self.blocks.diagonal().reshape(-1, 2)
         blocks[:, 0, 1] += cross
         blocks[:, 1, 0] += cross
         return np.asarray(blocks)

@@ -14,7 +14,7 @@ from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.reduction import reduce as reduction
 from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.reduce import reduce_model
-from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_rows, condition_number
+from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
 from frf_ipz.fe.response import model_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
@@ -309,7 +309,7 @@ def test_chosen_rows_are_as_independent_as_can_be():
     rng = np.random.default_rng(2)
     shapes = rng.standard_normal((40, 5))
     shapes[7] = 1.001 * shapes[3]
-    rows = choose_rows(shapes, [3, 7, 11], np.arange(40), 5)
+    rows = choose_retained_rows(shapes, [3, 7, 11], np.arange(40), 5)
     assert rows[:2].tolist() == [3, 11]
     assert len(set(rows.tolist())) == 5
     assert condition_number(shapes[rows]) < 20 < MAX_CONDITION

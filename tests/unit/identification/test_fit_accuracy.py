@@ -49,16 +49,16 @@ def zero_errors(fit, truth):
     products = (truth["phi_o"][:, None] * truth["phi_i"][None]).reshape(-1, len(omega))
     low, high = (float(np.ravel(truth[name])[0]) if name in truth else 0.0 for name in ("lr", "ur"))
     errors = []
-    for place in np.flatnonzero(fit.zeros.identifiable):
-        if fit.zeros.kind[place] == "real":
+    for index in np.flatnonzero(fit.zeros.identifiable):
+        if fit.zeros.kind[index] == "real":
             continue
-        z = value = fit.zeros.values[place]
-        product = products[fit.zeros.frf[place]]
+        z = value = fit.zeros.values[index]
+        product = products[fit.zeros.frf[index]]
         for _ in range(20):  # Newton's method from the estimate to the zero of the truth
             stiffness = z**2 + 2 * ratio * omega * z + omega**2
             slope = -np.sum(product * (2 * z + 2 * ratio * omega) / stiffness**2) - 2 * low / z**3
             z = z - (np.sum(product / stiffness) + low / z**2 + high) / slope
-        rows = slice(2 * (fit.n_modes + place), 2 * (fit.n_modes + place) + 2)
+        rows = slice(2 * (fit.n_modes + index), 2 * (fit.n_modes + index) + 2)
         std = np.sqrt(np.diagonal(fit.covariance[rows, rows]))
         errors.append(np.array([(value - z).real, (value - z).imag]) / std)
     return np.array(errors)
@@ -69,7 +69,7 @@ def rms(values):
 
 
 @pytest.mark.parametrize("modes", ["complex", "real"])
-def test_errors_are_as_large_as_said(modes):
+def test_standard_deviations_are_calibrated(modes):
     truth = random_modes(SPREAD, 0.005)
     errors = []
     for seed in range(2):

@@ -64,7 +64,7 @@ def test_weak_modes_are_found_where_the_noise_lets_them(seed):
     small = np.where(np.isin(np.arange(len(SPREAD)), [2, 5]), 10**-1.5, 1.0)
     truth = replace(truth, outputs=truth.outputs * small, inputs=truth.inputs * small)
     frfs = accelerances(truth, LINES_HZ, noise=0.01, seed=seed)
-    found = np.abs(np.abs(poles_of(fit_modes(frfs, FitOptions())))[:, None] / np.abs(truth.poles) - 1).min(axis=0)
+    error = np.abs(np.abs(poles_of(fit_modes(frfs, FitOptions())))[:, None] / np.abs(truth.poles) - 1).min(axis=0)
     s = frfs.s[:, None]
     for weak in (2, 5):
         alone = truth.residues()[weak] / (s - truth.poles[weak]) + truth.residues()[weak].conj() / (
@@ -75,7 +75,7 @@ def test_weak_modes_are_found_where_the_noise_lets_them(seed):
         count_of_frfs = np.arange(1, len(best) + 1)
         demanded = (2 * count_of_frfs + 2) * np.log(2 * len(LINES_HZ))
         demanded += 2 * count_of_frfs * np.log(len(best) / count_of_frfs)
-        assert (found[weak] < 1e-3) == (np.max(best / demanded) > 1)  # what the BIC asks of a mode
+        assert (error[weak] < 1e-3) == (np.max(best / demanded) > 1)  # what the BIC asks of a mode
 
 
 def test_noise_that_all_frfs_share():
@@ -85,8 +85,8 @@ def test_noise_that_all_frfs_share():
     for seed in range(4):
         rng = np.random.default_rng(seed)
         shared = 0.01 * (rng.standard_normal(len(LINES_HZ)) + 1j * rng.standard_normal(len(LINES_HZ)))
-        own = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2)) * rng.standard_normal(values.shape)
-        fit = fit_modes(frf_set(LINES_HZ, values * (1 + shared[:, None]) + own, labels_of(6, 2)), FitOptions())
+        independent = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2)) * rng.standard_normal(values.shape)
+        fit = fit_modes(frf_set(LINES_HZ, values * (1 + shared[:, None]) + independent, labels_of(6, 2)), FitOptions())
         assert_complete(fit, truth)
         errors.append(normalised_errors(fit, truth.poles))
     assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.4  # 2.7 if FRFs were taken for independent
@@ -103,15 +103,15 @@ def test_pink_noise():
 
 @pytest.fixture(name="holed")
 def holed_frfs():
-    """FRFs with hum and two stretches of noise, and where these are."""
+    """FRFs with hum and two bands of noise, and where these are."""
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    stretches = [(300.0, 330.0), (600.0, 612.0), *((hum - 1.1, hum + 1.1) for hum in np.arange(50.0, 1024.0, 50.0))]
-    hole = np.any([(low <= LINES_HZ) & (high >= LINES_HZ) for low, high in stretches], axis=0)
+    bands = [(300.0, 330.0), (600.0, 612.0), *((hum - 1.1, hum + 1.1) for hum in np.arange(50.0, 1024.0, 50.0))]
+    hole = np.any([(low <= LINES_HZ) & (high >= LINES_HZ) for low, high in bands], axis=0)
     rng = np.random.default_rng(SEED)
     size = 0.5 * np.sqrt(np.mean(np.abs(frfs.values) ** 2, axis=0))
     noise = size * (rng.standard_normal(frfs.values.shape) + 1j * rng.standard_normal(frfs.values.shape))
-    return truth, replace(frfs, values=frfs.values + hole[:, None] * noise), hole, tuple(stretches)
+    return truth, replace(frfs, values=frfs.values + hole[:, None] * noise), hole, tuple(bands)
 
 
 def test_lines_of_low_coherence_are_left_out(holed):
@@ -123,25 +123,25 @@ def test_lines_of_low_coherence_are_left_out(holed):
     assert not fit.used_lines[hole].any()
 
 
-def test_stretches_that_the_user_leaves_out(holed):
-    truth, frfs, hole, stretches = holed
-    fit = fit_modes(frfs, FitOptions(exclude_hz=stretches))
+def test_bands_that_the_user_leaves_out(holed):
+    truth, frfs, hole, bands = holed
+    fit = fit_modes(frfs, FitOptions(exclude_hz=bands))
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
     assert not fit.used_lines[hole].any()
     omega = fit.zeros.values.imag / 2 / np.pi
-    inside = [any(low + 1 < hz < high - 1 for low, high in stretches[:2]) for hz in omega]
+    inside = [any(low + 1 < hz < high - 1 for low, high in bands[:2]) for hz in omega]
     assert not fit.zeros.identifiable[np.array(inside) & (np.abs(fit.zeros.values.real) < 10)].any()
 
 
 def test_a_record_that_is_cut_off():
     truth = replace(random_modes(SPREAD, 0.001, seed=SEED))
     s, record = 2j * np.pi * LINES_HZ, 4.0
-    left = np.exp(truth.poles.real * record)
-    assert left.max() > 0.2
+    remaining_amplitude = np.exp(truth.poles.real * record)
+    assert remaining_amplitude.max() > 0.2
     half = (1 - np.exp((truth.poles - s[:, None]) * record)) / (s[:, None] - truth.poles) @ truth.residues()
-    other = (1 - np.exp((truth.poles.conj() - s[:, None]) * record)) / (s[:, None] - truth.poles.conj())
-    values = (half + other @ truth.residues().conj()) * s[:, None] ** 2
+    conjugate_half = (1 - np.exp((truth.poles.conj() - s[:, None]) * record)) / (s[:, None] - truth.poles.conj())
+    values = (half + conjugate_half @ truth.residues().conj()) * s[:, None] ** 2
     std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
     fit = fit_modes(with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), FitOptions())
     assert_complete(fit, truth)
@@ -171,7 +171,7 @@ def test_a_channel_of_zeros_has_no_zeros():
     assert 2 not in fit.zeros.frf
 
 
-def test_noise_that_nobody_has_measured():
+def test_noise_that_was_not_measured():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     fit = fit_modes(frf_set(LINES_HZ, frfs.values, frfs.labels), FitOptions())
@@ -204,7 +204,7 @@ def test_the_model_is_in_the_unit_that_was_measured(quantity):
     assert np.sqrt(np.mean((error / allowed) ** 2)) == pytest.approx(1.0, abs=0.2)  # of 108 complex numbers
 
 
-def test_an_exponential_window_is_taken_back():
+def test_an_exponential_window_is_compensated():
     truth = random_modes(SPREAD, 0.002, seed=SEED)
     s = 3.0 + 2j * np.pi * LINES_HZ
     values = exact(truth, s)
@@ -226,17 +226,17 @@ def test_delays_of_channels():
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
 
 
-def test_pinned_and_struck_poles():
+def test_pinned_and_rejected_poles():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    struck = FitOptions(strike=(RejectedPole(hz=430.0, why="the shaker's own resonance"),))
-    fit = fit_modes(frfs, struck)
+    options = FitOptions(strike=(RejectedPole(hz=430.0, why="the shaker's own resonance"),))
+    fit = fit_modes(frfs, options)
     rest = np.delete(SPREAD, 4)
     assert np.abs(np.abs(poles_of(fit)) / 2 / np.pi - 430.0).min() > 8.0
     assert all(np.abs(np.abs(poles_of(fit)) / 2 / np.pi - hz).min() < 1.0 for hz in rest)
     assert "the shaker's own resonance" in set(fit.decisions["reason"])
-    nowhere = fit_modes(frfs, FitOptions(strike=(RejectedPole(hz=250.0, why="a lamp"),)))
-    assert list(nowhere.decisions.loc[nowhere.decisions["action"] == "struck", "reason"]) == ["a lamp"]
+    without_pole = fit_modes(frfs, FitOptions(strike=(RejectedPole(hz=250.0, why="a lamp"),)))
+    assert list(without_pole.decisions.loc[without_pole.decisions["action"] == "rejected", "reason"]) == ["a lamp"]
     pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0, PinnedPole(hz=430.0, why="seen by eye"))))
     is_pinned = pinned.decisions["action"] == "pinned"
     assert list(pinned.decisions.loc[is_pinned, "reason"]) == ["the user says that a mode is here", "seen by eye"]
@@ -259,7 +259,7 @@ def test_residues_of_a_single_frf_with_poles_held():
     assert np.sqrt(np.mean(steady.misfit["ratio"] ** 2)) < 1.05
 
 
-def test_drift_between_frfs_is_said():
+def test_drift_between_frfs_is_reported():
     truth = random_modes(SPREAD, 0.001, seed=SEED)
     drift = np.linspace(-1e-4, 1e-4, 12)
     columns = [
@@ -275,7 +275,7 @@ def test_drift_between_frfs_is_said():
     assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(200, rel=0.05)
 
 
-def test_model_error_is_said():
+def test_model_error_is_reported():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     fit = fit_modes(replace(frfs, variance=frfs.variance / 4), FitOptions())
@@ -301,7 +301,7 @@ def test_too_few_lines():
         fit_modes(frfs, FitOptions(band_hz=(100.0, 102.0)))
 
 
-def test_tables_say_what_was_found():
+def test_tables_of_a_clean_fit():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions())
     assert list(fit.modes["quality"]) == ["good"] * len(SPREAD)

@@ -1,4 +1,4 @@
-"""Constant gains of channels are found where FRFs tell them, and refused where they do not."""
+"""Constant gains of channels are found where FRFs determine them, and refused where they do not."""
 
 from dataclasses import replace
 
@@ -42,10 +42,10 @@ def test_a_sensor_against_the_trusted_channels():
     of_first = [label.output_dof.node == 1 for label in fit.labels]
     np.testing.assert_array_equal(fit.gain, np.where(of_first, row.gain, 1.0))
     assert set(fit.misfit.loc[fit.misfit["frf"] == 0, "gain"]) == {row.gain}
-    assert any("the channel 'output 1:+z' records 0.8" in said for said in fit.warnings)
-    right = mode_shapes(fit_modes(measured(), FitOptions()))
-    largest = np.abs(right.shapes).max()
-    np.testing.assert_allclose(mode_shapes(fit).shapes, right.shapes, rtol=0, atol=0.01 * largest)  # 1 % of noise
+    assert any("the channel 'output 1:+z' records 0.8" in text for text in fit.warnings)
+    expected = mode_shapes(fit_modes(measured(), FitOptions()))
+    largest = np.abs(expected.shapes).max()
+    np.testing.assert_allclose(mode_shapes(fit).shapes, expected.shapes, rtol=0, atol=0.01 * largest)  # 1 % of noise
 
 
 def test_a_force_channel():
@@ -54,7 +54,7 @@ def test_a_force_channel():
     assert row["gain"] == pytest.approx(1.2, abs=STANDARD_DEVIATIONS * row["gain_std"])
 
 
-def test_errors_of_gains_are_as_large_as_said():
+def test_standard_deviations_of_gains_are_calibrated():
     errors = []
     for seed in range(12):
         fit = fit_modes(measured(seed=seed, output1=GAIN), FitOptions(gain=("output 1:+z",)))
@@ -70,7 +70,7 @@ def test_two_channels_that_record_the_same():
     rng = np.random.default_rng(3)
     noise = (rng.standard_normal(second.values.shape) + 1j * rng.standard_normal(second.values.shape)) / np.sqrt(2)
     values = (second.values + np.sqrt(second.variance) * noise) * 2.5
-    both = FrfSet(
+    frfs_of_both = FrfSet(
         frequency_hz=frfs.frequency_hz,
         values=np.hstack([frfs.values, values]),
         labels=(*frfs.labels, *labels),
@@ -78,19 +78,19 @@ def test_two_channels_that_record_the_same():
         coherence=np.hstack([frfs.coherence, second.coherence]),
         averages=np.zeros(14, int),
     )
-    row = fit_modes(both, FitOptions(gain=("second",))).channel_gains.iloc[0]
+    row = fit_modes(frfs_of_both, FitOptions(gain=("second",))).channel_gains.iloc[0]
     assert row["gain"] == pytest.approx(2.5, abs=STANDARD_DEVIATIONS * row["gain_std"])
 
 
 @pytest.mark.parametrize(
     ("channels", "message"),
     [
-        (("output 3:+z",), r"do not tell the gain of the channel 'output 3:\+z'"),
-        (("output 1:+z", "input 1:+z"), r"do not tell the gain of the channel 'output 1:\+z'"),
+        (("output 3:+z",), r"do not determine the gain of the channel 'output 3:\+z'"),
+        (("output 1:+z", "input 1:+z"), r"do not determine the gain of the channel 'output 1:\+z'"),
         (("output 1:-z",), r"which no FRF has; did you mean 'output 1:\+z'"),
     ],
 )
-def test_gains_that_the_frfs_do_not_tell(channels, message):
+def test_gains_that_the_frfs_do_not_determine(channels, message):
     with pytest.raises(InputError, match=message):
         fit_modes(measured(), FitOptions(gain=channels))
 
@@ -107,10 +107,10 @@ def test_a_flipped_channel_is_refused():
 
 def test_frfs_that_differ_by_more_than_a_gain():
     frfs = measured()
-    other = accelerances(replace(TRUTH, outputs=TRUTH.outputs * np.linspace(0.9, 1.1, 5)), LINES_HZ, seed=2)
-    values = np.where(np.arange(frfs.n_frfs) == 1, other.values, frfs.values)
+    changed = accelerances(replace(TRUTH, outputs=TRUTH.outputs * np.linspace(0.9, 1.1, 5)), LINES_HZ, seed=2)
+    values = np.where(np.arange(frfs.n_frfs) == 1, changed.values, frfs.values)
     fit = fit_modes(replace(frfs, values=values), FitOptions(gain=("output 1:+z",)))
-    assert any("differ by more than a gain" in said for said in fit.warnings)
+    assert any("differ by more than a gain" in text for text in fit.warnings)
 
 
 def test_gains_from_known_shapes():

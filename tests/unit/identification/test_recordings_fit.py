@@ -73,7 +73,7 @@ def test_free_beam_weighs_the_same_by_three_of_its_modes(recordings, beam_fit):
     along = np.array([dof.direction == "z" for dof in model.all_dofs], float)  # a translation
     total = along @ (model.mass_all @ along)
     masses = total * shapes / measured
-    by_three = masses[[0, 1, 3]]  # the third mode has its node there: its mass says little
+    by_three = masses[[0, 1, 3]]  # the third mode has its node there: its mass is hardly determined
     np.testing.assert_allclose(by_three, by_three.mean(), rtol=0.05, atol=0)
 
 
@@ -87,8 +87,8 @@ def test_driving_point_of_the_free_beam_is_lower_than_the_others(recordings, bea
 
 
 @pytest.mark.slow
-def test_free_beam_does_not_tell_gains_by_itself(beam):
-    with pytest.raises(InputError, match=r"do not tell the gain of the channel 'input 99:\+z'"):
+def test_free_beam_does_not_determine_gains_by_itself(beam):
+    with pytest.raises(InputError, match=r"do not determine the gain of the channel 'input 99:\+z'"):
         fit_modes(beam, replace(BEAM_BAND, gain=("input 99:+z",)))
 
 
@@ -116,19 +116,19 @@ def test_ninth_file_of_the_free_beam_with_poles_held(beam):
 def test_steel_beam(recordings):
     frfs = frfs_of(recordings / "steel_beam_5x3" / "test.toml")
     fit = fit_modes(frfs, FitOptions(band_hz=(1.0, 600.0)))
-    seen = (32.7, 51.9, 93.1, 105.7, 172.4, 183.7, 289.0, 377.3, 437.5, 450.1)  # peaks of the plots
-    found = frequencies(fit)
-    assert all(np.abs(found / hz - 1).min() < 5e-3 for hz in seen)
+    peaks = (32.7, 51.9, 93.1, 105.7, 172.4, 183.7, 289.0, 377.3, 437.5, 450.1)  # peaks of the plots
+    natural_hz = frequencies(fit)
+    assert all(np.abs(natural_hz / hz - 1).min() < 5e-3 for hz in peaks)
     assert 13 <= fit.n_modes <= 16
     assert fit.misfit.groupby("frf")["ratio"].median().max() < 1.5
 
 
-def test_raw_blows_of_a_lightly_damped_structure(recordings):
+def test_raw_impacts_of_a_lightly_damped_structure(recordings):
     frfs = frfs_of(recordings / "raw_hammer" / "test.toml")
     fit = fit_modes(frfs, FitOptions(band_hz=(500.0, 6500.0)))
     peaks = (810.3, 851.6, 900.0, 2640.2, 3007.5, 3035.3, 3669.0, 3689.4, 4127.6, 4163.2, 4391.7, 4421.0, 4470.0)
-    found = frequencies(fit)
-    assert all(np.abs(found / hz - 1).min() < 1e-3 for hz in (*peaks, 5031.0, 5073.8, 5969.6, 6076.7))
+    natural_hz = frequencies(fit)
+    assert all(np.abs(natural_hz / hz - 1).min() < 1e-3 for hz in (*peaks, 5031.0, 5073.8, 5969.6, 6076.7))
     assert fit.n_modes < 40
     assert "times the noise of the recordings" in fit.warnings[0]
     used = fit.used_lines

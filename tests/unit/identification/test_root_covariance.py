@@ -9,13 +9,13 @@ from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
 EXACT = 1e-13  # rounding of a sum of five products
 
 
-@pytest.fixture(name="both")
+@pytest.fixture(name="forms")
 def both_forms():
     rng = np.random.default_rng(3)
     common = rng.standard_normal((8, 5))
     parts = [rng.standard_normal((4, 6)) for _ in range(2)]
-    own = sparse.block_diag([part @ part.T for part in parts], format="csr")
-    return RootCovariance(common=common, own=own), common @ common.T + own.toarray()
+    blocks = sparse.block_diag([part @ part.T for part in parts], format="csr")
+    return RootCovariance(common=common, blocks=blocks), common @ common.T + blocks.toarray()
 
 
 @pytest.mark.parametrize(
@@ -31,15 +31,15 @@ def both_forms():
     ],
     ids=["ix", "slices", "column", "row", "number", "negative", "empty"],
 )
-def test_indexing(both, key):
-    covariance, dense = both
+def test_indexing(forms, key):
+    covariance, dense = forms
     key = tuple(np.asarray(part, int) if isinstance(part, np.ndarray) else part for part in key)
     assert np.shape(covariance[key]) == dense[key].shape
     np.testing.assert_allclose(covariance[key], dense[key], rtol=EXACT, atol=EXACT)
 
 
-def test_diagonal_blocks_and_array(both):
-    covariance, dense = both
+def test_diagonal_blocks_and_array(forms):
+    covariance, dense = forms
     assert covariance.shape == dense.shape
     np.testing.assert_allclose(covariance.diagonal(), np.diagonal(dense), rtol=EXACT)
     np.testing.assert_allclose(np.diagonal(covariance), np.diagonal(dense), rtol=EXACT)

@@ -1,4 +1,4 @@
-"""Whether the even and the odd lines, each fitted by itself, agree within what is said, and what is said if not."""
+"""Even and odd lines, each fitted by itself, agree within the stated standard deviations, which are raised if not."""
 
 from dataclasses import replace
 
@@ -43,8 +43,8 @@ def four_modes(*, detuned=0.0):
     )
 
 
-def on_even_lines(frfs, others):
-    return replace(frfs, values=np.where(EVEN[:, None], others.values, frfs.values))
+def on_even_lines(frfs, frfs_there):
+    return replace(frfs, values=np.where(EVEN[:, None], frfs_there.values, frfs.values))
 
 
 def halves_of(frfs, options):
@@ -54,9 +54,9 @@ def halves_of(frfs, options):
 
 def partners(first, second):
     a, b = (fit.model.poles[: fit.n_modes] for fit in (first, second))
-    apart = np.abs(a[:, None] - b) / np.minimum(-a.real[:, None], -b.real)
-    i, j = linear_sum_assignment(np.minimum(apart, 2.0))
-    same = apart[i, j] < SAME
+    distance = np.abs(a[:, None] - b) / np.minimum(-a.real[:, None], -b.real)
+    i, j = linear_sum_assignment(np.minimum(distance, 2.0))
+    same = distance[i, j] < SAME
     return i[same], j[same]
 
 
@@ -65,32 +65,32 @@ def differences(first, second):
     i, j = partners(first, second)
     good = (first.modes["quality"].to_numpy()[i] != "poor") & (second.modes["quality"].to_numpy()[j] != "poor")
     i, j = i[good], j[good]
-    apart = first.model.poles[i] - second.model.poles[j]
+    difference = first.model.poles[i] - second.model.poles[j]
     variance = pair_blocks(first.covariance)[i] + pair_blocks(second.covariance)[j]
-    return np.stack([apart.real, apart.imag], 1) / np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
+    return np.stack([difference.real, difference.imag], 1) / np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
 
 def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def test_modes_that_both_halves_have_are_not_doubted():
+def test_modes_of_both_halves_are_confirmed():
     fit = fit_modes(four_modes(), FitOptions())
     assert fit.warnings == ()
     assert list(fit.modes["quality"]) == ["good"] * 4
-    assert "doubted" not in set(fit.decisions["action"])
+    assert "unconfirmed" not in set(fit.decisions["action"])
 
 
-def test_a_mode_of_one_half_is_doubted():
-    truth, more = random_modes(FOUR, 0.01, seed=SEED), random_modes(np.array([260.0]), 0.01, seed=SEED)
+def test_a_mode_of_one_half_is_unconfirmed():
+    truth, extra = random_modes(FOUR, 0.01, seed=SEED), random_modes(np.array([260.0]), 0.01, seed=SEED)
     frfs = four_modes()
-    added = 0.3 * accelerances(more, LINES_HZ, noise=0.0).values
+    added = 0.3 * accelerances(extra, LINES_HZ, noise=0.0).values
     fit = fit_modes(replace(frfs, values=frfs.values + np.where(EVEN[:, None], added, 0.0)), FitOptions())
-    doubtful = np.abs(fit.modes["frequency_hz"] - 260.0) < 2.0
-    assert doubtful.sum() == 1
-    assert list(fit.modes["quality"]) == np.where(doubtful, "poor", "good").tolist()
-    row = fit.decisions[fit.decisions["action"] == "doubted"].squeeze()
-    assert row["frequency_hz"] == fit.modes["frequency_hz"][doubtful].item()
+    is_poor = np.abs(fit.modes["frequency_hz"] - 260.0) < 2.0
+    assert is_poor.sum() == 1
+    assert list(fit.modes["quality"]) == np.where(is_poor, "poor", "good").tolist()
+    row = fit.decisions[fit.decisions["action"] == "unconfirmed"].squeeze()
+    assert row["frequency_hz"] == fit.modes["frequency_hz"][is_poor].item()
     assert row["reason"].startswith("comes up in one half only of the lines")
     assert "1 of 5 modes do not come up in both halves" in fit.warnings[0]
     assert count_within(fit, truth) == 4
@@ -115,18 +115,18 @@ def test_halves_that_differ_raise_the_standard_deviations():
     assert set(fit.modes["quality"]) == {"good"}
 
 
-def cut_off(frfs, at_s, left):
-    """Weaken what comes after a time, as an analyser's window does: no linear model follows."""
+def cut_off(frfs, at_s, remaining_amplitude):
+    """Weaken the signal after a time, as an analyser's window does: no linear model follows."""
     spectrum = np.concatenate([np.zeros((1, frfs.n_frfs)), frfs.values])
     signal = np.fft.irfft(spectrum, axis=0)
     time = np.arange(len(signal)) / (2 * frfs.frequency_hz[-1])
-    window = np.where(time < at_s, 1.0, left * np.exp(-np.maximum(time - at_s, 0.0) / (1.3 * at_s)))
+    window = np.where(time < at_s, 1.0, remaining_amplitude * np.exp(-np.maximum(time - at_s, 0.0) / (1.3 * at_s)))
     return replace(frfs, values=np.fft.rfft(signal * window[:, None], axis=0)[1:])
 
 
 @pytest.mark.slow
 def test_halves_agree_where_a_window_makes_model_error():
-    found, errors = [], []
+    normalised, counts = [], []
     truth = random_modes(np.array([55.0, 98.0, 140.0, 188.0, 231.0, 290.0, 341.0]), 0.015, seed=SEED)
     for seed, at_s in enumerate((0.04, 0.055, 0.08)):
         exact = accelerances(truth, LINES_HZ, noise=0.0)
@@ -134,10 +134,10 @@ def test_halves_agree_where_a_window_makes_model_error():
         frfs = unmeasured(cut_off(exact, at_s, 0.97))
         frfs = replace(frfs, values=frfs.values + noisy.values - exact.values)
         first, second = halves_of(frfs, FitOptions())
-        found.append(differences(first, second))
-        errors.append(len(found[-1]))
-    assert min(errors) > 0
-    assert rms(np.concatenate(found)) < WITHIN
+        normalised.append(differences(first, second))
+        counts.append(len(normalised[-1]))
+    assert min(counts) > 0
+    assert rms(np.concatenate(normalised)) < WITHIN
 
 
 @pytest.mark.slow
@@ -153,7 +153,7 @@ def test_halves_agree_where_a_window_makes_model_error():
 def test_halves_of_real_measurements(recordings, name, band_hz, fewest, share):
     frfs = recorded(recordings / name)
     first, second = halves_of(frfs, FitOptions(band_hz=band_hz))
-    found = differences(first, second)
-    assert len(found) >= fewest  # modes that neither half marks as poor
+    normalised = differences(first, second)
+    assert len(normalised) >= fewest  # modes that neither half marks as poor
     assert len(partners(first, second)[0]) >= share * (first.n_modes + second.n_modes) / 2
-    assert rms(found) < WITHIN
+    assert rms(normalised) < WITHIN

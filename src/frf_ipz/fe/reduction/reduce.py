@@ -21,9 +21,9 @@ from frf_ipz.dofs import Dof
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
-from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_ratios
+from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
-from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_rows, condition_number
+from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
 from frf_ipz.structure import ReducedModel, StructuralModel
 
 if TYPE_CHECKING:
@@ -212,12 +212,12 @@ def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> In
     wanted, count = [model.index(dof) for dof in plan.wanted], ritz.shapes.shape[1]
     translations = np.array([row for row, dof in enumerate(dofs) if not dof.direction.startswith("r")], dtype=np.int64)
     if translations.size >= count:
-        rows = choose_rows(ritz.shapes, wanted, translations, count)
+        rows = choose_retained_rows(ritz.shapes, wanted, translations, count)
         if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
             return rows
     # rotations have another unit: only the directions of the rows can be compared
     lengths = np.linalg.norm(ritz.shapes, axis=1, keepdims=True)
-    return choose_rows(ritz.shapes / np.where(lengths > 0, lengths, 1.0), wanted, np.arange(len(dofs)), count)
+    return choose_retained_rows(ritz.shapes / np.where(lengths > 0, lengths, 1.0), wanted, np.arange(len(dofs)), count)
 
 
 def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:
@@ -237,7 +237,7 @@ def _reduced(
     inverse = linalg.inv(ritz.shapes[rows])
     mass, stiffness = _gram(inverse), _gram(np.sqrt(ritz.eigenvalues)[:, None] * inverse)
     _require_modes(mass, stiffness, ritz)
-    ratios = stated_ratios(model.modal_damping, len(ritz.eigenvalues), ritz.n_rigid)
+    ratios = stated_damping_ratios(model.modal_damping, len(ritz.eigenvalues), ritz.n_rigid)
     rates = 2 * ratios * np.sqrt(ritz.eigenvalues)
     viscous = ritz.shapes.T @ multiply(model.damping, ritz.shapes)
     dashpots = inverse.T @ ((viscous + viscous.T) / 2) @ inverse

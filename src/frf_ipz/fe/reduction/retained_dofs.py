@@ -41,7 +41,7 @@ def condition_number(shapes: FloatArray) -> float:
     return float(np.linalg.cond(shapes / lengths[:, None]))
 
 
-def choose_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int) -> IntArray:
+def choose_retained_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int) -> IntArray:
     """Choose DOFs at which modes are as independent as can be.
 
     Those wanted come first, in their order, as long as they are independent of each other; the others follow by

@@ -1,4 +1,4 @@
-"""Thousands of measured lines compressed into a small triangular system that says the same about the model.
+"""Thousands of measured lines compressed into a small triangular system with the same likelihood.
 
 Around poles p every FRF f is linear: ``h_f = S c_f + Phi(p) R_f + D(p) T(R_f) dp``, with smooth columns S, partial
 fractions Phi, and D their derivative. The weighted columns ``B = [S, Phi, D]`` are reduced to ``B = Q U``; then
@@ -19,21 +19,21 @@ from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-    from frf_ipz.identification.measured_lines import Weighted
+    from frf_ipz.identification.measured_lines import WeightedLines
 
 WORST_PIVOT = 1e-6  # of a unit column: below, the normal equations lose too many digits and QR is taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Compressed:
+class CompressedSystem:
     """The triangular system around some poles.
 
     Parameters
     ----------
     poles : (n_poles,) complex array
-        Where it was taken, rad/s.
+        Poles around which the system is linear, rad/s.
     n_smooth : int
-        Number of smooth columns; then come those of the residues and 2 n_poles of the poles' changes.
+        Number of smooth columns; the columns of the residues follow, then 2 n_poles of the changes of the poles.
     real_modes : bool
         Residues have imaginary parts only: n_poles columns; otherwise 2 n_poles, real parts first.
     U : (n_systems, n, n) array
@@ -113,12 +113,12 @@ class Compressed:
         return np.asarray((self.scaled_residues() / self.scale[:, None]).T)
 
 
-def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compressed:
+def compress(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> CompressedSystem:
     """Compress the data around poles.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
     poles : (n_poles,) complex array
         rad/s.
@@ -127,7 +127,7 @@ def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compres
 
     Returns
     -------
-    Compressed
+    CompressedSystem
         The small system.
     """
     columns = model_columns(data.s, poles, terms, real_modes=data.real_modes, with_slopes=True)
@@ -144,7 +144,7 @@ def compress(data: Weighted, poles: ComplexArray, terms: SmoothTerms) -> Compres
         systems = np.stack([U for U, _ in reduced])
         right = np.stack([z[:, 0] for _, z in reduced])
         total = np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0)
-    return Compressed(
+    return CompressedSystem(
         poles=poles,
         n_smooth=terms.n_columns,
         real_modes=data.real_modes,
@@ -171,24 +171,24 @@ def model_columns(
     real_modes : bool
         Residues have imaginary parts only.
     with_slopes : bool
-        Add the columns of the poles' changes.
+        Add the columns of the changes of the poles.
 
     Returns
     -------
     (2 n, n_columns) array
-        Smooth ones, residues, and slopes.
+        Smooth columns, those of the residues, and slopes.
     """
     residues = pair_columns(s, poles)
     parts = [terms.columns(s), residues[:, len(poles) :] if real_modes else residues]
     return np.concatenate([*parts, pair_columns(s, poles, power=2)] if with_slopes else parts, axis=1)
 
 
-def response(system: Compressed, terms: SmoothTerms, s: ComplexArray) -> ComplexArray:
+def response(system: CompressedSystem, terms: SmoothTerms, s: ComplexArray) -> ComplexArray:
     """Evaluate the model.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The fit.
     terms : SmoothTerms
         What lies out of band.
@@ -221,7 +221,9 @@ def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
     """
     if len(U) == 1:
         return np.asarray(linalg.solve_triangular(U[0], z.T, check_finite=False).T)
-    return np.stack([linalg.solve_triangular(one, side, check_finite=False) for one, side in zip(U, z, strict=True)])
+    return np.stack(
+        [linalg.solve_triangular(upper, side, check_finite=False) for upper, side in zip(U, z, strict=True)]
+    )
 
 
 def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -230,10 +232,10 @@ def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArr
     columns = columns / length
     try:
         U = linalg.cholesky(columns.T @ columns, check_finite=False)
-        safe = bool(np.min(np.diag(U)) > WORST_PIVOT)
+        is_accurate = bool(np.min(np.diag(U)) > WORST_PIVOT)
     except linalg.LinAlgError:
-        safe = False
-    if safe:
+        is_accurate = False
+    if is_accurate:
         return U * length, linalg.solve_triangular(U, columns.T @ rows, trans="T", check_finite=False)
     Q, U = np.linalg.qr(columns)
     return U * length, Q.T @ rows

@@ -1,7 +1,7 @@
-"""Pure delays of output channels: filters and converters that answer late.
+"""Pure delays of output channels, as filters and converters cause them.
 
 Poles held, the best delay is where residues and smooth terms explain the most of ``exp(s delay) y``. Delays and
-residues are far from alike over a band of several modes, so a grid that is refined finds it.
+residues act very differently over a band of several modes, so a grid that is refined finds it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from frf_ipz.numerics.partial_fractions import stacked
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
-    from frf_ipz.identification.measured_lines import Weighted
+    from frf_ipz.identification.measured_lines import WeightedLines
 
 EARLIEST, LATEST = -1.0, 3.0  # periods of the highest frequency
 STEPS = 81
@@ -24,12 +24,12 @@ FINER = 0.1  # of the step, each time the grid is refined
 REFINEMENTS = 5
 
 
-def find_delays(data: Weighted, poles: ComplexArray, terms: SmoothTerms, channels: IntArray) -> FloatArray:
+def find_delays(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, channels: IntArray) -> FloatArray:
     """Find the delay of each channel.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
     poles : (n_poles,) complex array
         rad/s.
@@ -49,9 +49,9 @@ def find_delays(data: Weighted, poles: ComplexArray, terms: SmoothTerms, channel
     period = 2 * np.pi / float(np.abs(data.s[-1]))
     delays = np.zeros(len(channels))
     for channel in np.unique(channels):
-        mine = np.flatnonzero(channels == channel)
-        rows = data.receptance[:, mine] * weight[:, None] * data.gain[mine]
-        delays[mine] = _best_delay(rows, data.s, basis, period)
+        frfs = np.flatnonzero(channels == channel)
+        rows = data.receptance[:, frfs] * weight[:, None] * data.gain[frfs]
+        delays[frfs] = _best_delay(rows, data.s, basis, period)
     return delays
 
 

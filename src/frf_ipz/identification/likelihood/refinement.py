@@ -16,8 +16,8 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, compress
-from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.identification.likelihood.compression import CompressedSystem, compress
+from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.rational import damping_ratio
 
 if TYPE_CHECKING:
@@ -25,32 +25,32 @@ if TYPE_CHECKING:
 
 MAX_ITERATIONS = 30
 SMALL_GAIN = 0.02  # of minus twice the log likelihood: less is no gain that data could show
-LONGEST_STEP = 0.7  # of a pole's distance from the imaginary axis, or of a line where that is larger
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-4, 1e-10, 1e8  # of the step, by the diagonal of the information
+MAX_STEP = 0.7  # of a pole's distance from the imaginary axis, or of a line where that is larger
+FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-4, 1e-10, 1e8  # of the step, by the diagonal of the information
 MAX_RATIO = 0.4  # damping ratio above which a pole is no mode but background
 MERGED = 0.02  # of the distance from the axis: two poles closer than this are one
-BESIDE = (0.7, 1.1)  # a free pole may leave the band by that much
+POLE_BAND = (0.7, 1.1)  # of the edges of the band: how far a pole may leave it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Refined:
+class RefinedPoles:
     """Poles at the optimum.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The data around the poles.
     information : (2 n_poles, 2 n_poles) array
         Fisher information of the poles: all real parts, then all imaginary parts.
-    lost : (n_lost,) complex array
-        Poles that the iteration gave up: they ran out of the band, into the background or into one another.
+    discarded : (n_discarded,) complex array
+        Poles that were discarded: they left the band, became background, or merged with another.
     has_converged : bool
         No step gains anything that data could show.
     """
 
-    system: Compressed
+    system: CompressedSystem
     information: FloatArray
-    lost: ComplexArray
+    discarded: ComplexArray
     has_converged: bool
 
     @property
@@ -64,12 +64,14 @@ class Refined:
         return float(np.sum(self.system.misfit))
 
 
-def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iterations: int = MAX_ITERATIONS) -> Refined:
+def refine_poles(
+    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, *, iterations: int = MAX_ITERATIONS
+) -> RefinedPoles:
     """Iterate poles to the maximum of the likelihood.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
     poles : (n_poles,) complex array
         Where to start, rad/s.
@@ -80,13 +82,13 @@ def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iteration
 
     Returns
     -------
-    Refined
+    RefinedPoles
         The optimum.
     """
     line = float(np.median(np.diff(data.s.imag)))
     band = float(data.s.imag[0]), float(data.s.imag[-1])
-    lost: list[complex] = []
-    system, poles = _without_lost(data, poles, terms, band, lost)
+    discarded: list[complex] = []
+    system, poles = _compress_valid(data, poles, terms, band, discarded)
     damping, count, has_converged = FIRST_DAMPING, 0, False
     information, gradient = normal_equations(system)
     while count < iterations and len(system.poles):
@@ -95,26 +97,28 @@ def refine(data: Weighted, poles: ComplexArray, terms: SmoothTerms, *, iteration
         if gain < SMALL_GAIN:
             has_converged = True
             break
-        trial = compress(data, _moved(system.poles, step, line), terms)
+        trial = compress(data, _stepped_poles(system.poles, step, line), terms)
         if np.sum(trial.misfit) > np.sum(system.misfit):
             damping *= 10
-            if damping > MOST_DAMPING:
+            if damping > MAX_DAMPING:
                 break
             continue
-        damping = max(damping / 10, LEAST_DAMPING)
+        damping = max(damping / 10, MIN_DAMPING)
         system = trial
-        if (_gone(system.poles, band)).any():
-            system, _ = _without_lost(data, system.poles, terms, band, lost)
+        if _is_invalid(system.poles, band).any():
+            system, _ = _compress_valid(data, system.poles, terms, band, discarded)
         information, gradient = normal_equations(system)
-    return Refined(system=system, information=information, lost=np.array(lost, complex), has_converged=has_converged)
+    return RefinedPoles(
+        system=system, information=information, discarded=np.array(discarded, complex), has_converged=has_converged
+    )
 
 
-def normal_equations(system: Compressed) -> tuple[FloatArray, FloatArray]:
+def normal_equations(system: CompressedSystem) -> tuple[FloatArray, FloatArray]:
     """Information and gradient of the poles, residues eliminated.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The data around the poles.
 
     Returns
@@ -129,12 +133,12 @@ def normal_equations(system: Compressed) -> tuple[FloatArray, FloatArray]:
     return flat.T @ flat, flat.T @ system.z[:, system.n_linear :].ravel()
 
 
-def pole_jacobian(system: Compressed) -> FloatArray:
-    """Differentiate each FRF by the poles, less what residues can follow.
+def pole_jacobian(system: CompressedSystem) -> FloatArray:
+    """Differentiate each FRF by the poles, without the part that residues can follow.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The data around the poles.
 
     Returns
@@ -158,27 +162,28 @@ def _damped_step(information: FloatArray, gradient: FloatArray, damping: float) 
     return step, float(2 * step @ gradient - step @ information @ step)
 
 
-def _moved(poles: ComplexArray, step: FloatArray, line: float) -> ComplexArray:
+def _stepped_poles(poles: ComplexArray, step: FloatArray, line: float) -> ComplexArray:
     n = len(poles)
     change = step[:n] + 1j * step[n:]
-    longest = LONGEST_STEP * np.maximum(-poles.real, line / 4)
-    change *= np.minimum(1.0, longest / np.maximum(np.abs(change), np.finfo(float).tiny))
+    limit = MAX_STEP * np.maximum(-poles.real, line / 4)
+    change *= np.minimum(1.0, limit / np.maximum(np.abs(change), np.finfo(float).tiny))
     moved = poles + change
     # a pole stays in the left half plane and in the upper one
     real = np.where(moved.real < 0, moved.real, 0.3 * poles.real)
     return np.asarray(real + 1j * np.abs(moved.imag))
 
 
-def _gone(poles: ComplexArray, band: tuple[float, float]) -> BoolArray:
-    outside = (poles.imag < BESIDE[0] * band[0]) | (poles.imag > BESIDE[1] * band[1])
+def _is_invalid(poles: ComplexArray, band: tuple[float, float]) -> BoolArray:
+    """Mark poles outside the band, overdamped ones, and all but one of those that have merged."""
+    outside = (poles.imag < POLE_BAND[0] * band[0]) | (poles.imag > POLE_BAND[1] * band[1])
     distance = np.abs(poles[:, None] - poles)
     closest = np.where(np.tri(len(poles), dtype=bool), np.inf, distance).min(axis=1, initial=np.inf)
     return np.asarray(outside | (damping_ratio(poles) > MAX_RATIO) | (closest < MERGED * -poles.real))
 
 
-def _without_lost(
-    data: Weighted, poles: ComplexArray, terms: SmoothTerms, band: tuple[float, float], lost: list[complex]
-) -> tuple[Compressed, ComplexArray]:
-    gone = _gone(poles, band)
-    lost.extend(poles[gone].tolist())
-    return compress(data, poles[~gone], terms), poles[~gone]
+def _compress_valid(
+    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, band: tuple[float, float], discarded: list[complex]
+) -> tuple[CompressedSystem, ComplexArray]:
+    invalid = _is_invalid(poles, band)
+    discarded.extend(poles[invalid].tolist())
+    return compress(data, poles[~invalid], terms), poles[~invalid]

@@ -1,4 +1,4 @@
-"""How much larger errors of poles are where the misfit is not white: lines, and FRFs, that err alike.
+"""How much larger errors of poles are where the misfit is not white: errors that lines, or FRFs, have in common.
 
 The covariance of an optimum is ``I^-1 B I^-1`` with the information I and the covariance B of the score, which is
 ``I`` itself for white noise [Huber1967]. B is found from the score of each line, summed over the FRFs: a structure
@@ -19,25 +19,25 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.identification.likelihood.compression import model_columns, response
-from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.numerics.partial_fractions import stacked
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.likelihood.refinement import Refined
+    from frf_ipz.identification.likelihood.refinement import RefinedPoles
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
-NEIGHBOURS = (0, 2)  # lines on either side whose scores count as alike; the larger result is taken
-MOST_LEVERAGE = 0.95  # of a line that the coefficients follow nearly by themselves
+LAGS = (0, 2)  # lines on either side whose scores count as correlated; the larger result is taken
+MAX_LEVERAGE = 0.95  # of a line that the coefficients follow nearly by themselves
 
 
-def levels_of_poles(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray:
+def pole_variance_factors(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
     """Find the factor on the variance of each pole that the misfit shows.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
-    fit : Refined
+    fit : RefinedPoles
         The fit.
     terms : SmoothTerms
         What lies out of band.
@@ -50,19 +50,19 @@ def levels_of_poles(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatAr
     scores = _scores(data, fit, terms)
     inverse = np.linalg.pinv(fit.information, hermitian=True)
     expected = np.diag(inverse)
-    found = [np.einsum("ij,jk,ki->i", inverse, _covariance(scores, reach), inverse) for reach in NEIGHBOURS]
-    return np.asarray(np.max(found, axis=0) / expected)
+    variances = [np.einsum("ij,jk,ki->i", inverse, _score_covariance(scores, max_lag), inverse) for max_lag in LAGS]
+    return np.asarray(np.max(variances, axis=0) / expected)
 
 
-def _covariance(scores: FloatArray, reach: int) -> FloatArray:
+def _score_covariance(scores: FloatArray, max_lag: int) -> FloatArray:
     total = scores.T @ scores
-    for lag in range(1, reach + 1):
+    for lag in range(1, max_lag + 1):
         shifted = scores[lag:].T @ scores[:-lag]
-        total += (1 - lag / (reach + 1)) * (shifted + shifted.T)
+        total += (1 - lag / (max_lag + 1)) * (shifted + shifted.T)
     return np.asarray(total)
 
 
-def _scores(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray:
+def _scores(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
     """Gradient of the log likelihood by the poles on each line, (n_lines, 2 n_poles), all FRFs together."""
     system = fit.system
     n_lines, n_poles = len(data.s), system.n_poles
@@ -76,9 +76,9 @@ def _scores(data: Weighted, fit: Refined, terms: SmoothTerms) -> FloatArray:
         basis = np.linalg.qr(weighted[:, : system.n_linear])[0]
         slopes = weighted[:, system.n_linear :]
         real, imag = np.split(slopes - basis @ (basis.T @ slopes), 2, axis=1)
-        leverage = np.minimum(np.einsum("ij,ij->i", basis, basis), MOST_LEVERAGE)
-        raised = misfit[:, frfs] / np.sqrt(1 - leverage)[:, None]
-        a, b = raised @ residues[frfs].real, raised @ residues[frfs].imag
+        leverage = np.minimum(np.einsum("ij,ij->i", basis, basis), MAX_LEVERAGE)
+        corrected = misfit[:, frfs] / np.sqrt(1 - leverage)[:, None]
+        a, b = corrected @ residues[frfs].real, corrected @ residues[frfs].imag
         by_poles = np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
         scores += by_poles[:n_lines] + by_poles[n_lines:]
     return scores

@@ -1,4 +1,4 @@
-"""What modes outside the band leave inside it: smooth terms, linear in their coefficients.
+"""The part of modes outside the band inside it: smooth terms, linear in their coefficients.
 
 In receptance these are ``1/s^2`` of rigid-body motion and modes far below, a constant of modes far above, and for modes
 that are not so far pairs of fixed poles beside the band. A rational function with poles on both sides of the band takes
@@ -19,7 +19,9 @@ from frf_ipz.numerics.partial_fractions import pair_columns, stacked
 
 ABOVE = (1.3, 1.08, 2.0)  # fixed poles above the band, in the order in which they are taken, by its highest frequency
 BELOW = (0.5, 0.9)  # the same below, by its lowest frequency
-BROAD = 0.02  # damping ratio of a fixed pole: its residue is complex, so that it takes damping out of band as well
+FIXED_DAMPING = (
+    0.02  # damping ratio of a fixed pole: its residue is complex, so that it takes damping out of band as well
+)
 POWERS = (0, -2)
 
 
@@ -64,22 +66,22 @@ class SmoothTerms:
         return np.concatenate([*powers, *pairs], axis=1)
 
     def first(self, n_fixed: int) -> SmoothTerms:
-        """Keep the first fixed poles only.
+        """Select the first fixed poles.
 
         Parameters
         ----------
         n_fixed : int
-            How many.
+            Number of fixed poles.
 
         Returns
         -------
         SmoothTerms
-            Fewer terms.
+            With these fixed poles.
         """
         return SmoothTerms(powers=self.powers, poles=self.poles[:n_fixed], scale_rad_s=self.scale_rad_s)
 
 
-def all_terms(band_hz: tuple[float, float], spacing_hz: float) -> SmoothTerms:
+def smooth_terms_of_band(band_hz: tuple[float, float], spacing_hz: float) -> SmoothTerms:
     """All the smooth terms that a band may need, the most useful first.
 
     Parameters
@@ -92,12 +94,12 @@ def all_terms(band_hz: tuple[float, float], spacing_hz: float) -> SmoothTerms:
     Returns
     -------
     SmoothTerms
-        Terms.
+        Powers of s and fixed poles.
     """
     low, high = band_hz
     below = BELOW if low > 10 * spacing_hz else ()
     frequencies = [high * ABOVE[0], *(low * ratio for ratio in below[:1]), high * ABOVE[1]]
     frequencies += [*(low * ratio for ratio in below[1:]), high * ABOVE[2]]
     omega = 2 * np.pi * np.array(frequencies)
-    poles = omega * (-BROAD + 1j * np.sqrt(1 - BROAD**2))
+    poles = omega * (-FIXED_DAMPING + 1j * np.sqrt(1 - FIXED_DAMPING**2))
     return SmoothTerms(powers=POWERS, poles=poles, scale_rad_s=2 * np.pi * high)

@@ -1,9 +1,9 @@
 """Constant gains of channels: amplifiers set wrongly, sensitivities that are not those of the data sheet.
 
-A recorded channel is its gain times the true signal. Poles and zeros do not tell a gain, and residues take any in. It
-shows only where two FRFs must be equal but for gains: the same two DOFs with blow and sensor exchanged (reciprocity),
-or the same FRF recorded by two channels. So a user names the channels that are in doubt, and all others are trusted.
-Shapes that are known from elsewhere tell more: one gain an FRF, against all the others.
+A recorded channel is its gain times the true signal. Poles and zeros do not depend on a gain, and residues follow any.
+It shows only where two FRFs must be equal but for gains: the same two DOFs with excitation and sensor exchanged
+(reciprocity), or the same FRF recorded by two channels. So a user names the channels whose gain is unknown, and all
+others are trusted. Known shapes, as those of an FE model, show more: one gain an FRF, relative to the other FRFs.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from frf_ipz.modes import ModeSet
 
 ITERATIONS = 20  # of the ratio of two FRFs; of gains and scales in turn
-UNKNOWN = 1e-6  # part of a gain that equations leave open: above, they do not tell it
+UNDETERMINED = 1e-6  # part of a gain that the equations leave open: above, they do not determine it
 DIFFERENT = 3.0  # mean square over that of noise, above which two FRFs differ by more than a gain
 SHAPE_ERROR = 0.02  # of the largest product of a mode: what computed shapes are trusted to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ChannelGains:
-    """Gains of the channels in doubt.
+    """Gains of the channels whose gain is unknown.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class ChannelGains:
     remarks: tuple[str, ...]
 
 
-def find_gains(
+def find_channel_gains(
     labels: Sequence[FrfLabel], residues: ComplexArray, covariance: FloatArray, channels: Sequence[str]
 ) -> ChannelGains:
-    """Find the gains of the channels in doubt.
+    """Find the gains of some channels.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def find_gains(
     covariance : (n_modes, n_frfs, 2, 2) array
         Of their real and imaginary parts.
     channels : sequence of str
-        Those in doubt.
+        Those whose gain is unknown.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def find_gains(
     Raises
     ------
     InputError
-        If a channel does not exist, if the FRFs do not tell its gain, or if two FRFs have opposite signs.
+        If a channel does not exist, if the FRFs do not determine its gain, or if two FRFs have opposite signs.
     """
     if not channels:
         ones = np.ones(len(labels))
@@ -104,22 +104,24 @@ def find_gains(
         rows.append(row)
         values.append(np.log(abs(ratio)))
         weights.append(abs(ratio) / (std * np.sqrt(max(spread, 1.0))))
-    found, root = _solved(np.array(rows).reshape(-1, len(channels)), np.array(values), np.array(weights), channels)
-    gain, of_frf = np.exp(found), np.exp(exponents @ found)
+    log_gain, root = _solve_log_gains(
+        np.array(rows).reshape(-1, len(channels)), np.array(values), np.array(weights), channels
+    )
+    gain, of_frf = np.exp(log_gain), np.exp(exponents @ log_gain)
     table = pd.DataFrame({"channel": list(channels), "gain": gain, "gain_std": gain * np.linalg.norm(root, axis=1)})
-    remarks += [_said(*row) for row in table.itertuples(index=False)]
+    remarks += [_remark(*row) for row in table.itertuples(index=False)]
     of_frf_std = of_frf * np.linalg.norm(exponents @ root, axis=1)
     return ChannelGains(table=table, of_frf=of_frf, of_frf_std=of_frf_std, remarks=tuple(remarks))
 
 
-def _said(channel: str, gain: float, std: float) -> str:
+def _remark(channel: str, gain: float, std: float) -> str:
     return f"the channel '{channel}' records {gain:.4g} times the true signal (standard deviation {std:.2g})"
 
 
 def gains_from_shapes(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
-    """Find one gain an FRF, against shapes that are known from elsewhere, such as those of an FE model.
+    """Find one gain an FRF from known shapes, such as those of an FE model.
 
-    The scale of each mode is free: only how an FRF stands against the others is found.
+    The scale of each mode is free: only gains relative to the other FRFs are found.
 
     Parameters
     ----------
@@ -140,13 +142,13 @@ def gains_from_shapes(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     receptances = fit.model.residues[: fit.n_modes] * delays / poles[:, None] ** powers
     measured = (2j * poles.imag[:, None] * receptances).real
     at_dof = dict(zip([dof.unsigned for dof in shapes.dofs], shapes.shapes.real, strict=True))
-    every = np.stack(
+    products = np.stack(
         [at_dof[label.output_dof.unsigned] * at_dof[label.input_dof.unsigned] for label in fit.labels], axis=1
     )
-    every = every[np.abs(every).any(axis=1)] * signs
-    alike = np.abs(measured @ every.T) / np.linalg.norm(every, axis=1)
-    products = every[np.argmax(alike, axis=1)]
-    gain, std = _bilinear(measured, products)
+    products = products[np.abs(products).any(axis=1)] * signs
+    likeness = np.abs(measured @ products.T) / np.linalg.norm(products, axis=1)
+    products = products[np.argmax(likeness, axis=1)]
+    gain, std = _fit_bilinear(measured, products)
     return pd.DataFrame(
         {
             "output_dof": [str(label.output_dof) for label in fit.labels],
@@ -157,21 +159,21 @@ def gains_from_shapes(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     )
 
 
-def _bilinear(measured: FloatArray, products: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _fit_bilinear(measured: FloatArray, products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit ``measured[r, f] = scale[r] gain[f] products[r, f]``, and the standard deviation of the gains."""
     size = np.abs(measured).max(axis=1, keepdims=True)
     measured = measured / size
     gain = np.ones(measured.shape[1])
     for _ in range(ITERATIONS):
-        ahead = products * gain
-        scale = np.sum(measured * ahead, axis=1) / np.sum(ahead**2, axis=1)
-        behind = products * scale[:, None]
-        gain = np.sum(measured * behind, axis=0) / np.sum(behind**2, axis=0)
+        with_gain = products * gain
+        scale = np.sum(measured * with_gain, axis=1) / np.sum(with_gain**2, axis=1)
+        with_scale = products * scale[:, None]
+        gain = np.sum(measured * with_scale, axis=0) / np.sum(with_scale**2, axis=0)
         gain = gain / np.median(gain)
-    left = measured - behind * gain
-    free = max(left.size - sum(left.shape) + 1, 1)
-    error = max(float(np.sqrt(np.sum(left**2) / free)), SHAPE_ERROR)
-    return gain, np.asarray(error / np.sqrt(np.sum(behind**2, axis=0)))
+    misfit = measured - with_scale * gain
+    degrees_of_freedom = max(misfit.size - sum(misfit.shape) + 1, 1)
+    error = max(float(np.sqrt(np.sum(misfit**2) / degrees_of_freedom)), SHAPE_ERROR)
+    return gain, np.asarray(error / np.sqrt(np.sum(with_scale**2, axis=0)))
 
 
 def _ends(label: FrfLabel) -> tuple[str, str]:
@@ -180,10 +182,10 @@ def _ends(label: FrfLabel) -> tuple[str, str]:
 
 
 def _require_known(channels: Sequence[str], ends: list[tuple[str, str]]) -> None:
-    every = list(dict.fromkeys(name for end in ends for name in end))
+    known = list(dict.fromkeys(name for end in ends for name in end))
     for name in channels:
-        if name not in every:
-            raise InputError(f"[fit] gain names the channel '{name}', which no FRF has; {did_you_mean(name, every)}")
+        if name not in known:
+            raise InputError(f"[fit] gain names the channel '{name}', which no FRF has; {did_you_mean(name, known)}")
 
 
 def _equal_pairs(labels: Sequence[FrfLabel]) -> list[tuple[int, int]]:
@@ -204,25 +206,25 @@ def _ratio(residues: ComplexArray, covariance: FloatArray) -> tuple[float, float
     ratio = float(np.sum(a * b) / np.sum(a * a))
     for _ in range(ITERATIONS):
         weight = np.linalg.inv(covariance[:, 1] + ratio**2 * covariance[:, 0])
-        left = np.einsum("rij,rj->ri", weight, b - ratio * a)
-        true = a + ratio * np.einsum("rij,rj->ri", covariance[:, 0], left)
-        seen = np.einsum("ri,rij->rj", true, weight)
-        ratio = float(np.sum(seen * b) / np.sum(seen * a))
-    spread = float(np.sum((b - ratio * a) * left)) / max(a.size - 1, 1)
-    return ratio, float(1 / np.sqrt(np.sum(seen * true))), spread
+        weighted_misfit = np.einsum("rij,rj->ri", weight, b - ratio * a)
+        estimate = a + ratio * np.einsum("rij,rj->ri", covariance[:, 0], weighted_misfit)
+        weighted_estimate = np.einsum("ri,rij->rj", estimate, weight)
+        ratio = float(np.sum(weighted_estimate * b) / np.sum(weighted_estimate * a))
+    spread = float(np.sum((b - ratio * a) * weighted_misfit)) / max(a.size - 1, 1)
+    return ratio, float(1 / np.sqrt(np.sum(weighted_estimate * estimate))), spread
 
 
-def _solved(
+def _solve_log_gains(
     rows: FloatArray, values: FloatArray, weights: FloatArray, channels: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve for the logarithms of the gains, with a root of their covariance; refuse those that are left open."""
-    told = np.linalg.pinv(rows) @ rows
-    open_ones = [name for number, name in enumerate(channels) if told[number, number] < 1 - UNKNOWN]
-    if open_ones:
+    """Solve for the logarithms of the gains, with a root of their covariance; refuse those that are not determined."""
+    resolution = np.linalg.pinv(rows) @ rows
+    undetermined = [name for number, name in enumerate(channels) if resolution[number, number] < 1 - UNDETERMINED]
+    if undetermined:
         raise InputError(
-            f"[fit] gain: these FRFs do not tell the gain of the channel '{open_ones[0]}'; a gain shows only against a "
-            "trusted channel: exchange blow and sensor between two DOFs, or record one FRF with both channels, or take "
-            "it out of the list"
+            f"[fit] gain: these FRFs do not determine the gain of the channel '{undetermined[0]}'; a gain shows only "
+            "against a trusted channel: exchange excitation and sensor between two DOFs, or record one FRF with both "
+            "channels, or take it out of the list"
         )
     root = np.asarray(np.linalg.pinv(rows * weights[:, None]), np.float64)
     return root @ (values * weights), root

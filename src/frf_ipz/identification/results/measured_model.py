@@ -11,12 +11,12 @@ from frf_ipz.identification.likelihood.covariance import FitErrors
 from frf_ipz.rational import PoleResidueModel
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.likelihood.compression import Compressed
+    from frf_ipz.identification.likelihood.compression import CompressedSystem
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 
 def measured_model(
-    system: Compressed, terms: SmoothTerms, powers: IntArray, order: IntArray, delay_s: FloatArray
+    system: CompressedSystem, terms: SmoothTerms, powers: IntArray, order: IntArray, delay_s: FloatArray
 ) -> PoleResidueModel:
     """Multiply a model of receptances by the powers of s that were measured.
 
@@ -24,7 +24,7 @@ def measured_model(
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The fit.
     terms : SmoothTerms
         What lies out of band; its fixed poles join the others at the end.
@@ -33,7 +33,7 @@ def measured_model(
     order : (n_poles,) int array
         Order of the poles.
     delay_s : (n_frfs,) array
-        Delays that were fitted.
+        Fitted delays.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def residue_covariance(errors: FitErrors, powers: IntArray, modes: IntArray) -> 
     powers : (n_frfs,) int array
         Power of s of each FRF's quantity.
     modes : (n_modes,) int array
-        Places of the modes among the poles.
+        Indices of the modes among the poles.
 
     Returns
     -------
@@ -85,16 +85,17 @@ def residue_covariance(errors: FitErrors, powers: IntArray, modes: IntArray) -> 
     count = system.n_poles
     poles = system.poles[modes]
     rows = np.zeros((len(modes), system.n_linear), complex)
-    own_columns = system.n_smooth + modes
     if not system.real_modes:
-        rows[np.arange(len(modes)), own_columns] = 1.0
+        rows[np.arange(len(modes)), system.n_smooth + modes] = 1.0
     rows[np.arange(len(modes)), system.n_linear - count + modes] = 1j
     slopes = np.zeros((len(modes), 2 * count), complex)
     covariance = np.empty((len(modes), len(powers), 2, 2))
     for frf, power in enumerate(powers):
-        own, common = errors.linear(rows, slopes, frf)
+        white, common = errors.linear_errors(rows, slopes, frf)
         factor = poles**power
-        parts = np.concatenate([own, common], axis=1) * factor[:, None]  # the error of the factor itself is far smaller
+        parts = (
+            np.concatenate([white, common], axis=1) * factor[:, None]
+        )  # the error of the factor itself is far smaller
         stacked = np.stack([parts.real, parts.imag], axis=1)
         covariance[:, frf] = stacked @ stacked.transpose(0, 2, 1)
     return covariance

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
 
-SWEEPS = 30  # of the alternating fit of a product to the residues that were measured
+SWEEPS = 30  # of the alternating fit of a product to the measured residues
 
 
 def mode_shapes(fit: ModalFit) -> ModeSet:
@@ -36,7 +36,7 @@ def mode_shapes(fit: ModalFit) -> ModeSet:
     -------
     ModeSet
         At all measured DOFs, unsigned and mass-normalised, where a driving point was measured; else at the sensors or
-        at the blows, whichever are more, with the largest entry 1.
+        at the excited DOFs, whichever are more, with the largest entry 1.
     """
     poles = fit.model.poles[: fit.n_modes]
     outputs = tuple(dict.fromkeys(label.output_dof.unsigned for label in fit.labels))
@@ -46,10 +46,10 @@ def mode_shapes(fit: ModalFit) -> ModeSet:
     dofs = tuple(dict.fromkeys((*outputs, *inputs))) if driving else max(outputs, inputs, key=len)
     shapes = np.empty((len(dofs), len(poles)), complex)
     for mode, matrix in enumerate(matrices):
-        left, right = _product(matrix, measured)
+        at_outputs, at_inputs = _fit_rank_one(matrix, measured)
         if driving:
-            left, right = _with_driving_point(left, right, outputs, inputs, driving)
-        shapes[:, mode] = _normalised(left, right, outputs, inputs, dofs, keep_size=bool(driving))
+            at_outputs, at_inputs = _scaled_at_driving_points(at_outputs, at_inputs, outputs, inputs, driving)
+        shapes[:, mode] = _normalised(at_outputs, at_inputs, outputs, inputs, dofs, keep_size=bool(driving))
     return ModeSet(
         natural_frequency_hz=natural_frequency_hz(poles), damping_ratio=damping_ratio(poles), shapes=shapes, dofs=dofs
     )
@@ -80,43 +80,47 @@ def _residue_matrices(
     matrices = np.zeros((len(poles), len(outputs), len(inputs)), complex)
     measured = np.zeros((len(outputs), len(inputs)), bool)
     for column, label in enumerate(fit.labels):
-        place = outputs.index(label.output_dof.unsigned), inputs.index(label.input_dof.unsigned)
+        entry = outputs.index(label.output_dof.unsigned), inputs.index(label.input_dof.unsigned)
         delay = np.exp(-poles * fit.model.delay_s[column])
         receptance = fit.model.residues[: len(poles), column] * delay / poles**label.quantity.power / fit.gain[column]
-        matrices[:, *place] = label.sign * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance
-        measured[place] = True
+        matrices[:, *entry] = label.sign * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance
+        measured[entry] = True
     return matrices, measured
 
 
-def _product(matrix: ComplexArray, measured: BoolArray) -> tuple[ComplexArray, ComplexArray]:
-    """Find the product of two vectors that fits the measured entries best."""
-    right = matrix[np.argmax(np.sum(np.abs(matrix), axis=1))].copy()
-    left = np.zeros(len(matrix), complex)
+def _fit_rank_one(matrix: ComplexArray, measured: BoolArray) -> tuple[ComplexArray, ComplexArray]:
+    """Find the product of two vectors, over outputs and inputs, that fits the measured entries best."""
+    at_inputs = matrix[np.argmax(np.sum(np.abs(matrix), axis=1))].copy()
+    at_outputs = np.zeros(len(matrix), complex)
     for _ in range(SWEEPS):
-        left = matrix @ right.conj() / _positive(measured @ np.abs(right) ** 2)
-        right = matrix.T @ left.conj() / _positive(measured.T @ np.abs(left) ** 2)
-    return left, right
+        at_outputs = matrix @ at_inputs.conj() / _positive_or_infinite(measured @ np.abs(at_inputs) ** 2)
+        at_inputs = matrix.T @ at_outputs.conj() / _positive_or_infinite(measured.T @ np.abs(at_outputs) ** 2)
+    return at_outputs, at_inputs
 
 
-def _positive(values: np.ndarray) -> np.ndarray:
+def _positive_or_infinite(values: np.ndarray) -> np.ndarray:
     return np.where(values > 0, values, np.inf)
 
 
-def _with_driving_point(
-    left: ComplexArray, right: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...], driving: list[Dof]
+def _scaled_at_driving_points(
+    at_outputs: ComplexArray,
+    at_inputs: ComplexArray,
+    outputs: tuple[Dof, ...],
+    inputs: tuple[Dof, ...],
+    driving: list[Dof],
 ) -> tuple[ComplexArray, ComplexArray]:
     """Share the size between the two vectors so that they agree at the driving points."""
-    at_output = np.array([left[outputs.index(dof)] for dof in driving])
-    at_input = np.array([right[inputs.index(dof)] for dof in driving])
-    weight = np.vdot(at_output, at_output).real
-    ratio = np.vdot(at_output, at_input) / weight if weight > 0 else 1.0
+    output_values = np.array([at_outputs[outputs.index(dof)] for dof in driving])
+    input_values = np.array([at_inputs[inputs.index(dof)] for dof in driving])
+    weight = np.vdot(output_values, output_values).real
+    ratio = np.vdot(output_values, input_values) / weight if weight > 0 else 1.0
     factor = np.sqrt(complex(ratio) or 1.0)
-    return left * factor, right / factor
+    return at_outputs * factor, at_inputs / factor
 
 
 def _normalised(
-    left: ComplexArray,
-    right: ComplexArray,
+    at_outputs: ComplexArray,
+    at_inputs: ComplexArray,
     outputs: tuple[Dof, ...],
     inputs: tuple[Dof, ...],
     dofs: tuple[Dof, ...],
@@ -124,10 +128,10 @@ def _normalised(
     keep_size: bool,
 ) -> ComplexArray:
     """One vector over the DOFs, its largest entry real and positive."""
-    found = dict(zip(inputs, right, strict=True)) | dict(zip(outputs, left, strict=True))
+    values = dict(zip(inputs, at_inputs, strict=True)) | dict(zip(outputs, at_outputs, strict=True))
     if not keep_size:
-        found = dict(zip(outputs, left, strict=True)) if dofs == outputs else dict(zip(inputs, right, strict=True))
-    shape = np.array([found[dof] for dof in dofs])
+        values = dict(zip(*((outputs, at_outputs) if dofs == outputs else (inputs, at_inputs)), strict=True))
+    shape = np.array([values[dof] for dof in dofs])
     largest = shape[np.argmax(np.abs(shape))]
     if not abs(largest) > 0:
         return shape

@@ -13,19 +13,19 @@ from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.identification.search.goodness_of_fit import Judgement
+    from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit
 
-BANDS = 8  # of the misfit table, as wide as one another
+BANDS = 8  # of the misfit table, of equal width
 GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the damping
 GOOD_SIGNIFICANCE = 5.0  # times what the BIC demands
 COLLINEAR = 0.9  # phase collinearity of a mode that looks normal
-ALIKE = 0.9  # MAC between two modes at which the shapes do not tell them apart
+SAME_SHAPE = 0.9  # MAC between two modes at which the shapes do not distinguish them
 FEWEST_FRFS = 3  # whose shapes can differ
-CLOSE = 0.02  # relative distance of two modes whose shapes are compared for it
+CLOSE_MODES = 0.02  # relative distance of two modes whose shapes are compared for it
 
 
 def mode_table(
-    poles: ComplexArray, residues: ComplexArray, judgement: Judgement, modes: IntArray, doubts: tuple[str, ...]
+    poles: ComplexArray, residues: ComplexArray, goodness: GoodnessOfFit, modes: IntArray, doubts: tuple[str, ...]
 ) -> pd.DataFrame:
     """Table of the modes with a quality mark.
 
@@ -35,10 +35,10 @@ def mode_table(
         rad/s.
     residues : (n_modes, n_frfs) complex array
         Of receptances.
-    judgement : Judgement
+    goodness : GoodnessOfFit
         Of the fit.
     modes : (n_modes,) int array
-        Places of the modes in the judgement.
+        Indices of the modes in the goodness.
     doubts : tuple of str
         Why a mode is not to be relied on, whatever else; empty where nothing says so.
 
@@ -50,8 +50,8 @@ def mode_table(
     shapes = residues.T
     assurance = modal_assurance(shapes, shapes)
     np.fill_diagonal(assurance, 0.0)
-    near = np.abs(np.abs(poles)[:, None] / np.abs(poles) - 1) < CLOSE
-    confused = np.max(assurance * near, axis=1, initial=0.0) * (len(shapes) >= FEWEST_FRFS)
+    is_close = np.abs(np.abs(poles)[:, None] / np.abs(poles) - 1) < CLOSE_MODES
+    confused = np.max(assurance * is_close, axis=1, initial=0.0) * (len(shapes) >= FEWEST_FRFS)
     rows = {
         "pole_id": np.arange(1, len(poles) + 1),
         "frequency_hz": natural_frequency_hz(poles),
@@ -59,9 +59,9 @@ def mode_table(
         # residues of normal modes are imaginary in every FRF: a phase common to all of them shows complexity as well
         "mpc": modal_phase_collinearity(shapes) if shapes.shape[0] > 1 else np.ones(len(poles)),
         "highest_mac": np.max(assurance, axis=1, initial=0.0),
-        "significance": judgement.significance[modes],
-        "damping_std_ratio": judgement.damping_std[modes],
-        "misfit_level": _level_at(judgement, poles),
+        "significance": goodness.significance[modes],
+        "damping_std_ratio": goodness.damping_std[modes],
+        "misfit_level": _level_at(goodness, poles),
     }
     remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
     quality = [
@@ -98,7 +98,7 @@ def misfit_table(
     starts = np.flatnonzero(np.diff(band, prepend=-1))
     counts = np.diff(np.append(starts, len(band)))[:, None]
     squares, powers = np.abs(misfit) ** 2, std**2
-    columns = [np.sqrt(np.add.reduceat(one, starts) / counts).T for one in (squares, powers, squares / powers)]
+    columns = [np.sqrt(np.add.reduceat(values, starts) / counts).T for values in (squares, powers, squares / powers)]
     shape = columns[0].shape
     return pd.DataFrame(
         {
@@ -114,9 +114,9 @@ def misfit_table(
     )
 
 
-def _level_at(judgement: Judgement, poles: ComplexArray) -> FloatArray:
-    place = np.clip(np.searchsorted(judgement.frequency_hz, natural_frequency_hz(poles)), 0, len(judgement.level) - 1)
-    return np.asarray(np.sqrt(np.median(judgement.level[place], axis=1)))
+def _level_at(goodness: GoodnessOfFit, poles: ComplexArray) -> FloatArray:
+    lines = np.clip(np.searchsorted(goodness.frequency_hz, natural_frequency_hz(poles)), 0, len(goodness.level) - 1)
+    return np.asarray(np.sqrt(np.median(goodness.level[lines], axis=1)))
 
 
 def _remarks(rows: dict[str, FloatArray], number: int, confused: float) -> list[str]:
@@ -127,8 +127,8 @@ def _remarks(rows: dict[str, FloatArray], number: int, confused: float) -> list[
         remarks.append("hardly more than the data ask for")
     if rows["mpc"][number] < COLLINEAR:
         remarks.append("complex shape")
-    if confused > ALIKE:
-        remarks.append("same shape as the mode beside it")
+    if confused > SAME_SHAPE:
+        remarks.append("same shape as the neighbouring mode")
     return remarks
 
 

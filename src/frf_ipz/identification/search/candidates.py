@@ -1,6 +1,6 @@
 """Where modes are missing: peaks of the misfit that noise does not make.
 
-A mode that was left out leaves ``R / (i (omega - omega_0) + a)`` in the misfit of every FRF. In the time domain that is
+A missing mode shows as ``R / (i (omega - omega_0) + a)`` in the misfit of every FRF. In the time domain that is
 a decaying exponential; so the best match to it, at every frequency at once, is the spectrum of the misfit's time signal
 times ``exp(-a t)``. The energy of the match, summed over FRFs, is chi-square with two degrees of freedom an FRF where
 there is only noise, and a candidate is what exceeds the largest value that so many lines would show by chance.
@@ -37,7 +37,7 @@ class Candidates:
     half_width_rad_s : (n_widths,) array
         Half widths that were matched.
     level : (n_widths,) array
-        Typical energy of a match over that of white noise: above 1 where neighbouring lines err alike.
+        Typical energy of a match over that of white noise: above 1 where errors of neighbouring lines are correlated.
     """
 
     poles: ComplexArray
@@ -58,11 +58,11 @@ class Candidates:
         (n_poles,) array
             At least 1.
         """
-        known = np.log(self.half_width_rad_s)
-        return np.asarray(np.interp(np.log(np.maximum(-poles.real, np.exp(known[0]))), known, self.level))
+        widths = np.log(self.half_width_rad_s)
+        return np.asarray(np.interp(np.log(np.maximum(-poles.real, np.exp(widths[0]))), widths, self.level))
 
 
-def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -> Candidates:
+def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, max_count: int) -> Candidates:
     """Find modes that are missing in a model.
 
     Parameters
@@ -71,8 +71,8 @@ def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -
         Lines, Hz; gaps count as lines without data.
     misfit : (n_lines, n_frfs) complex array
         Measured minus model, in units where each part of the noise has variance one.
-    most : int
-        At most so many.
+    max_count : int
+        Largest number of candidates.
 
     Returns
     -------
@@ -80,34 +80,35 @@ def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, most: int) -
         The strongest first; none where nothing exceeds chance.
     """
     line = float(np.median(np.diff(frequency_hz)))
-    place = _places(frequency_hz, line)
-    n_grid = int(place[-1]) + 1
+    grid_indices = _grid_indices(frequency_hz, line)
+    n_grid = int(grid_indices[-1]) + 1
     size = fft.next_fast_len(n_grid + n_grid // PADDING)
-    spread = np.zeros((misfit.shape[1], n_grid), np.complex64)  # single precision: the misfit is of order one
-    spread[:, place] = misfit.T
-    signal = np.asarray(fft.ifft(spread, size, axis=1, norm="forward"), np.complex64)
+    gridded = np.zeros((misfit.shape[1], n_grid), np.complex64)  # single precision: the misfit is of order one
+    gridded[:, grid_indices] = misfit.T
+    signal = np.asarray(fft.ifft(gridded, size, axis=1, norm="forward"), np.complex64)
     present = np.zeros(n_grid)
-    present[place] = 1.0
+    present[grid_indices] = 1.0
     widths = _half_widths(frequency_hz, line)
     limit = _chance_limit(misfit.shape[1], len(frequency_hz) * len(widths))
     typical = float(stats.chi2.median(2 * misfit.shape[1]))
     levels = np.ones(len(widths))
-    found: list[tuple[float, complex]] = []
+    matches: list[tuple[float, complex]] = []
     for number, width in enumerate(widths):
-        energy = _match(signal, width, n_grid)[place] / _template_energy(present, width)[place]
+        energy = _match_energy(signal, width, n_grid)[grid_indices] / _template_energy(present, width)[grid_indices]
         levels[number] = max(1.0, float(np.median(energy)) / typical)
         ratio = energy / (limit * levels[number])
-        found += [
-            (float(ratio[k]), 2 * np.pi * complex(-width * line, frequency_hz[k])) for k in _peaks(ratio)[: 2 * most]
+        matches += [
+            (float(ratio[k]), 2 * np.pi * complex(-width * line, frequency_hz[k]))
+            for k in _peaks(ratio)[: 2 * max_count]
         ]
-    poles, strength = _separate(sorted(found, key=lambda item: -item[0]), most)
+    poles, strength = _separate(sorted(matches, key=lambda match: -match[0]), max_count)
     return Candidates(
         poles=poles, strength=strength, half_width_rad_s=2 * np.pi * line * np.asarray(widths), level=levels
     )
 
 
-def _places(frequency_hz: FloatArray, line: float) -> IntArray:
-    """Place the lines on a grid; a gap longer than the tails of the widest match is shortened."""
+def _grid_indices(frequency_hz: FloatArray, line: float) -> IntArray:
+    """Put the lines on a grid; a gap longer than the tails of the widest match is shortened."""
     steps = np.clip(np.round(np.diff(frequency_hz) / line), 1, 10 * TAILS)
     return np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
 
@@ -119,8 +120,8 @@ def _half_widths(frequency_hz: FloatArray, line: float) -> FloatArray:
     return np.geomspace(NARROWEST, widest, count)
 
 
-def _match(signal: npt.NDArray[np.complex64], width: float, n_grid: int) -> FloatArray:
-    """Energy of the match at every place of the grid, summed over FRFs."""
+def _match_energy(signal: npt.NDArray[np.complex64], width: float, n_grid: int) -> FloatArray:
+    """Energy of the match at every point of the grid, summed over FRFs."""
     size = signal.shape[1]
     # a broad match varies slowly: a part of the time signal is enough, and gives fewer points
     length = min(size // 2, fft.next_fast_len(int(np.ceil(12 * size / (2 * np.pi * width)))))
@@ -142,26 +143,27 @@ def _template_energy(present: FloatArray, width: float) -> FloatArray:
     return np.asarray(fft.irfft(fft.rfft(present, size) * kernel, size)[reach : reach + len(present)])
 
 
-def _chance_limit(n_frfs: int, n_places: int) -> float:
-    return float(stats.chi2.isf(FALSE_ALARMS / n_places, 2 * n_frfs))
+def _chance_limit(n_frfs: int, n_points: int) -> float:
+    return float(stats.chi2.isf(FALSE_ALARMS / n_points, 2 * n_frfs))
 
 
 def _peaks(ratio: FloatArray) -> IntArray:
-    above = np.flatnonzero(ratio > 1)
-    inner = above[(above > 0) & (above < len(ratio) - 1)]
+    indices = np.flatnonzero(ratio > 1)
+    inner = indices[(indices > 0) & (indices < len(ratio) - 1)]
     tops = inner[(ratio[inner] >= ratio[inner - 1]) & (ratio[inner] >= ratio[inner + 1])]
     return np.asarray(tops[np.argsort(-ratio[tops])])
 
 
-def _separate(found: list[tuple[float, complex]], most: int) -> tuple[ComplexArray, FloatArray]:
-    kept: list[tuple[float, complex]] = []
-    for strength, pole in found:
-        shadow = sum(stronger * _overlap(pole, other) for stronger, other in kept)
-        if len(kept) < most and strength > SHADOW * shadow:
-            kept.append((strength, pole))
-    return np.array([pole for _, pole in kept], complex), np.array([strength for strength, _ in kept])
+def _separate(matches: list[tuple[float, complex]], max_count: int) -> tuple[ComplexArray, FloatArray]:
+    """Select matches, given strongest first, that are not the shadow of stronger ones."""
+    selected: list[tuple[float, complex]] = []
+    for strength, pole in matches:
+        shadow = sum(stronger * _overlap(pole, stronger_pole) for stronger, stronger_pole in selected)
+        if len(selected) < max_count and strength > SHADOW * shadow:
+            selected.append((strength, pole))
+    return np.array([pole for _, pole in selected], complex), np.array([strength for strength, _ in selected])
 
 
-def _overlap(pole: complex, other: complex) -> float:
-    """Energy that one pole's match finds in the response of another, by its own."""
-    return 4 * pole.real * other.real / ((pole.real + other.real) ** 2 + (pole.imag - other.imag) ** 2)
+def _overlap(first: complex, second: complex) -> float:
+    """Energy of one pole's match in the response of another, over that in its own response."""
+    return 4 * first.real * second.real / ((first.real + second.real) ** 2 + (first.imag - second.imag) ** 2)

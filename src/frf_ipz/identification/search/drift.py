@@ -1,8 +1,8 @@
 """Drift between recordings: all natural frequencies of an FRF off by one factor, as temperature or support change.
 
 A common factor per FRF moves poles in proportion to themselves. Gauss-Newton steps find it with the information that
-the poles are fitted by. Where it explains much of the misfit, each FRF is moved to the mean frequencies by what the
-model says: ``h(s) - h(s / (1 + drift))`` is added to it.
+the poles are fitted by. Where it explains much of the misfit, each FRF is moved to the mean frequencies by the
+model: ``h(s) - h(s / (1 + drift))`` is added to it.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, response
-from frf_ipz.identification.likelihood.refinement import Refined, pole_jacobian, refine
-from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.identification.likelihood.compression import CompressedSystem, response
+from frf_ipz.identification.likelihood.refinement import RefinedPoles, pole_jacobian, refine_poles
+from frf_ipz.identification.measured_lines import WeightedLines
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 ROUNDS = 8
-SETTLED = 0.3  # standard deviations
-LARGEST = 2e-3  # a larger change is no drift but another structure
-WORTH = 0.3  # part of the excess misfit that the factors must explain
+CONVERGED = 0.3  # standard deviations
+MAX_DRIFT = 2e-3  # a larger change is no drift but another structure
+MIN_EXPLAINED = 0.3  # part of the excess misfit that the factors must explain
 ITERATIONS = 6
 
 
@@ -33,82 +33,84 @@ class Drift:
 
     Parameters
     ----------
-    relative : (n_frfs,) array
+    relative_change : (n_frfs,) array
         Change of all natural frequencies in each FRF, relative, of mean zero over FRFs unless the poles are held.
     std : (n_frfs,) array
         Its standard deviation, from the noise alone.
-    moved : (n_lines, n_frfs) complex array
+    receptance : (n_lines, n_frfs) complex array
         The receptances at the mean frequencies, m/N.
     """
 
-    relative: FloatArray
+    relative_change: FloatArray
     std: FloatArray
-    moved: ComplexArray
+    receptance: ComplexArray
 
 
 def find_drift(
-    data: Weighted, fit: Refined, terms: SmoothTerms, *, poles_are_held: bool = False
-) -> tuple[Drift, Refined] | None:
+    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms, *, poles_are_held: bool = False
+) -> tuple[Drift, RefinedPoles] | None:
     """Find the drift between FRFs, if there is one.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
-    fit : Refined
+    fit : RefinedPoles
         A fit without drift.
     terms : SmoothTerms
         What lies out of band.
     poles_are_held : bool
-        Poles come from elsewhere: the drift is against them, and one FRF is enough.
+        Poles are given: the drift is against them, and one FRF is enough.
 
     Returns
     -------
-    (Drift, Refined) or None
+    (Drift, RefinedPoles) or None
         The drift and the fit to the moved FRFs; None where it does not explain the misfit.
     """
     n_frfs = data.receptance.shape[1]
     if (n_frfs < 2 and not poles_are_held) or not len(fit.poles):
         return None
-    step, std = stretches(fit.system)
-    demanded = n_frfs * np.log(2 * data.receptance.size)
-    if np.sum((step / std) ** 2) < demanded:
+    step, std = frequency_changes(fit.system)
+    penalty = n_frfs * np.log(2 * data.receptance.size)
+    if np.sum((step / std) ** 2) < penalty:
         return None
-    relative, best, moved = np.zeros(n_frfs), fit, data.receptance
+    change, best, receptance = np.zeros(n_frfs), fit, data.receptance
     for _ in range(ROUNDS):
-        relative = relative + step
+        change = change + step
         if not poles_are_held:
-            relative = relative - np.average(relative, weights=std**-2)
-        if np.abs(relative).max() > LARGEST:
+            change = change - np.average(change, weights=std**-2)
+        if np.abs(change).max() > MAX_DRIFT:
             return None
-        moved = _moved(data, best.system, terms, relative)
+        receptance = _at_mean_frequencies(data, best.system, terms, change)
         steps = 0 if poles_are_held else ITERATIONS
-        best = refine(replace(data, receptance=moved), best.poles, terms, iterations=steps)
-        step, std = stretches(best.system)
+        best = refine_poles(replace(data, receptance=receptance), best.poles, terms, iterations=steps)
+        step, std = frequency_changes(best.system)
         if not poles_are_held:
             step = step - np.average(step, weights=std**-2)
-        if np.all(np.abs(step) < SETTLED * std):
+        if np.all(np.abs(step) < CONVERGED * std):
             break
     excess = max(fit.misfit - 2 * data.receptance.size, 1.0)
     gain = fit.misfit - best.misfit
-    if gain < demanded or gain < WORTH * excess:
+    if gain < penalty or gain < MIN_EXPLAINED * excess:
         return None
-    return Drift(relative=relative, std=std, moved=moved), best
+    return Drift(relative_change=change, std=std, receptance=receptance), best
 
 
-def _moved(data: Weighted, system: Compressed, terms: SmoothTerms, relative: FloatArray) -> ComplexArray:
-    moved = data.receptance + response(system, terms, data.s)
-    for frf, change in enumerate(relative):
-        moved[:, frf] -= response(system, terms, data.s / (1 + change))[:, frf]
-    return moved
+def _at_mean_frequencies(
+    data: WeightedLines, system: CompressedSystem, terms: SmoothTerms, relative_change: FloatArray
+) -> ComplexArray:
+    receptance = data.receptance + response(system, terms, data.s)
+    for frf, change in enumerate(relative_change):
+        receptance[:, frf] -= response(system, terms, data.s / (1 + change))[:, frf]
+    return receptance
 
 
-def stretches(system: Compressed) -> tuple[FloatArray, FloatArray]:
+def frequency_changes(system: CompressedSystem) -> tuple[FloatArray, FloatArray]:
     """One step towards the relative change of frequencies in each FRF.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The fit.
 
     Returns

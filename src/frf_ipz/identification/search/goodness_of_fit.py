@@ -1,9 +1,9 @@
 """How well a model explains the lines, and which of its poles the lines ask for.
 
 The misfit is measured against the noise that was recorded. Where a model cannot follow to the noise (a structure that
-is not linear, or drifts), the level of the misfit takes the place of the noise, line by line; and where neighbouring
-lines err alike, the level of matches of a pole's own width: otherwise such errors would be explained by ever more
-poles.
+is not linear, or drifts), the level of the misfit takes the place of the noise, line by line; and where errors of
+neighbouring lines are correlated, the level of matches of a pole's own width: otherwise such errors would be explained
+by ever more poles.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import Compressed, response
-from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.identification.likelihood.compression import CompressedSystem, response
+from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.noise import smooth_level
 from frf_ipz.identification.search.candidates import Candidates, find_candidates
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.likelihood.refinement import Refined
+    from frf_ipz.identification.likelihood.refinement import RefinedPoles
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 LEVEL_SCATTER = 1.6  # a level found from one block of lines exceeds its expectation by this about once in a thousand
 FAR = 10.0  # mean square of the misfit over that of noise, above which modes are missing
 NEEDED = 0.02  # part of such a misfit that a pole must take off to stay
-GROWTH = 3  # a search proposes at most one pole for so many that there are, and two
+GROWTH = 3  # at most two candidates, and one more for so many poles that there are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Judgement:
-    """A fit set against noise and misfit.
+class GoodnessOfFit:
+    """How a fit compares with the noise, and each of its poles with the misfit.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Judgement:
         Measured minus model; each part has variance one where it is noise.
     level : (n_lines, n_frfs) array
         Mean square of the misfit over that of noise, at least 1.
-    missing : tuple of Candidates
+    candidates : tuple of Candidates
         Poles that may be missing, from the misfit as it is and from that over its level.
     significance : (n_poles,) array
         What each pole takes off minus twice the log likelihood, over what the BIC demands for it.
@@ -56,89 +56,91 @@ class Judgement:
     frequency_hz: FloatArray
     misfit: ComplexArray
     level: FloatArray
-    missing: tuple[Candidates, ...]
+    candidates: tuple[Candidates, ...]
     significance: FloatArray
     damping_std: FloatArray
     is_needed: BoolArray
 
 
-def judge(data: Weighted, fit: Refined, terms: SmoothTerms, *, best: Judgement | None = None) -> Judgement:
-    """Set a fit against noise and misfit.
+def assess_fit(
+    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms, *, best: GoodnessOfFit | None = None
+) -> GoodnessOfFit:
+    """Compare a fit with the noise, and each of its poles with the misfit.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
-    fit : Refined
+    fit : RefinedPoles
         The fit.
     terms : SmoothTerms
         What lies out of band.
-    best : Judgement, optional
-        Of a fit with more poles: its level tells what the model cannot follow. Otherwise each pole that is dropped
-        would raise the level, by which the next one is judged.
+    best : GoodnessOfFit, optional
+        Of a fit with more poles: its level is the part that the model cannot follow. Otherwise each pole that is
+        dropped would raise the level that the next one is compared with.
 
     Returns
     -------
-    Judgement
-        What is missing and what is too much.
+    GoodnessOfFit
+        Candidates for missing poles, and the significance of those that the fit has.
     """
     misfit = (data.receptance - response(fit.system, terms, data.s)) * data.weight
     level = smooth_level(np.abs(misfit) ** 2) / 2
     level = np.where(level > LEVEL_SCATTER, level, 1.0)
     frequency = data.s.imag / (2 * np.pi)
-    most = 2 + len(fit.poles) // GROWTH
-    leveled = find_candidates(frequency, misfit / np.sqrt(level), most)
-    missing = (find_candidates(frequency, misfit, most), leveled) if (level > 1).any() else (leveled,)
-    unexplained, alike = (level, leveled) if best is None else (best.level, best.missing[-1])
-    factor = _level_near(data, fit.poles, unexplained) * alike.level_at(fit.poles)[:, None]
+    max_count = 2 + len(fit.poles) // GROWTH
+    over_level = find_candidates(frequency, misfit / np.sqrt(level), max_count)
+    candidates = (find_candidates(frequency, misfit, max_count), over_level) if (level > 1).any() else (over_level,)
+    model_error, correlation = (level, over_level) if best is None else (best.level, best.candidates[-1])
+    factor = _level_at_poles(data, fit.poles, model_error) * correlation.level_at(fit.poles)[:, None]
     gains = pole_gains(fit.system)
-    far = fit.misfit > FAR * 2 * data.receptance.size
-    return Judgement(
+    modes_are_missing = fit.misfit > FAR * 2 * data.receptance.size
+    return GoodnessOfFit(
         frequency_hz=frequency,
         misfit=misfit,
         level=level,
-        missing=missing,
+        candidates=candidates,
         significance=_over_bic(gains / factor, 2 * len(data.s)),
         damping_std=_damping_std(fit) * np.sqrt(np.median(factor, axis=1)),
-        is_needed=far & (gains.sum(axis=1) > NEEDED * fit.misfit),
+        is_needed=modes_are_missing & (gains.sum(axis=1) > NEEDED * fit.misfit),
     )
 
 
-def pole_gains(system: Compressed) -> FloatArray:
-    """Find what each pole takes off the misfit of each FRF.
+def pole_gains(system: CompressedSystem) -> FloatArray:
+    """Find the part of each FRF's misfit that each pole takes off.
 
     Parameters
     ----------
-    system : Compressed
+    system : CompressedSystem
         The fit.
 
     Returns
     -------
     (n_poles, n_frfs) array
-        Increase of minus twice the log likelihood if the pole left, poles being held.
+        Increase of minus twice the log likelihood without the pole, the other poles being held.
     """
     n, first, count = system.n_linear, system.n_smooth, system.n_poles
     c = system.scaled_coefficients()
     inverses = np.stack([linalg.solve_triangular(U[:n, :n], np.eye(n), check_finite=False) for U in system.U])
     gains = np.empty((count, len(c)))
     for pole in range(count):
-        own = [first + pole] if system.real_modes else [first + pole, first + count + pole]
-        rows = inverses[:, own]
+        columns = [first + pole] if system.real_modes else [first + pole, first + count + pole]
+        rows = inverses[:, columns]
         weight = np.linalg.inv(rows @ rows.transpose(0, 2, 1))
         gains[pole] = np.einsum(
-            "fi,fij,fj->f", c[:, own], np.broadcast_to(weight, (len(c), *weight.shape[1:])), c[:, own]
+            "fi,fij,fj->f", c[:, columns], np.broadcast_to(weight, (len(c), *weight.shape[1:])), c[:, columns]
         )
     return gains
 
 
-def peak_levels(data: Weighted, fit: Refined, misfit: ComplexArray) -> FloatArray:
-    """Find how large the misfit is on the lines that tell where a pole is.
+def peak_levels(data: WeightedLines, fit: RefinedPoles, misfit: ComplexArray) -> FloatArray:
+    """Find how large the misfit is on the lines that determine a pole.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
-    fit : Refined
+    fit : RefinedPoles
         The fit.
     misfit : (n_lines, n_frfs) complex array
         Over the noise.
@@ -150,26 +152,26 @@ def peak_levels(data: Weighted, fit: Refined, misfit: ComplexArray) -> FloatArra
     """
     slope = np.abs(data.s[:, None] - fit.poles) ** -4
     residues = np.abs(fit.system.residues().T) ** 2
-    told = np.einsum("lp,lp->p", slope, data.weight**2 @ residues)
-    missed = np.einsum("lp,lp->p", slope, (data.weight**2 * np.abs(misfit) ** 2 / 2) @ residues)
-    return np.asarray(missed / told)
+    expected = np.einsum("lp,lp->p", slope, data.weight**2 @ residues)
+    observed = np.einsum("lp,lp->p", slope, (data.weight**2 * np.abs(misfit) ** 2 / 2) @ residues)
+    return np.asarray(observed / expected)
 
 
 def _over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
-    """Let the best subset of FRFs decide: a local mode shows in a few only, and need not pay for all the others."""
+    """Take the best subset of FRFs: a local mode shows in a few of them, and need not pay for the rest."""
     n_frfs = drops.shape[1]
     count = np.arange(1, n_frfs + 1)
     penalty = (2 * count + 2) * np.log(n_numbers) + 2 * count * np.log(n_frfs / count)
-    together = np.cumsum(-np.sort(-drops, axis=1), axis=1)
-    return np.asarray(np.max(together / penalty, axis=1, initial=0.0))
+    cumulated = np.cumsum(-np.sort(-drops, axis=1), axis=1)
+    return np.asarray(np.max(cumulated / penalty, axis=1, initial=0.0))
 
 
-def _level_near(data: Weighted, poles: ComplexArray, level: FloatArray) -> FloatArray:
-    near = np.clip(np.searchsorted(data.s.imag, poles.imag), 0, len(level) - 1)
-    return np.asarray(level[near])
+def _level_at_poles(data: WeightedLines, poles: ComplexArray, level: FloatArray) -> FloatArray:
+    lines = np.clip(np.searchsorted(data.s.imag, poles.imag), 0, len(level) - 1)
+    return np.asarray(level[lines])
 
 
-def _damping_std(fit: Refined) -> FloatArray:
+def _damping_std(fit: RefinedPoles) -> FloatArray:
     count = len(fit.poles)
     try:
         covariance = np.linalg.inv(fit.information)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray
-from frf_ipz.identification.likelihood.refinement import Refined, refine
-from frf_ipz.identification.measured_lines import Weighted
+from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
+from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.goodness_of_fit import Judgement, judge
-from frf_ipz.identification.search.spurious_poles import find_artefacts
+from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit
+from frf_ipz.identification.search.spurious_poles import find_spurious_poles
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -20,200 +20,200 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
 
 ROUNDS = 8  # of adding poles
-CLEARER = 0.6  # times the misfit before: what was refused then may be proposed again
+CLEARED = 0.6  # times the misfit before: poles that were refused then may be proposed again
 ROUGH_ITERATIONS = 12  # of a fit whose poles are still to be judged
-UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole says nothing
+UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole is not determined
 SURE = 6.0  # times what the BIC demands: such a pole stays even where its damping is uncertain
-NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or struck
+NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or rejected
 MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
-SAID = "the user says that a mode is here"  # of a pin without a reason
+PIN_REASON = "the user says that a mode is here"  # of a pin without a reason
 NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Selected:
-    """The fit with the modes that the lines ask for.
+class SelectedModes:
+    """The fit with the modes that the lines support.
 
     Parameters
     ----------
-    data : Weighted
-        What was fitted: FRFs moved to their mean frequencies where the structure drifted.
+    data : WeightedLines
+        The fitted lines: FRFs moved to their mean frequencies where the structure drifted.
     drift : Drift or None
         The drift, where there is one.
-    fit : Refined
+    fit : RefinedPoles
         Poles and residues.
-    judgement : Judgement
+    goodness : GoodnessOfFit
         Of this fit.
     decisions : tuple of dict
-        What was added, dropped, pinned and struck.
+        Poles that were added, dropped, pinned and rejected, with the reason.
     """
 
-    data: Weighted
+    data: WeightedLines
     drift: Drift | None
-    fit: Refined
-    judgement: Judgement
+    fit: RefinedPoles
+    goodness: GoodnessOfFit
     decisions: tuple[dict[str, object], ...]
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Search:
-    """The work: what is fitted, and what was decided so far."""
+    """State of the search: the fitted lines, and the decisions so far."""
 
-    data: Weighted
+    data: WeightedLines
     terms: SmoothTerms
     pinned: tuple[tuple[float, str], ...]
-    struck: tuple[tuple[float, str], ...]
-    trusted: bool
+    rejected: tuple[tuple[float, str], ...]
+    noise_is_trusted: bool
     drift: Drift | None = None
     refused: list[complex] = field(default_factory=list)
     decisions: list[dict[str, object]] = field(default_factory=list)
 
-    def note(self, poles: ComplexArray, action: str, reasons: list[str]) -> None:
+    def record(self, poles: ComplexArray, action: str, reasons: list[str]) -> None:
         for pole, reason in zip(poles, reasons, strict=True):
             hz, ratio = float(natural_frequency_hz(pole[None])[0]), float(damping_ratio(pole[None])[0])
             self.decisions.append({"frequency_hz": hz, "damping_ratio": ratio, "action": action, "reason": reason})
 
 
 def select_modes(
-    data: Weighted, poles: ComplexArray, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
-) -> Selected:
-    """Find the modes that the lines ask for.
+    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
+) -> SelectedModes:
+    """Find the modes that the lines support.
 
     Parameters
     ----------
-    data : Weighted
+    data : WeightedLines
         Lines and weights.
     poles : (n_poles,) complex array
-        Where to start, rad/s.
+        Start poles, rad/s.
     terms : SmoothTerms
         What lies out of band.
     options : FitOptions
-        Poles that are pinned and struck.
+        Poles that are pinned and rejected.
     noise_is_known : bool
         All FRFs came with their variance.
 
     Returns
     -------
-    Selected
+    SelectedModes
         The fit.
     """
-    struck = tuple((one.hz, one.why) for one in options.strike)
-    pinned = tuple((one.hz, one.why) for one in options.pinned)
-    search = _Search(data=data, terms=terms, pinned=pinned, struck=struck, trusted=noise_is_known)
-    poles = _pin(search, _strike(search, poles))
-    search.trusted = True  # first poles are not many, and errors of strong modes are not told yet
-    fit, judgement = _skim(search, refine(data, poles, terms, iterations=ROUGH_ITERATIONS))
-    search.trusted = noise_is_known
+    rejected = tuple((pole.hz, pole.why) for pole in options.strike)
+    pinned = tuple((pole.hz, pole.why) for pole in options.pinned)
+    search = _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_trusted=noise_is_known)
+    poles = _with_pinned(search, _without_rejected(search, poles))
+    search.noise_is_trusted = True  # start poles are not many, and errors of strong modes do not show yet
+    fit, goodness = _drop_insignificant(search, refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS))
+    search.noise_is_trusted = noise_is_known
     for _ in range(ROUNDS):
-        fit, judgement = _with_drift(search, fit, judgement)
-        proposed = _proposed(search, judgement)
+        fit, goodness = _without_drift(search, fit, goodness)
+        proposed = _proposed_poles(search, goodness)
         if not len(proposed):
             break
-        trial = refine(search.data, np.concatenate([fit.poles, proposed]), terms, iterations=ROUGH_ITERATIONS)
-        search.refused.extend(trial.lost.tolist())
-        better, verdict = _skim(search, trial)
-        if len(better.poles) <= len(fit.poles) and better.misfit > fit.misfit:
+        trial = refine_poles(search.data, np.concatenate([fit.poles, proposed]), terms, iterations=ROUGH_ITERATIONS)
+        search.refused.extend(trial.discarded.tolist())
+        trial, trial_goodness = _drop_insignificant(search, trial)
+        if len(trial.poles) <= len(fit.poles) and trial.misfit > fit.misfit:
             continue
-        if better.misfit < CLEARER * fit.misfit:
-            search.refused.clear()  # they were judged against a misfit that was not noise
-        search.note(*_added(fit.poles, better.poles))
-        fit, judgement = better, verdict
-    search.trusted = search.trusted and bool(np.median(judgement.level) < MODEL_ERROR)
-    if not search.trusted:
-        fit, judgement = _skim(search, fit)
-    return Selected(
-        data=search.data, drift=search.drift, fit=fit, judgement=judgement, decisions=tuple(search.decisions)
+        if trial.misfit < CLEARED * fit.misfit:
+            search.refused.clear()  # they were compared with a misfit that was not noise
+        search.record(*_added_poles(fit.poles, trial.poles))
+        fit, goodness = trial, trial_goodness
+    search.noise_is_trusted = search.noise_is_trusted and bool(np.median(goodness.level) < MODEL_ERROR)
+    if not search.noise_is_trusted:
+        fit, goodness = _drop_insignificant(search, fit)
+    return SelectedModes(
+        data=search.data, drift=search.drift, fit=fit, goodness=goodness, decisions=tuple(search.decisions)
     )
 
 
-def _strike(search: _Search, poles: ComplexArray) -> ComplexArray:
-    for hz, why in search.struck:
-        mine = np.array([_is_near(pole, hz) for pole in poles], bool)
-        found = poles[mine] if mine.any() else np.array([2j * np.pi * hz])  # remembered even where no pole came up
-        search.note(found, "struck", [why] * len(found))
-    return poles[~_near_struck(search, poles)]
+def _without_rejected(search: _Search, poles: ComplexArray) -> ComplexArray:
+    for hz, why in search.rejected:
+        is_meant = np.array([_is_near(pole, hz) for pole in poles], bool)
+        rejected = poles[is_meant] if is_meant.any() else np.array([2j * np.pi * hz])  # recorded even without a pole
+        search.record(rejected, "rejected", [why] * len(rejected))
+    return poles[~_is_rejected(search, poles)]
 
 
-def _near_struck(search: _Search, poles: ComplexArray) -> BoolArray:
-    return np.array([any(_is_near(pole, hz) for hz, _ in search.struck) for pole in poles], bool)
+def _is_rejected(search: _Search, poles: ComplexArray) -> BoolArray:
+    return np.array([any(_is_near(pole, hz) for hz, _ in search.rejected) for pole in poles], bool)
 
 
 def _is_near(pole: complex, hz: float) -> bool:
     return abs(abs(pole) / (2 * np.pi) - hz) < NEAR_PIN * hz
 
 
-def _pin(search: _Search, poles: ComplexArray) -> ComplexArray:
+def _with_pinned(search: _Search, poles: ComplexArray) -> ComplexArray:
     for hz, why in search.pinned:
         omega = 2 * np.pi * hz
         if not any(_is_near(pole, hz) for pole in poles):
             poles = np.append(poles, omega * complex(-0.01, 1.0))
-        search.note(np.array([omega * 1j]), "pinned", [why or SAID])
+        search.record(np.array([omega * 1j]), "pinned", [why or PIN_REASON])
     return poles
 
 
-def _protected(search: _Search, poles: ComplexArray) -> BoolArray:
+def _is_pinned(search: _Search, poles: ComplexArray) -> BoolArray:
     """Mark the pole nearest to each pinned frequency."""
-    kept = np.zeros(len(poles), bool)
+    is_pinned = np.zeros(len(poles), bool)
     for hz, _ in search.pinned:
         if len(poles):
-            kept[np.argmin(np.abs(natural_frequency_hz(poles) - hz))] = True
-    return kept
+            is_pinned[np.argmin(np.abs(natural_frequency_hz(poles) - hz))] = True
+    return is_pinned
 
 
-def _skim(search: _Search, fit: Refined) -> tuple[Refined, Judgement]:
+def _drop_insignificant(search: _Search, fit: RefinedPoles) -> tuple[RefinedPoles, GoodnessOfFit]:
     """Drop poles that are not significant, the weakest half of them at a time: one may have hidden another."""
     best = None
     while True:
-        judgement = judge(search.data, fit, search.terms, best=best)
-        best = best if search.trusted else best or judgement
-        struck = _near_struck(search, fit.poles)
-        uncertain = (judgement.damping_std > UNCERTAIN) & (judgement.significance < SURE)
-        weak = ((judgement.significance < 1) | uncertain) & ~judgement.is_needed
-        artefacts = [""] * len(fit.poles) if search.trusted else find_artefacts(search.data, fit, judgement)
-        bad = struck | (
-            (weak | np.array([bool(reason) for reason in artefacts], bool)) & ~_protected(search, fit.poles)
+        goodness = assess_fit(search.data, fit, search.terms, best=best)
+        best = best if search.noise_is_trusted else best or goodness
+        rejected = _is_rejected(search, fit.poles)
+        uncertain = (goodness.damping_std > UNCERTAIN) & (goodness.significance < SURE)
+        weak = ((goodness.significance < 1) | uncertain) & ~goodness.is_needed
+        spurious = [""] * len(fit.poles) if search.noise_is_trusted else find_spurious_poles(search.data, fit, goodness)
+        dropped = rejected | (
+            (weak | np.array([bool(reason) for reason in spurious], bool)) & ~_is_pinned(search, fit.poles)
         )
-        if not bad.any():
-            return fit, judgement
-        bad &= struck | (judgement.significance <= np.median(judgement.significance[bad]))
-        reasons = [_why(judgement, number) or artefacts[number] for number in np.flatnonzero(bad).tolist()]
-        search.note(fit.poles[bad], "dropped", reasons)
-        search.refused.extend(fit.poles[bad].tolist())
-        fit = refine(search.data, fit.poles[~bad], search.terms, iterations=ROUGH_ITERATIONS)
+        if not dropped.any():
+            return fit, goodness
+        dropped &= rejected | (goodness.significance <= np.median(goodness.significance[dropped]))
+        reasons = [_weakness(goodness, number) or spurious[number] for number in np.flatnonzero(dropped).tolist()]
+        search.record(fit.poles[dropped], "dropped", reasons)
+        search.refused.extend(fit.poles[dropped].tolist())
+        fit = refine_poles(search.data, fit.poles[~dropped], search.terms, iterations=ROUGH_ITERATIONS)
 
 
-def _why(judgement: Judgement, number: int) -> str:
-    if judgement.significance[number] < 1:
-        return f"takes off the misfit {judgement.significance[number]:.2g} of what the BIC demands"
-    if judgement.damping_std[number] > UNCERTAIN:
-        return f"its damping is known to {judgement.damping_std[number]:.0%} only"
+def _weakness(goodness: GoodnessOfFit, number: int) -> str:
+    if goodness.significance[number] < 1:
+        return f"takes off the misfit {goodness.significance[number]:.2g} of what the BIC demands"
+    if goodness.damping_std[number] > UNCERTAIN:
+        return f"its damping is known to {goodness.damping_std[number]:.0%} only"
     return ""
 
 
-def _with_drift(search: _Search, fit: Refined, judgement: Judgement) -> tuple[Refined, Judgement]:
-    found = None if search.drift else find_drift(search.data, fit, search.terms)
-    if found is None:
-        return fit, judgement
-    search.drift, moved_fit = found
-    search.data = replace(search.data, receptance=search.drift.moved)
+def _without_drift(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> tuple[RefinedPoles, GoodnessOfFit]:
+    drift_and_fit = None if search.drift else find_drift(search.data, fit, search.terms)
+    if drift_and_fit is None:
+        return fit, goodness
+    search.drift, fit_without_drift = drift_and_fit
+    search.data = replace(search.data, receptance=search.drift.receptance)
     search.refused.clear()
-    return _skim(search, moved_fit)
+    return _drop_insignificant(search, fit_without_drift)
 
 
-def _proposed(search: _Search, judgement: Judgement) -> ComplexArray:
-    chosen: list[complex] = []
-    for pole in np.concatenate([one.poles for one in judgement.missing]):
-        again = any(abs(other - pole) < NEAR_REFUSED * -pole.real for other in chosen)
-        refused = any(
-            abs(other.imag - pole.imag) < NEAR_REFUSED * max(-pole.real, -other.real) for other in search.refused
+def _proposed_poles(search: _Search, goodness: GoodnessOfFit) -> ComplexArray:
+    proposed: list[complex] = []
+    for pole in np.concatenate([candidates.poles for candidates in goodness.candidates]):
+        is_double = any(abs(known - pole) < NEAR_REFUSED * -pole.real for known in proposed)
+        was_refused = any(
+            abs(known.imag - pole.imag) < NEAR_REFUSED * max(-pole.real, -known.real) for known in search.refused
         )
-        if not (again or refused):
-            chosen.append(complex(pole))
-    poles = np.array(chosen, complex)
-    return poles[~_near_struck(search, poles)]
+        if not (is_double or was_refused):
+            proposed.append(complex(pole))
+    poles = np.array(proposed, complex)
+    return poles[~_is_rejected(search, poles)]
 
 
-def _added(before: ComplexArray, after: ComplexArray) -> tuple[ComplexArray, str, list[str]]:
+def _added_poles(before: ComplexArray, after: ComplexArray) -> tuple[ComplexArray, str, list[str]]:
     new = after
     if len(before):
         new = after[np.min(np.abs(after[:, None] - before), axis=1) > -after.real]

@@ -19,8 +19,8 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
+from frf_ipz.updating.ipz.chosen_parameters import iterate_parameters
 from frf_ipz.updating.ipz.loop import LoopResult, published_loop
-from frf_ipz.updating.ipz.parameters import iterate_parameters
 from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 

@@ -21,7 +21,7 @@ from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
-from frf_ipz.updating.minimal_change.outliers import contradicted, unmet_targets
+from frf_ipz.updating.minimal_change.outliers import contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots
@@ -61,7 +61,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     start = phase.nominal_roots(problem.computed)
     stated = _by_damping(problem.computed, start)
     phase = replace(phase, targets=phase.targets - stated)
-    left_out = contradicted(phase, start)
+    left_out = contradicted_targets(phase, start)
     phase = replace(
         phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.wanted.frf)), left_out) * LEFT_OUT**2)
     )

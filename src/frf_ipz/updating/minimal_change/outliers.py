@@ -24,7 +24,7 @@ NEAR_ENOUGH = 1e-4  # relative; what is nearer counts as met all the same
 DEAF = 1e-3  # relative change by the prior's standard deviations below which nothing moves a target
 
 
-def contradicted(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
+def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
     """Find targets that all others contradict: mostly pairs that join two different modes.
 
     Parameters
