@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
 from frf_ipz.export.run_tables import FILES
 from frf_ipz.fe.model_file import FILE_TYPES
-from frf_ipz.ingest.campaign_keys import CampaignFileKeys
+from frf_ipz.ingest.campaign_file import CampaignFileKeys
 from frf_ipz.pipeline.config import PipelineFile
 
 if TYPE_CHECKING:

@@ -175,8 +175,8 @@ def read_records(
     """
     files = files or RecordingFiles(test=test)
     survey = survey or survey_records(files, options)
-    selected = survey.used if used_only else survey.records
-    for path, group in groupby(selected, key=lambda info: info.path):
+    selected_infos = survey.used if used_only else survey.records
+    for path, group in groupby(selected_infos, key=lambda info: info.path):
         infos = list(group)
         segments = files.segments(infos[0].setup, path, [(info.start, info.stop) for info in infos])
         for info, signals in zip(infos, segments, strict=True):

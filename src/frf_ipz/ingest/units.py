@@ -117,9 +117,9 @@ def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = Fa
     output = _parse(sensitivity)
     if output.magnitude == 0:
         raise QuantityError(f"the sensitivity '{sensitivity}' is zero")
-    measured = _parse(numerator_of(sensitivity)) / output
+    measured_unit = _parse(numerator_of(sensitivity)) / output
     problem = f"the sensitivity '{sensitivity}' is not per unit of {quantity}"
-    return _convert(measured, si_unit(quantity, rotational=rotational), problem, quantity)
+    return _convert(measured_unit, si_unit(quantity, rotational=rotational), problem, quantity)
 
 
 def numerator_of(sensitivity: str) -> str:

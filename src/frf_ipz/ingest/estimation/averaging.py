@@ -120,18 +120,18 @@ def _assemble_frfs(
     """Make the FRFs of a test, in the order of its labels."""
     estimates: dict[FrfLabel, _LabelEstimate] = {}
     for setups, labels in _group_labels(test).items():
-        pooled = _pool(test, [averages[setup] for setup in setups], setups, labels)
-        estimates |= _estimate(pooled, labels, options.estimator)
-    ordered = [estimates[label] for label in test.labels]
+        pooled_average = _pool(test, [averages[setup] for setup in setups], setups, labels)
+        estimates |= _estimate(pooled_average, labels, options.estimator)
+    ordered_estimates = [estimates[label] for label in test.labels]
     duration = survey.n_samples * survey.step_s
     n_lines = survey.n_samples // 2 + 1
     return FrfSet(
         frequency_hz=np.arange(n_lines) / duration,
-        values=np.column_stack([estimate.values for estimate in ordered]),
+        values=np.column_stack([estimate.values for estimate in ordered_estimates]),
         labels=test.labels,
-        variance=np.column_stack([estimate.variance for estimate in ordered]),
-        coherence=np.column_stack([estimate.coherence for estimate in ordered]),
-        averages=np.array([estimate.count for estimate in ordered], np.int64),
+        variance=np.column_stack([estimate.variance for estimate in ordered_estimates]),
+        coherence=np.column_stack([estimate.coherence for estimate in ordered_estimates]),
+        averages=np.array([estimate.count for estimate in ordered_estimates], np.int64),
         window_decay_1_s=survey.decay_1_s,
         correlated_lines=correlated_lines(survey.decay_1_s * duration),
         unknown_scale=test.unknown_scale,
@@ -193,9 +193,9 @@ def _estimate_variance(average: SetupAverage, values: ComplexArray) -> FloatArra
 
 def _warn_of_single_records(averages: Mapping[TestSetup, SetupAverage]) -> tuple[str, ...]:
     """Say which FRFs come from a single record, and what their variance is then."""
-    single = [str(setup.input_dof) for setup, average in averages.items() if average.sums.count == 1]
-    if not single:
+    single_dofs = [str(setup.input_dof) for setup, average in averages.items() if average.sums.count == 1]
+    if not single_dofs:
         return ()
-    known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
-    source = "is the noise in that record alone" if known else "is not known"
-    return (f"a single record at {', '.join(dict.fromkeys(single))}: no coherence, and the variance {source}",)
+    is_known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
+    source = "is the noise in that record alone" if is_known else "is not known"
+    return (f"a single record at {', '.join(dict.fromkeys(single_dofs))}: no coherence, and the variance {source}",)

@@ -119,8 +119,8 @@ def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, .
         lines = lines[_contains(frf.frequency_hz, lines)]
     low = max(frf.frequency_hz[0] for frf in frfs)
     high = min(frf.frequency_hz[-1] for frf in frfs)
-    covered = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
-    if len(lines) < max(2, FEWEST_COMMON * covered):
+    n_covered = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
+    if len(lines) < max(2, FEWEST_COMMON * n_covered):
         raise _no_common_lines(frfs)
     largest = max(len(frf.frequency_hz) for frf in frfs)
     if len(lines) == largest:
@@ -135,12 +135,13 @@ def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:
 def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
     """Make the error that names the file that shares the fewest lines with the first."""
     first = frfs[0]
-    odd = min(frfs, key=lambda frf: int(_contains(frf.frequency_hz, first.frequency_hz).sum()))
+    outlier = min(frfs, key=lambda frf: int(_contains(frf.frequency_hz, first.frequency_hz).sum()))
     lines, expected = (
-        f"{len(frf.frequency_hz)} from {frf.frequency_hz[0]:g} to {frf.frequency_hz[-1]:g} Hz" for frf in (odd, first)
+        f"{len(frf.frequency_hz)} from {frf.frequency_hz[0]:g} to {frf.frequency_hz[-1]:g} Hz"
+        for frf in (outlier, first)
     )
     problem = f"its lines ({lines}) are not those of {first.source.path.name} ({expected}): all FRFs of a test need "
-    return FileFormatError(odd.source.path, problem + "common lines; export them alike")
+    return FileFormatError(outlier.source.path, problem + "common lines; export them alike")
 
 
 def _contains(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:

@@ -38,19 +38,21 @@ def add_traces(traces: tuple[Trace, ...], info: RecordInfo, record: Record) -> t
     tuple of Trace
         The same and the force of this one around its pulse; the responses too, where few are drawn yet.
     """
-    new: list[Trace] = []
+    new_traces: list[Trace] = []
     n_forces = sum(trace.unit.startswith("N") for trace in traces)
     if n_forces < MOST_FORCES:
         start, stop = info.pulse_interval
         margin = int(MARGIN * (stop - start))
         channel = record.labels[0].input_channel
-        new.append(_make_trace(record, channel, record.force, _force_unit(record), start - margin, stop + margin))
+        new_traces.append(
+            _make_trace(record, channel, record.force, _force_unit(record), start - margin, stop + margin)
+        )
     if record.used and len(traces) - n_forces < MOST_RESPONSES:
         room = MOST_RESPONSES - (len(traces) - n_forces)
         for label, response in list(zip(record.labels, record.responses, strict=True))[:room]:
             unit = si_unit(RESPONSES[label.quantity.power], rotational=label.output_dof.direction.startswith("r"))
-            new.append(_make_trace(record, label.output_channel, response, unit, 0, record.n_samples))
-    return (*traces, *new)
+            new_traces.append(_make_trace(record, label.output_channel, response, unit, 0, record.n_samples))
+    return (*traces, *new_traces)
 
 
 def thin(values: FloatArray, n_points: int) -> tuple[np.ndarray, FloatArray]:

@@ -56,9 +56,9 @@ def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
     table = pa.Table.from_batches(batches).rename_columns(list(columns.values()))
     required = [index for index, name in columns.items() if name in NUMBERS]
     numbers = np.column_stack([table[name].to_numpy() for name in NUMBERS])
-    bad = ~np.isfinite(numbers).all(axis=1)
-    if bad.any():
-        raise not_a_number(layout, names, required, int(np.argmax(bad)))
+    is_bad = ~np.isfinite(numbers).all(axis=1)
+    if is_bad.any():
+        raise not_a_number(layout, names, required, int(np.argmax(is_bad)))
     return table
 
 

@@ -81,9 +81,9 @@ def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
     indices = [index for index, name in enumerate(names) if name != SKIP]
     table = pa.Table.from_batches(read_blocks(layout, names, dict.fromkeys(indices, pa.float64())))
     numbers = np.column_stack([table.column(position).to_numpy() for position in range(len(indices))])
-    bad = ~np.isfinite(numbers).all(axis=1)
-    if bad.any():
-        raise not_a_number(layout, names, indices, int(np.argmax(bad)))
+    is_bad = ~np.isfinite(numbers).all(axis=1)
+    if is_bad.any():
+        raise not_a_number(layout, names, indices, int(np.argmax(is_bad)))
     return {names[index]: numbers[:, position] for position, index in enumerate(indices)}
 
 

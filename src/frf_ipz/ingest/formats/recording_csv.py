@@ -82,16 +82,16 @@ def _read_units_row(layout: TextLayout, rows_below: tuple[tuple[str, ...], ...])
 
 def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str]:
     """Make a line of the header as wide as the numbers where a delimiter at the end is all that differs."""
-    matched = list(fields)
-    while len(matched) > layout.n_columns and not matched[-1]:
-        matched.pop()
-    if len(matched) == layout.n_columns - 1:
-        matched.append("")
-    if len(matched) != layout.n_columns:
+    row = list(fields)
+    while len(row) > layout.n_columns and not row[-1]:
+        row.pop()
+    if len(row) == layout.n_columns - 1:
+        row.append("")
+    if len(row) != layout.n_columns:
         problem = f"has {layout.n_columns} values where the header has {len(fields)} columns"
         hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
         raise FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")
-    return matched
+    return row
 
 
 def _read_numbers(layout: TextLayout, names: list[str], indices: list[int]) -> Iterator[FloatArray]:
@@ -101,14 +101,14 @@ def _read_numbers(layout: TextLayout, names: list[str], indices: list[int]) -> I
     n_rows, first_empty = 0, -1
     for batch in read_blocks(layout, names, types):
         block = np.column_stack([batch.column(position).to_numpy(zero_copy_only=False) for position in order])
-        finite = np.abs(block) < LARGEST
-        empty = ~finite.any(axis=1) & np.isnan(block).all(axis=1)
-        if first_empty < 0 and empty.any():
-            first_empty = n_rows + int(np.argmax(empty))
-        bad = ~finite.all(axis=1) & ~empty
-        if bad.any():
-            raise not_a_number(layout, names, indices, n_rows + int(np.argmax(bad)))
-        if first_empty >= 0 and not empty[max(first_empty - n_rows, 0) :].all():
+        is_finite = np.abs(block) < LARGEST
+        is_empty = ~is_finite.any(axis=1) & np.isnan(block).all(axis=1)
+        if first_empty < 0 and is_empty.any():
+            first_empty = n_rows + int(np.argmax(is_empty))
+        is_bad = ~is_finite.all(axis=1) & ~is_empty
+        if is_bad.any():
+            raise not_a_number(layout, names, indices, n_rows + int(np.argmax(is_bad)))
+        if first_empty >= 0 and not is_empty[max(first_empty - n_rows, 0) :].all():
             raise not_a_number(layout, names, indices, first_empty)
         n_rows += len(block)
-        yield block[~empty]
+        yield block[~is_empty]

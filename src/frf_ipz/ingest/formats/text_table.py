@@ -41,9 +41,9 @@ def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
     FileFormatError
         If there is no such column, or more than one.
     """
-    plain = [name_and_unit(name)[0] for name in names]
+    bare_names = [name_and_unit(name)[0] for name in names]
     indices = [index for index, name in enumerate(names) if name == column]
-    indices = indices or [index for index, name in enumerate(plain) if name == column]
+    indices = indices or [index for index, name in enumerate(bare_names) if name == column]
     if not indices:
         known = [name for name in names if name]
         where = f"line {max(layout.n_before, 1)}"

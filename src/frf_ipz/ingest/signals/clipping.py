@@ -47,7 +47,7 @@ def is_clipped(signal: FloatArray) -> bool:
 
 
 def digital_step(signal: FloatArray) -> float:
-    """Find the step between the values of a signal that was made digital coarsely.
+    """Find the step between the values of a signal that was digitised coarsely.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def digital_step(signal: FloatArray) -> float:
     return step if float(np.abs(multiples - np.round(multiples)).max()) < 0.05 else 0.0
 
 
-def share_a_rail(peaks: FloatArray, widths: FloatArray) -> BoolArray:
-    """Tell which of several pulses have equal peaks to the last digit: they met the end of one range.
+def find_saturated_peaks(peaks: FloatArray, widths: FloatArray) -> BoolArray:
+    """Find peaks of several pulses that are equal to the last digit: they reached the end of one range.
 
     Parameters
     ----------

@@ -65,10 +65,10 @@ def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
     frequency, first, last = _power_of_halves(response, half, step_s)
     floor = _noise_floor(last)
     noise = float(np.sqrt(np.mean(floor) / np.sum(np.hanning(half) ** 2)))
-    early = maximum_filter1d(first, 5)
+    early_power = maximum_filter1d(first, 5)
     is_ringing = (last == maximum_filter1d(last, 7)) & (last > RINGING * floor) & (frequency > 2.5 / (half * step_s))
-    is_ringing &= (last < early) & _is_notable(early, frequency, power)
-    ratio = np.where(is_ringing, last / np.maximum(early, np.finfo(float).tiny), 0.0)
+    is_ringing &= (last < early_power) & _is_notable(early_power, frequency, power)
+    ratio = np.where(is_ringing, last / np.maximum(early_power, np.finfo(float).tiny), 0.0)
     ratio[_is_hum(frequency, ratio)] = 0.0
     slowest = int(np.argmax(ratio))
     return Decay(

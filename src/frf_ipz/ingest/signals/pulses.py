@@ -127,8 +127,8 @@ def _find_bumps(
     prominence = smooth - np.maximum(lowest_before, lowest_after)
     is_peak = smooth == maximum_filter1d(smooth, 2 * int(1.5 * scale) + 1, mode="nearest")
     first = float(smooth[max(peak - int(scale), 0) : peak + int(scale) + 1].max())
-    fast = smooth - gaussian_filter1d(smooth, 3.0 * scale, mode="nearest")  # without hum and drift
-    floor = max(threshold * first, SIGNIFICANT * _noise_level(fast[outside]))
+    high_pass = smooth - gaussian_filter1d(smooth, 3.0 * scale, mode="nearest")  # without hum and drift
+    floor = max(threshold * first, SIGNIFICANT * _noise_level(high_pass[outside]))
     counts = is_peak & (prominence > floor) & (np.abs(np.arange(len(upward)) - peak) > SEPARATION * scale)
     bumps = np.flatnonzero(counts)
     # Ringing swings below its surroundings as far as above: heights count from their middle, not from the trough.

@@ -118,21 +118,21 @@ def _fit_transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> tuple[
 
 def _line_weights(forces: ComplexArray, rough_forces: ComplexArray) -> FloatArray:
     """(n,) roots of the weights of lines: the information on G beside M over that without M, over `ROUGH`."""
-    beside, without = _information(rough_forces), _information(forces[:, None] * _POWERS.T)
-    ratio = beside / (ROUGH * np.maximum(without, np.finfo(float).tiny))
+    with_transient, without_transient = _information(rough_forces), _information(forces[:, None] * _POWERS.T)
+    ratio = with_transient / (ROUGH * np.maximum(without_transient, np.finfo(float).tiny))
     return np.sqrt(np.clip(ratio, np.finfo(float).eps, 1.0))
 
 
 def _information(rows: ComplexArray) -> FloatArray:
     """(n,) squared norm of the part of the first row, (n, p, width), that is orthogonal to the further rows."""
-    first, further = rows[:, :1], rows[:, 1:]
-    return np.asarray(np.sum(np.abs(first - _fit_rows(further, first) @ further) ** 2, axis=(1, 2)))
+    first_row, further_rows = rows[:, :1], rows[:, 1:]
+    return np.asarray(np.sum(np.abs(first_row - _fit_rows(further_rows, first_row) @ further_rows) ** 2, axis=(1, 2)))
 
 
 def _fit_rows(rows: ComplexArray, targets: ComplexArray) -> ComplexArray:
     """Least-squares coefficients, (n, q, p), of rows, (n, p, width), for each target row, (n, q, width)."""
-    across = rows.conj().swapaxes(1, 2)
-    normal = rows @ across
+    adjoint = rows.conj().swapaxes(1, 2)
+    normal = rows @ adjoint
     ridge = RIDGE * np.trace(normal, axis1=1, axis2=2).real + np.finfo(float).tiny
     normal = normal + ridge[:, None, None] * np.eye(rows.shape[1])
-    return np.asarray(np.linalg.solve(normal.swapaxes(1, 2), (targets @ across).swapaxes(1, 2)).swapaxes(1, 2))
+    return np.asarray(np.linalg.solve(normal.swapaxes(1, 2), (targets @ adjoint).swapaxes(1, 2)).swapaxes(1, 2))

@@ -23,9 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.record_info import RecordInfo
     from frf_ipz.progress import Progress
 
-WINDOWED = (
-    3e-4  # of the slowest mode's amplitude at the end under an automatic window: below the noise of good recordings
-)
+REMAINDER = 3e-4  # share of the slowest mode that remains under an automatic window: below the noise of good records
 SAME_LENGTH = 0.01  # relative difference up to which recordings are taken as equally long
 LONG_BEFORE = 0.12  # of a recording before its impact: more is cut off, for it holds nothing but noise
 SHORT_BEFORE = 0.05  # of a recording: what stays before the impact then
@@ -66,14 +64,13 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     _check_lengths(indices, used, options)
     n_samples = _common_length(used)
     decay_1_s, about_decay = _choose_decay(used, options)
-    windowed, about_force = _choose_force_window(selection.records, options)
+    windowed_records, about_force = _choose_force_window(selection.records, options)
     about_lines = _describe_correlation(decay_1_s * n_samples * selection.step_s)
     return Survey(
-        records=tuple(replace(record, stop=min(record.stop, record.start + n_samples)) for record in windowed),
+        records=tuple(replace(record, stop=min(record.stop, record.start + n_samples)) for record in windowed_records),
         step_s=selection.step_s,
         n_samples=n_samples,
         decay_1_s=decay_1_s,
-        force_window=bool(about_force),
         choices=(*about_decay, *about_force, *about_lines),
         warnings=(*selection.warnings, *_warn_of_truncation(used, decay_1_s)),
     )
@@ -129,9 +126,9 @@ def _without_long_lead(record: RecordInfo) -> RecordInfo:
 def _check_lengths(indices: Sequence[FileIndex], used: Sequence[RecordInfo], options: IngestOptions) -> None:
     """Refuse recordings of one impact whose lengths differ: one that was cut short would pass as a decay."""
     names = {record.path: record.name for record in used if "#" not in record.name}
-    whole = [index for index in indices if index.path in names]
-    usual = int(np.median([index.n_rows for index in whole])) if whole else 0
-    for index in whole:
+    single_impact_files = [index for index in indices if index.path in names]
+    usual = int(np.median([index.n_rows for index in single_impact_files])) if single_impact_files else 0
+    for index in single_impact_files:
         if abs(index.n_rows / usual - 1.0) > SAME_LENGTH and not is_named(names[index.path], options.keep):
             raise FileFormatError(
                 index.path,
@@ -157,7 +154,7 @@ def _choose_decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[f
         rate = 1.0 / options.exponential_window_s
         return rate, (f"exponential window of {options.exponential_window_s:g} s on force and response, as asked for",)
     rates = [
-        (np.log(record.remaining_amplitude / WINDOWED) / record.ringing_s, record)
+        (np.log(record.remaining_amplitude / REMAINDER) / record.ringing_s, record)
         for record in used
         if record.remaining_amplitude > CUT_OFF
     ]
@@ -167,7 +164,7 @@ def _choose_decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[f
     text = (
         f"exponential window of {1.0 / rate:.4g} s on force and response: without it "
         f"{100 * slowest.remaining_amplitude:.2g} % of the mode at {slowest.slowest_mode_hz:.4g} Hz would be cut off "
-        f"at the end of {slowest.name}, with it {100 * WINDOWED:.2g} %; the FRFs are exact at s = sigma + i omega"
+        f"at the end of {slowest.name}, with it {100 * REMAINDER:.2g} %; the FRFs are exact at s = sigma + i omega"
     )
     return float(rate), (text,)
 
@@ -188,10 +185,10 @@ def _choose_force_window(
     is_short = 2 * (lead + tail + 2 * taper_length(0, lead + tail)) < min(record.n_samples for record in used)
     if length_s == 0.0 or (length_s is None and (is_silent or not is_short)):
         return tuple(records), ()
-    windowed = tuple(replace(record, force_interval=_force_interval(record, lead, tail)) for record in records)
+    windowed_records = tuple(replace(record, force_interval=_force_interval(record, lead, tail)) for record in records)
     reason = "as asked for" if length_s is not None else "the pulse and its ringing, as far as they exceed the noise"
     extent = f"from {1e3 * lead * step_s:.3g} ms before the impact to {1e3 * tail * step_s:.3g} ms after it"
-    return windowed, (f"force window {extent}: {reason}",)
+    return windowed_records, (f"force window {extent}: {reason}",)
 
 
 def _force_interval(record: RecordInfo, lead: int, tail: int) -> tuple[int, int]:

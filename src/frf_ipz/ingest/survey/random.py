@@ -122,8 +122,8 @@ def _use_exponential_window(survey: Survey, decay_1_s: float) -> Survey:
     )
     step = correlated_lines(decay_1_s * survey.n_samples * survey.step_s)
     lines = f"the window correlates the noise of neighbouring lines: one in {step} is independent"
-    moving = [record.name for record in survey.used if not record.starts_at_rest]
-    warnings = [f"{name} does not start from rest: its initial motion enters the FRFs" for name in moving]
+    moving_records = [record.name for record in survey.used if not record.starts_at_rest]
+    warnings = [f"{name} does not start from rest: its initial motion enters the FRFs" for name in moving_records]
     return replace(
         survey,
         decay_1_s=decay_1_s,

@@ -118,8 +118,6 @@ class Survey:
         Samples of the segments, under Hann windows, that records are cut into; 0 for none.
     subrecord_length : int
         Samples of the sub-records, transients removed, that records are cut into; 0 for none.
-    force_window : bool
-        The force outside of its pulse is set to zero.
     choices : tuple of str
         What was chosen, and by what.
     warnings : tuple of str
@@ -132,7 +130,6 @@ class Survey:
     decay_1_s: float = 0.0
     segment_length: int = 0
     subrecord_length: int = 0
-    force_window: bool = False
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.ingest.signals.clipping import share_a_rail
+from frf_ipz.ingest.signals.clipping import find_saturated_peaks
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -133,21 +133,23 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
     """
     not_dropped = [record for record in records if not is_named(record.name, options.drop)]
     step_s = _usual_step([record.step_s for record in not_dropped or records])
-    marked = _mark_rails([_mark_step(record, step_s) for record in records])
-    decided = [_decide(record, options) for record in marked]
+    marked_records = _mark_saturated([_mark_step(record, step_s) for record in records])
+    decided_records = [_decide(record, options) for record in marked_records]
     warnings = [
         f"{record.name} is left out: {'; '.join(record.faults)}"
-        for record in decided
+        for record in decided_records
         if not record.used and record.faults
     ]
     for setup in dict.fromkeys(record.setup for record in records):
-        if not any(record.used for record in decided if record.setup == setup):
-            fallback = _least_bad(setup, decided, options, step_s)
-            decided = [replace(record, used=True) if record is fallback else record for record in decided]
+        if not any(record.used for record in decided_records if record.setup == setup):
+            fallback = _least_bad(setup, decided_records, options, step_s)
+            decided_records = [
+                replace(record, used=True) if record is fallback else record for record in decided_records
+            ]
             warnings = [text for text in warnings if not text.startswith(f"{fallback.name} is left out")]
             reason = f"although it is bad ({'; '.join(fallback.faults)}): no better record at {setup.input_dof}"
             warnings.append(f"{fallback.name} is used {reason}")
-    return Selection(records=tuple(decided), step_s=step_s, warnings=tuple(warnings))
+    return Selection(records=tuple(decided_records), step_s=step_s, warnings=tuple(warnings))
 
 
 def _usual_step(steps: Sequence[float]) -> float:
@@ -164,16 +166,16 @@ def _mark_step(record: RecordInfo, step_s: float) -> RecordInfo:
     return replace(record, faults=(*record.faults, fault))
 
 
-def _mark_rails(records: Sequence[RecordInfo]) -> list[RecordInfo]:
-    """Mark records whose peaks are equal to the last digit: they met the end of the force's range."""
-    fine = [record for record in records if not record.has_coarse_force]
-    peaks = np.array([record.peak_force + record.offsets[0] for record in fine])
-    equal = share_a_rail(peaks, np.array([record.pulse_s for record in fine]))
-    clipped = {record.name for record, is_equal in zip(fine, equal, strict=True) if is_equal}
+def _mark_saturated(records: Sequence[RecordInfo]) -> list[RecordInfo]:
+    """Mark records whose peaks are equal to the last digit: they reached the end of the force's range."""
+    fine_records = [record for record in records if not record.has_coarse_force]
+    peaks = np.array([record.peak_force + record.offsets[0] for record in fine_records])
+    is_saturated = find_saturated_peaks(peaks, np.array([record.pulse_s for record in fine_records]))
+    clipped_names = {record.name for record, saturated in zip(fine_records, is_saturated, strict=True) if saturated}
     fault = "clipping of the force: its peak equals another record's to the last digit"
     return [
         replace(record, faults=(*record.faults, fault))
-        if record.name in clipped and not any(text.startswith("clipping") for text in record.faults)
+        if record.name in clipped_names and not any(text.startswith("clipping") for text in record.faults)
         else record
         for record in records
     ]
@@ -194,10 +196,12 @@ def _least_bad(setup: TestSetup, records: Sequence[RecordInfo], options: IngestO
         raise InputError(
             f"[ingest] drop leaves no record at {setup.input_dof}; keep one, or take its entry out of test.toml"
         )
-    usable = [record for record in candidates if abs(record.step_s / step_s - 1.0) <= SAME_STEP]
-    if not usable:
+    usable_records = [record for record in candidates if abs(record.step_s / step_s - 1.0) <= SAME_STEP]
+    if not usable_records:
         raise InputError(
             f"all records at {setup.input_dof} have the time step {candidates[0].step_s:.6g} s, but the others of the "
             f"test have {step_s:.6g} s; export them with one step, or make a test of their own"
         )
-    return min(usable, key=lambda record: (len(record.faults), record.second_pulse_ratio, -abs(record.peak_force)))
+    return min(
+        usable_records, key=lambda record: (len(record.faults), record.second_pulse_ratio, -abs(record.peak_force))
+    )
