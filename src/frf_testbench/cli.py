@@ -31,19 +31,19 @@ def simulate(
     case = make_case(seed, effect, structure=structure)
     answers = (truth or out.parent / "truth") / f"{out.name}.json"
     case.write(out, answers)
-    print(f"{out}: {case.world.specimen.name}, {len(case.drives)} recordings; answers in {answers}")
+    print(f"{out}: {case.system.specimen.name}, {len(case.excitations)} records; answers in {answers}")
 
 
 @app.command("check-simulator")
 def check_simulator(
-    each: Annotated[int, typer.Option("--each", help="Specimens of each kind.")] = 3,
+    n_specimens: Annotated[int, typer.Option("--each", help="Specimens of each kind.")] = 3,
     kinds: Annotated[list[str] | None, typer.Option("--kind", help="Kind of specimen; all by default.")] = None,
     laws: Annotated[bool, typer.Option("--laws/--no-laws", help="Halve the step of force laws too.")] = True,
 ) -> None:
     """Check the simulator against nominal models and its own time step."""
     from frf_testbench.simulator.self_check import print_checks
 
-    print_checks(each=each, kinds=kinds, laws=laws)
+    print_checks(n_specimens=n_specimens, kinds=kinds, laws=laws)
 
 
 @app.command()

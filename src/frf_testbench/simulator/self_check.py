@@ -1,4 +1,4 @@
-"""Check the simulator against closed formulas and against nominal models, before its cases judge anything.
+"""Check the simulator against nominal models and against smaller steps, before its cases judge anything.
 
 ``frf-testbench check-simulator`` prints a table: for random specimens of every kind, without scatter, noise
 and effects, how far the truth is from the nominal model in frequency and in the FRFs, and how far FRFs that are
@@ -14,15 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.cases.campaign import draw_drives, true_records
 from frf_testbench.simulator.cases.case import make_case
-from frf_testbench.simulator.cases.scatter import no_scatter
-from frf_testbench.simulator.cases.set_up import draw_set_up
-from frf_testbench.simulator.cases.specimens import KINDS, draw_specimen
-from frf_testbench.simulator.cases.world import World, make_world
-from frf_testbench.simulator.signals.receptance import ModalReceptance, modal_receptance, solve_modes
-from frf_testbench.simulator.structures.points import Point
-from frf_testbench.simulator.structures.reality import hang
+from frf_testbench.simulator.cases.records import draw_excitations, simulate_records
+from frf_testbench.simulator.cases.scatter import make_zero_scatter
+from frf_testbench.simulator.cases.system import TrueSystem, build_system
+from frf_testbench.simulator.set_up import draw_set_up
+from frf_testbench.simulator.signals.receptance import ModalReceptance, make_receptance, solve_modes
+from frf_testbench.simulator.specimens import KINDS, draw_specimen
+from frf_testbench.simulator.structures.structure import Point, suspend
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -79,58 +78,61 @@ def check_nominal(kind: str, seed: int) -> Check:
     drawn = specimen.build()
     modes = solve_modes(drawn)
     set_up = draw_set_up(rng, specimen, drawn, modes)
-    early = 100 / set_up.rate_hz  # all that rings before the blow is in the record
+    early = 100 / set_up.rate_hz  # all that rings before the impact is in the record
     set_up = replace(set_up, kind="hammer", running=False, start_s=early, in_one_file=False)
-    ideal = make_world(specimen, set_up, no_scatter(specimen, set_up, float(modes.frequencies_hz[drawn.n_rigid])), ())
-    nominal_frequencies, nominal = _nominal_motion(ideal)
+    scatter = make_zero_scatter(specimen, set_up, float(modes.frequencies_hz[drawn.n_rigid]))
+    ideal_system = build_system(specimen, set_up, scatter, ())
+    nominal_hz, nominal_receptance = _solve_nominal_model(ideal_system)
     low, high = set_up.band_hz
-    truth_frequencies = ideal.modes.frequencies_hz
-    inside = np.flatnonzero((truth_frequencies >= low) & (truth_frequencies <= high))
-    ratio = nominal_frequencies[inside] / truth_frequencies[inside]
-    s, estimate = _from_records(ideal, rng)
-    truth, model = ideal.motion(s), ideal.motion(s, nominal)
+    true_hz = ideal_system.modes.frequencies_hz
+    inside = np.flatnonzero((true_hz >= low) & (true_hz <= high))
+    ratio = nominal_hz[inside] / true_hz[inside]
+    s, estimate = _estimate_from_records(ideal_system, rng)
+    truth, model = ideal_system.motion(s), ideal_system.motion(s, nominal_receptance)
     return Check(
         kind=kind,
         seed=seed,
         frequency=float(np.abs(ratio - 1).max()),
-        frf=_norm(model, truth),
-        recorded=_norm(estimate, model),
-        exact=_norm(estimate, truth),
+        frf=_relative_difference(model, truth),
+        recorded=_relative_difference(estimate, model),
+        exact=_relative_difference(estimate, truth),
         median=float(np.median(np.abs(model / truth - 1))),
     )
 
 
-def _norm(a: ComplexArray | FloatArray, b: ComplexArray | FloatArray) -> float:
+def _relative_difference(a: ComplexArray | FloatArray, b: ComplexArray | FloatArray) -> float:
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
-def _nominal_motion(ideal: World) -> tuple[FloatArray, ModalReceptance]:
-    """Natural frequencies and receptance of the nominal model, with the truth's damping and cords."""
-    structure = hang(ideal.specimen.nominal().structure(), ideal.scatter.cords_hz)
+def _solve_nominal_model(ideal_system: TrueSystem) -> tuple[FloatArray, ModalReceptance]:
+    """Give natural frequencies and receptance of the nominal model, with the truth's damping and suspension."""
+    structure = suspend(ideal_system.specimen.build_nominal_model().structure(), ideal_system.scatter.suspension_hz)
     modes = solve_modes(structure)
-    set_up, direction = ideal.set_up, ideal.specimen.direction
-    nodes = [sensor.node for sensor in set_up.sensors] + [node for node, _ in set_up.struck]
+    set_up, direction = ideal_system.set_up, ideal_system.specimen.direction
+    nodes = [sensor.node for sensor in set_up.sensors] + [node for node, _ in set_up.excited_points]
     rows = np.array([structure.row(Point(node, direction)) for node in nodes])
-    ratio = np.concatenate([np.full(structure.n_rigid, ideal.scatter.cords_damping), [set_up.damping_ratio]])
-    return modes.frequencies_hz, modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[-1]))
+    ratio = np.concatenate(
+        [np.full(structure.n_rigid, ideal_system.scatter.suspension_damping), [set_up.damping_ratio]]
+    )
+    return modes.frequencies_hz, make_receptance(modes, rows, ratio, float(modes.frequencies_hz[-1]))
 
 
-def _from_records(world: World, rng: np.random.Generator) -> tuple[ComplexArray, ComplexArray]:
-    """Lines s and FRFs (n_s, n_sensors, n_struck) estimated from the strongest noise-free blow of each point."""
-    set_up = world.set_up
-    drives = draw_drives(rng, replace(set_up, blows_each=1))
-    signals, _ = true_records(world, drives)
+def _estimate_from_records(system: TrueSystem, rng: np.random.Generator) -> tuple[ComplexArray, ComplexArray]:
+    """Estimate FRFs (n_s, n_sensors, n_excited) at lines s from the strongest noise-free record of each point."""
+    set_up = system.set_up
+    excitations = draw_excitations(rng, replace(set_up, records_each=1))
+    signals, _ = simulate_records(system, excitations)
     n = set_up.n_samples
     index = np.round(set_up.lines_hz * n / set_up.rate_hz).astype(int)
     sigma = SIGMA * set_up.rate_hz / n
     spectra = np.fft.rfft(signals * np.exp(-SIGMA * np.arange(n) / n), axis=-1)[:, :, index]
     units = np.array([sensor.unit_si for sensor in set_up.sensors])
     frf = spectra[:, 1:] * units[:, None] / spectra[:, :1]
-    return sigma + 2j * np.pi * set_up.lines_hz, frf.transpose(2, 1, 0)
+    return np.asarray(sigma + 2j * np.pi * set_up.lines_hz, np.complex128), frf.transpose(2, 1, 0)
 
 
 def check_step(effect: str, seed: int) -> tuple[float, float]:
-    """Halve the time step of a nonlinear case.
+    """Halve the time step of a nonlinear case, and compare.
 
     Parameters
     ----------
@@ -145,21 +147,21 @@ def check_step(effect: str, seed: int) -> tuple[float, float]:
         Change of the responses, and of their part in the band, norm over norm.
     """
     case = make_case(seed, effect)
-    world, drives = case.world, case.drives
-    coarse, _ = true_records(world, drives)
-    fine, _ = true_records(world, drives, refine=2)
-    set_up = world.set_up
+    system, excitations = case.system, case.excitations
+    coarse, _ = simulate_records(system, excitations)
+    fine, _ = simulate_records(system, excitations, refine=2)
+    set_up = system.set_up
     index = np.round(set_up.lines_hz * set_up.n_samples / set_up.rate_hz).astype(int)
     a, b = (np.fft.rfft(signals[:, 1:], axis=-1)[:, :, index] for signals in (coarse, fine))
-    return _norm(coarse[:, 1:], fine[:, 1:]), _norm(a, b)
+    return _relative_difference(coarse[:, 1:], fine[:, 1:]), _relative_difference(a, b)
 
 
-def print_checks(*, each: int = 3, kinds: Sequence[str] | None = None, laws: bool = True) -> None:
+def print_checks(*, n_specimens: int = 3, kinds: Sequence[str] | None = None, laws: bool = True) -> None:
     """Print the tables.
 
     Parameters
     ----------
-    each : int
+    n_specimens : int
         Specimens of each kind.
     kinds : sequence of str, optional
         Kinds of specimens; all by default.
@@ -168,7 +170,7 @@ def print_checks(*, each: int = 3, kinds: Sequence[str] | None = None, laws: boo
     """
     print(f"{'specimen':17}{'seed':>5}{'frequency':>12}{'FRF':>10}{'median':>10}{'records':>10}{'simulation':>12}")
     for kind in kinds or KINDS:
-        for seed in range(each):
+        for seed in range(n_specimens):
             c = check_nominal(kind, seed)
             print(
                 f"{kind:17}{seed:5}{c.frequency:12.1e}{c.frf:10.1e}{c.median:10.1e}{c.recorded:10.1e}{c.exact:12.1e}",
@@ -179,6 +181,6 @@ def print_checks(*, each: int = 3, kinds: Sequence[str] | None = None, laws: boo
     print(f"\n{'law':25}{'seed':>5}{'responses':>12}{'in band':>10}   (change when the step is halved)")
     effects = ("cubic_stiffness", "gap_contact", "dry_friction", "unknown:bouc_wen", "unknown:square_drag")
     for effect in effects:
-        for seed in range(each):
+        for seed in range(n_specimens):
             change, in_band = check_step(effect, seed)
             print(f"{effect:25}{seed:5}{change:12.1e}{in_band:10.1e}", flush=True)

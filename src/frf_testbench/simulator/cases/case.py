@@ -10,20 +10,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.cases.campaign import Drive, draw_drives, draw_noise, files_of, store, swing, true_records
-from frf_testbench.simulator.cases.detectability import Lines, change, four, level_change, make_lines, step_change
+from frf_testbench.simulator.cases.alternatives import fit_alternatives
+from frf_testbench.simulator.cases.detectability import (
+    FrfNoise,
+    compare_frfs,
+    compare_levels,
+    compare_steps,
+    measure_visibility,
+    predict_frf_noise,
+    round_to_four_digits,
+)
 from frf_testbench.simulator.cases.files import file_name, write_model, write_recording, write_test
-from frf_testbench.simulator.cases.nuisance import make_ruler
-from frf_testbench.simulator.cases.scatter import Scatter, draw_scatter, no_scatter
-from frf_testbench.simulator.cases.set_up import MARGIN, SetUp, draw_set_up, moving_nodes
-from frf_testbench.simulator.cases.specimens import KINDS, Specimen, draw_specimen
-from frf_testbench.simulator.cases.substitutes import compare
-from frf_testbench.simulator.cases.truth import GENERATOR, average_frf, describe, point_frfs, visibility
-from frf_testbench.simulator.cases.world import World, make_world
-from frf_testbench.simulator.effects.catalogue import draw_effects, kinds_for, needs_levels
-from frf_testbench.simulator.effects.effect import Bench, Effect
+from frf_testbench.simulator.cases.frf_distance import make_distance
+from frf_testbench.simulator.cases.records import (
+    Excitation,
+    digitise,
+    draw_excitations,
+    draw_noise,
+    group_by_file,
+    peak_motion,
+    simulate_records,
+)
+from frf_testbench.simulator.cases.scatter import Scatter, draw_scatter, make_zero_scatter
+from frf_testbench.simulator.cases.system import TrueSystem, build_system
+from frf_testbench.simulator.cases.truth import GENERATOR, compute_point_frfs, describe_case, estimate_frf
+from frf_testbench.simulator.effects.catalogue import depends_on_level, draw_effects, select_effects
+from frf_testbench.simulator.effects.effect import Effect, EffectTarget
+from frf_testbench.simulator.set_up import MARGIN, SetUp, draw_set_up, select_moving_nodes
 from frf_testbench.simulator.signals.channels import Noise
 from frf_testbench.simulator.signals.receptance import solve_modes
+from frf_testbench.simulator.specimens import KINDS, Specimen, draw_specimen
 from frf_testbench.simulator.structures.nominal import NominalModel
 
 FloatArray = NDArray[np.float64]
@@ -32,9 +48,9 @@ ATTEMPTS = 60
 WEIGHTS = {"frame": 2.5, "grid": 2.0, "plate": 1.5, "stepped": 1.5}  # of the kinds of specimens; 1 for all others
 MOST_COARSE = 1.5e-4  # error of a nominal frequency in band: a model that a user would trust
 LEAST_RATIO = 3.0  # of the change of the FRFs over their noise, RMS: below, nobody could see the effect
-LEAST_LEVEL_CHANGE = 0.01  # of responses to blows of different levels: less is hidden by the noise of a weak blow
+LEAST_LEVEL_CHANGE = 0.01  # of responses at different levels: less is hidden by the noise of a weak impact
 MOST_STEP_CHANGE = 0.02  # of the loudest responses when the step is doubled: more, and they are chaotic
-MOST_LEFT = 0.5  # of the motion at the end of a record: more, and it is a structure that feeds itself
+MOST_REMAINING_MOTION = 0.5  # of the motion at the end of a record: more, and it is a structure that feeds itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,13 +59,13 @@ class Case:
 
     Parameters
     ----------
-    world, base, ideal : World
+    system, base_system, ideal_system : TrueSystem
         With the effects; without them; without them and without scatter.
-    nominal : NominalModel
+    nominal_model : NominalModel
         What the owner of the specimen has.
-    drives : tuple of Drive
-        Blows or records.
-    stored : (n_drives, n_channels, n_samples) array
+    excitations : tuple of Excitation
+        Of all records.
+    stored : (n_records, n_channels, n_samples) array
         Recordings in the channels' units.
     noise : tuple of Noise
         Of the channels.
@@ -59,11 +75,11 @@ class Case:
         True FRFs at the points of interest, long form.
     """
 
-    world: World
-    base: World
-    ideal: World
-    nominal: NominalModel
-    drives: tuple[Drive, ...]
+    system: TrueSystem
+    base_system: TrueSystem
+    ideal_system: TrueSystem
+    nominal_model: NominalModel
+    excitations: tuple[Excitation, ...]
     stored: FloatArray
     noise: tuple[Noise, ...]
     truth: dict[str, Any]
@@ -71,13 +87,13 @@ class Case:
 
     def write(self, folder: Path, truth: Path) -> None:
         """Write what a user hands in to `folder`, and the answers to `truth` (JSON) and beside it (CSV)."""
-        set_up, specimen = self.world.set_up, self.world.specimen
-        write_model(folder, specimen, self.nominal, set_up.damping_ratio)
+        set_up, specimen = self.system.set_up, self.system.specimen
+        write_model(folder, specimen, self.nominal_model, set_up.damping_ratio)
         write_test(folder, specimen, set_up)
         columns = ("force", *(sensor.column for sensor in set_up.sensors))
-        blows = iter(self.stored)
-        for file in files_of(self.drives, set_up):
-            signals = np.concatenate([next(blows) for _ in file], axis=1)
+        records = iter(self.stored)
+        for file in group_by_file(self.excitations, set_up):
+            signals = np.concatenate([next(records) for _ in file], axis=1)
             path = folder / f"{file_name(file, set_up)}.csv"
             write_recording(path, dict(zip(columns, signals, strict=True)), set_up.rate_hz)
         truth.parent.mkdir(parents=True, exist_ok=True)
@@ -91,19 +107,19 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Ready:
-    """A specimen on its bench, before something is concealed."""
+class _PreparedTest:
+    """A specimen in its test, before something is concealed."""
 
     specimen: Specimen
     set_up: SetUp
-    nominal: NominalModel
+    nominal_model: NominalModel
     scatter: Scatter
-    base: World
-    ideal: World
-    drives: tuple[Drive, ...]
+    base_system: TrueSystem
+    ideal_system: TrueSystem
+    excitations: tuple[Excitation, ...]
     noise: tuple[Noise, ...]
-    lines: Lines
-    bench: Bench
+    frf_noise: FrfNoise
+    target: EffectTarget
 
 
 def make_case(seed: int, effect: str = "null", *, structure: str | None = None, analyse: bool = True) -> Case:
@@ -132,152 +148,166 @@ def make_case(seed: int, effect: str = "null", *, structure: str | None = None, 
     """
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([seed, attempt])
-        wanted, kinds = kinds_for(rng, effect, KINDS)
+        names, kinds = select_effects(rng, effect, KINDS)
         weights = np.array([WEIGHTS.get(kind, 1.0) for kind in kinds])
-        ready = _prepare(rng, structure or str(rng.choice(kinds, p=weights / weights.sum())), wanted)
-        if ready is None:
+        prepared = _prepare(rng, structure or str(rng.choice(kinds, p=weights / weights.sum())), names)
+        if prepared is None:
             continue
-        effects = draw_effects(rng, wanted, ready.bench)
+        effects = draw_effects(rng, names, prepared.target)
         if effects is None:
             continue
         case = _finish(
-            rng, ready, effects, head={"seed": seed, "attempt": attempt, "effect_asked": effect}, analyse=analyse
+            rng, prepared, effects, head={"seed": seed, "attempt": attempt, "effect_asked": effect}, analyse=analyse
         )
         if case is not None:
             return case
     raise RuntimeError(f"no specimen was found for the effect '{effect}' with seed {seed} in {ATTEMPTS} attempts")
 
 
-def _prepare(rng: np.random.Generator, kind: str, wanted: tuple[str, ...]) -> _Ready | None:
+def _prepare(rng: np.random.Generator, kind: str, names: tuple[str, ...]) -> _PreparedTest | None:
     """Draw a specimen and its test; None where its nominal model is too coarse for the band."""
-    thick = "shear_rotary_inertia" in wanted
+    thick = "shear_rotary_inertia" in names
     specimen = draw_specimen(rng, kind, thick_euler=thick)
     drawn = specimen.build()
     modes = solve_modes(drawn)
-    set_up = draw_set_up(rng, specimen, drawn, modes, levels=needs_levels(wanted))
-    nominal = specimen.nominal()
-    coarse = solve_modes(nominal.structure()).frequencies_hz
+    set_up = draw_set_up(rng, specimen, drawn, modes, levels=depends_on_level(names))
+    nominal_model = specimen.build_nominal_model()
+    nominal_hz = solve_modes(nominal_model.structure()).frequencies_hz
     inside = np.flatnonzero((modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1]))
-    if np.abs(coarse[inside] / modes.frequencies_hz[inside] - 1).max() > MOST_COARSE:
+    if np.abs(nominal_hz[inside] / modes.frequencies_hz[inside] - 1).max() > MOST_COARSE:
         return None
     first = float(modes.frequencies_hz[drawn.n_rigid])
     scatter = draw_scatter(rng, specimen, set_up, first)
-    base = make_world(specimen, set_up, scatter, ())
-    ideal = make_world(specimen, set_up, no_scatter(specimen, set_up, first), ())
-    drives = draw_drives(rng, set_up, double_hit=rng.random() < 0.12)
-    loudest = max(drives, key=lambda drive: drive.rms_n or (drive.blow.peak_n if drive.blow else 0.0))
-    signals, _ = true_records(base, (loudest,))
+    base_system = build_system(specimen, set_up, scatter, ())
+    ideal_system = build_system(specimen, set_up, make_zero_scatter(specimen, set_up, first), ())
+    excitations = draw_excitations(rng, set_up, double_hit=rng.random() < 0.12)
+    loudest = max(
+        excitations, key=lambda excitation: excitation.rms_n or (excitation.impact.peak_n if excitation.impact else 0.0)
+    )
+    signals, _ = simulate_records(base_system, (loudest,))
     noise = draw_noise(rng, signals)
-    bench = Bench(
+    target = EffectTarget(
         specimen=specimen,
         set_up=set_up,
         structure=drawn,
         modes=modes,
-        nodes=tuple(moving_nodes(drawn, modes, set_up.band_hz, MARGIN)),
+        nodes=tuple(select_moving_nodes(drawn, modes, set_up.band_hz, MARGIN)),
         mass_kg=specimen.mass_kg,
-        swing=lambda motion: swing(ideal, drives, motion),
-        vibration=lambda motion: swing(ideal, drives, motion, drifting=False)[0],
+        peak_motion=lambda motion: peak_motion(ideal_system, excitations, motion),
+        peak_vibration=lambda motion: peak_motion(ideal_system, excitations, motion, drifting=False)[0],
     )
-    return _Ready(
+    return _PreparedTest(
         specimen=specimen,
         set_up=set_up,
-        nominal=nominal,
+        nominal_model=nominal_model,
         scatter=scatter,
-        base=base,
-        ideal=ideal,
-        drives=drives,
+        base_system=base_system,
+        ideal_system=ideal_system,
+        excitations=excitations,
         noise=noise,
-        lines=make_lines(base, drives, noise),
-        bench=bench,
+        frf_noise=predict_frf_noise(base_system, excitations, noise),
+        target=target,
     )
 
 
 def _finish(
-    rng: np.random.Generator, ready: _Ready, effects: tuple[Effect, ...], *, head: dict[str, Any], analyse: bool
+    rng: np.random.Generator,
+    prepared: _PreparedTest,
+    effects: tuple[Effect, ...],
+    *,
+    head: dict[str, Any],
+    analyse: bool,
 ) -> Case | None:
     """Simulate the test with the effects; None where nobody could see them, or where the structure is not stable."""
-    world = make_world(ready.specimen, ready.set_up, ready.scatter, effects)
-    visible = visibility(ready.lines, ready.ideal, world)
+    system = build_system(prepared.specimen, prepared.set_up, prepared.scatter, effects)
+    visible = measure_visibility(prepared.frf_noise, prepared.ideal_system, system)
     if not _is_visible(visible, effects):
         return None
     try:
-        signals, points = true_records(world, ready.drives)
+        signals, points = simulate_records(system, prepared.excitations)
     except FloatingPointError:
         return None
-    left = _left_at_end(signals, world)
-    if left > MOST_LEFT:
+    remaining_motion = _measure_remaining_motion(signals, system)
+    if remaining_motion > MOST_REMAINING_MOTION:
         return None
     if any(effect.law for effect in effects):
-        visible["step_change"] = four(step_change(world, ready.drives, signals))
+        visible["step_change"] = round_to_four_digits(compare_steps(system, prepared.excitations, signals))
         if visible["step_change"] > MOST_STEP_CHANGE:
             return None
-    if _depends_on_blow(effects):
-        visible |= _by_level(ready, world, signals)
+    if _depends_on_record(effects):
+        visible |= _compare_levels(prepared, system, signals)
         if visible["level_ratio_rms"] < LEAST_RATIO or visible["level_change"] < LEAST_LEVEL_CHANGE:
             return None
-    stored, full_scale = store(rng, signals, ready.noise, ready.set_up)
+    stored, full_scale = digitise(rng, signals, prepared.noise, prepared.set_up)
     truth = {"generator": GENERATOR} | head
-    truth |= describe(ready.ideal, world, ready.nominal, ready.drives, ready.noise)
-    if analyse and not _depends_on_blow(effects):
-        truth |= _rivals(ready, world, visible)
-    truth["noise"]["full_scale"] = [four(value) for value in full_scale]
-    truth["detectability"] = visible | {"left_at_end": four(left)}
+    truth |= describe_case(prepared.ideal_system, system, prepared.nominal_model, prepared.excitations, prepared.noise)
+    if analyse and not _depends_on_record(effects):
+        truth |= _weigh_alternatives(prepared, system, visible)
+    truth["noise"]["full_scale"] = [round_to_four_digits(value) for value in full_scale]
+    truth["detectability"] = visible | {"left_at_end": round_to_four_digits(remaining_motion)}
     return Case(
-        world=world,
-        base=ready.base,
-        ideal=ready.ideal,
-        nominal=ready.nominal,
-        drives=ready.drives,
+        system=system,
+        base_system=prepared.base_system,
+        ideal_system=prepared.ideal_system,
+        nominal_model=prepared.nominal_model,
+        excitations=prepared.excitations,
         stored=stored,
-        noise=ready.noise,
+        noise=prepared.noise,
         truth=truth,
-        points=point_frfs(world, ready.drives, signals, points),
+        points=compute_point_frfs(system, prepared.excitations, signals, points),
     )
 
 
-def _rivals(ready: _Ready, world: World, visible: dict[str, Any]) -> dict[str, Any]:
+def _weigh_alternatives(prepared: _PreparedTest, system: TrueSystem, visible: dict[str, Any]) -> dict[str, Any]:
     """Measure the evidence for each effect, and find what may explain a single one as well; adds to `visible`."""
-    if not world.effects:
+    if not system.effects:
         return {}
-    ruler = make_ruler(world, ready.lines)
-    frequencies = ruler.frequencies_hz
-    ideal = make_world(ready.specimen, ready.set_up, ready.ideal.scatter, world.effects)
-    visible["scatter_nats"] = four(ruler.nats(ideal.measured_frf(frequencies)))
-    visible["evidence_nats"] = four(ruler.nats(ready.base.measured_frf(frequencies)))
-    if len(world.effects) > 1:
-        for i, one in enumerate(visible["each"]):
-            others = world.effects[:i] + world.effects[i + 1 :]
-            without = make_world(ready.specimen, ready.set_up, ready.scatter, others)
-            one["evidence_nats"] = four(ruler.nats(without.measured_frf(frequencies)))
+    distance = make_distance(system, prepared.frf_noise)
+    frequencies = distance.frequencies_hz
+    without_scatter = build_system(prepared.specimen, prepared.set_up, prepared.ideal_system.scatter, system.effects)
+    visible["scatter_nats"] = round_to_four_digits(distance.measure(without_scatter.measured_frf(frequencies)))
+    visible["evidence_nats"] = round_to_four_digits(distance.measure(prepared.base_system.measured_frf(frequencies)))
+    if len(system.effects) > 1:
+        for i, change in enumerate(visible["each"]):
+            other_effects = system.effects[:i] + system.effects[i + 1 :]
+            without = build_system(prepared.specimen, prepared.set_up, prepared.scatter, other_effects)
+            change["evidence_nats"] = round_to_four_digits(distance.measure(without.measured_frf(frequencies)))
         return {}
-    found = compare(ready.bench, world, ruler)
-    equivalents = found.pop("equivalents")
-    visible |= found
+    alternatives = fit_alternatives(prepared.target, system, distance)
+    equivalents = alternatives.pop("equivalents")
+    visible |= alternatives
     return {"equivalents": equivalents}
 
 
-def _by_level(ready: _Ready, world: World, signals: FloatArray) -> dict[str, Any]:
+def _compare_levels(prepared: _PreparedTest, system: TrueSystem, signals: FloatArray) -> dict[str, Any]:
     """Compare with what the structure would do without laws, saturation and drift."""
-    linear_effects = [effect for effect in world.effects if not _depends_on_blow((effect,))]
-    linear = make_world(ready.specimen, ready.set_up, ready.scatter, linear_effects)
-    without, _ = true_records(linear, ready.drives)
-    units = np.array([sensor.unit_si for sensor in ready.set_up.sensors])
+    linear_effects = [effect for effect in system.effects if not _depends_on_record((effect,))]
+    linear = build_system(prepared.specimen, prepared.set_up, prepared.scatter, linear_effects)
+    without, _ = simulate_records(linear, prepared.excitations)
+    units = np.array([sensor.unit_si for sensor in prepared.set_up.sensors])
     frfs = [
-        np.stack([average_frf(one[mine, 1:], one[mine, :1], ready.set_up) for mine in _by_point(ready)], axis=2)
+        np.stack(
+            [
+                estimate_frf(x[records, 1:], x[records, :1], prepared.set_up)
+                for records in _group_by_point(prepared.excitations, len(prepared.set_up.excited_points))
+            ],
+            axis=2,
+        )
         * units[:, None]
-        for one in (signals, without)
+        for x in (signals, without)
     ]
-    return change(ready.lines, *frfs) | level_change(signals, without, ready.noise, ready.drives, world)
+    return compare_frfs(prepared.frf_noise, *frfs) | compare_levels(
+        signals, without, prepared.noise, prepared.excitations, system
+    )
 
 
-def _by_point(ready: _Ready) -> list[list[int]]:
-    """Return indices of the blows of each struck point."""
-    points = range(len(ready.set_up.struck))
-    return [[i for i, drive in enumerate(ready.drives) if drive.struck == point] for point in points]
+def _group_by_point(excitations: tuple[Excitation, ...], n_points: int) -> list[list[int]]:
+    """Return indices of the records of each excited point."""
+    return [[i for i, excitation in enumerate(excitations) if excitation.point == point] for point in range(n_points)]
 
 
-def _depends_on_blow(effects: tuple[Effect, ...]) -> bool:
-    """Whether the FRFs of single blows differ."""
+def _depends_on_record(effects: tuple[Effect, ...]) -> bool:
+    """Whether the FRFs of single records differ."""
     return any(not effect.is_linear or effect.drift for effect in effects)
 
 
@@ -285,12 +315,12 @@ def _is_visible(visible: dict[str, Any], effects: tuple[Effect, ...]) -> bool:
     """Whether each effect that changes the linear FRFs does so beyond the noise."""
     linear = [effect.is_linear and not effect.drift for effect in effects]
     changes = visible.get("each", [visible])
-    return all(one["ratio_rms"] >= LEAST_RATIO for one, counts in zip(changes, linear, strict=False) if counts)
+    return all(change["ratio_rms"] >= LEAST_RATIO for change, counts in zip(changes, linear, strict=False) if counts)
 
 
-def _left_at_end(signals: FloatArray, world: World) -> float:
-    """Largest motion in the last part of a record over the largest one; of a shaker, what is left of a burst."""
-    if world.set_up.kind == "random" and world.set_up.burst == 1.0:
+def _measure_remaining_motion(signals: FloatArray, system: TrueSystem) -> float:
+    """Measure the largest motion in the last part of a record over the largest one; of a shaker, after a burst."""
+    if system.set_up.kind == "random" and system.set_up.burst == 1.0:
         return 0.0
     tail = np.abs(signals[:, 1:, -signals.shape[2] // 50 :]).max(axis=2)
     return float((tail / np.abs(signals[:, 1:]).max(axis=2)).max())

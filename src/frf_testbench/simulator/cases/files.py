@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.cases.campaign import Drive
-from frf_testbench.simulator.cases.set_up import SetUp
-from frf_testbench.simulator.cases.specimens import Specimen
+from frf_testbench.simulator.cases.records import Excitation
+from frf_testbench.simulator.set_up import SetUp
+from frf_testbench.simulator.specimens import Specimen
 from frf_testbench.simulator.structures.beams import BeamDrawing, PointPart, Section
 from frf_testbench.simulator.structures.frames import FrameDrawing
 from frf_testbench.simulator.structures.nominal import NominalModel
@@ -40,12 +40,13 @@ def write_recording(path: Path, columns: dict[str, FloatArray], rate_hz: float, 
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def file_name(drives: tuple[Drive, ...], set_up: SetUp) -> str:
-    """Name a file of blows or a record by where and how often it was struck, without its ending."""
+def file_name(excitations: tuple[Excitation, ...], set_up: SetUp) -> str:
+    """Name a file of records by the point and the order of its first one, without its ending."""
+    first = excitations[0]
     if set_up.kind != "hammer":
-        return f"records/r_{drives[0].order + 1:02d}"
-    point = f"hits/p{set_up.struck[drives[0].struck][0]}"
-    return f"{point}_all" if set_up.in_one_file else f"{point}_{drives[0].order + 1:02d}"
+        return f"records/r_{first.order + 1:02d}"
+    stem = f"hits/p{set_up.excited_points[first.point][0]}"
+    return f"{stem}_all" if set_up.in_one_file else f"{stem}_{first.order + 1:02d}"
 
 
 def read_beam(path: Path) -> BeamDrawing:
@@ -86,7 +87,7 @@ def write_toml(path: Path, text: str) -> None:
     path.write_text(text.strip() + "\n", encoding="utf-8")
 
 
-def write_model(folder: Path, specimen: Specimen, nominal: NominalModel, damping_ratio: float) -> None:
+def write_model(folder: Path, specimen: Specimen, nominal_model: NominalModel, damping_ratio: float) -> None:
     """Write ``model.toml``, and the matrices of a model of kind matrices.
 
     Parameters
@@ -95,7 +96,7 @@ def write_model(folder: Path, specimen: Specimen, nominal: NominalModel, damping
         Of the case.
     specimen : Specimen
         What its owner knows.
-    nominal : NominalModel
+    nominal_model : NominalModel
         Its matrices.
     damping_ratio : float
         Of all modes.
@@ -104,15 +105,15 @@ def write_model(folder: Path, specimen: Specimen, nominal: NominalModel, damping
     head = f'[model]\nkind = "{specimen.family}"\nname = "{specimen.name}"\n\n'
     head += f"[damping]\nmodal_ratio = {damping_ratio!r}\n\n"
     if isinstance(drawing, BeamDrawing):
-        body = _beam_table(drawing)
+        body = _format_beam(drawing)
     elif isinstance(drawing, FrameDrawing):
-        body = _frame_table(drawing)
+        body = _format_frame(drawing)
     else:
-        body = _matrices(folder, nominal)
+        body = _write_matrices(folder, nominal_model)
     write_toml(folder / "model.toml", head + body)
 
 
-def _beam_table(drawing: BeamDrawing) -> str:
+def _format_beam(drawing: BeamDrawing) -> str:
     keys = {
         "length_m": drawing.length_m,
         "elements": drawing.elements,
@@ -125,32 +126,32 @@ def _beam_table(drawing: BeamDrawing) -> str:
         "left": drawing.left,
         "right": drawing.right,
     }
-    text = "[beam]\n" + _pairs(keys)
+    text = "[beam]\n" + _format_keys(keys)
     for section in drawing.sections:
         text += f"\n[[beam.section]]\nelements = [{section.first}, {section.last}]\n"
-        text += _pairs({"thickness_m": section.thickness_m, "width_m": section.width_m})
+        text += _format_keys({"thickness_m": section.thickness_m, "width_m": section.width_m})
     for part in drawing.parts:
-        text += "\n[[beam.point_mass]]\n" + _pairs({"node": part.node, "mass_kg": part.mass_kg})
+        text += "\n[[beam.point_mass]]\n" + _format_keys({"node": part.node, "mass_kg": part.mass_kg})
     return text
 
 
-def _frame_table(drawing: FrameDrawing) -> str:
+def _format_frame(drawing: FrameDrawing) -> str:
     text = f'[lumped]\ndirection = "{drawing.direction}"\n'
     for i, mass in enumerate(drawing.masses_kg):
-        text += "\n[[lumped.mass]]\n" + _pairs({"node": i + 1, "mass_kg": mass})
+        text += "\n[[lumped.mass]]\n" + _format_keys({"node": i + 1, "mass_kg": mass})
     for spring in drawing.springs:
         text += f'\n[[lumped.spring]]\nid = "{spring.id}"\nnodes = [{spring.nodes[0]}, {spring.nodes[1]}]\n'
         text += f"stiffness_N_m = {spring.stiffness_n_m!r}\n"
     return text
 
 
-def _pairs(keys: dict[str, object]) -> str:
+def _format_keys(keys: dict[str, object]) -> str:
     return "".join(
         f'{key} = "{value}"\n' if isinstance(value, str) else f"{key} = {value!r}\n" for key, value in keys.items()
     )
 
 
-def _matrices(folder: Path, model: NominalModel) -> str:
+def _write_matrices(folder: Path, model: NominalModel) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     write_matrix(folder / "M.mtx", model.mass)
     write_matrix(folder / "K.mtx", model.stiffness)
@@ -198,7 +199,7 @@ def write_test(folder: Path, specimen: Specimen, set_up: SetUp) -> None:
     for sensor in set_up.sensors:
         text += f'\n[[channel]]\ncolumn = "{sensor.column}"\nrole = "output"\nquantity = "{sensor.quantity}"\n'
         text += f'unit = "{sensor.unit}"\ndof = "{dof(sensor.node, sensor.sign)}"\n'
-    for node, sign in set_up.struck:
+    for node, sign in set_up.excited_points:
         table, pattern = ("hit", f"hits/p{node}_*.csv") if set_up.kind == "hammer" else ("record", "records/r_*.csv")
         text += f'\n[[{table}]]\ndof = "{dof(node, sign)}"\nfiles = ["{pattern}"]\n'
     write_toml(folder / "test.toml", text)

@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.cases.set_up import SetUp
-from frf_testbench.simulator.cases.specimens import Specimen
+from frf_testbench.simulator.set_up import SetUp
 from frf_testbench.simulator.signals.laws import Law
 from frf_testbench.simulator.signals.receptance import DynamicStiffness, Modes
-from frf_testbench.simulator.structures.points import Point, Structure
+from frf_testbench.simulator.specimens import Specimen
 from frf_testbench.simulator.structures.reality import Reality
+from frf_testbench.simulator.structures.structure import Motion, Point, Structure
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Gain = Callable[[ComplexArray], ComplexArray]
-Pair = tuple[Point, Point | None]  # a motion: of one point, or of the first minus the second
 
-LEAST_VIBRATION = 0.5  # of the motion at a nonlinear law: nobody puts a stop a hand's breadth from a hanging plate
+LEAST_VIBRATION_SHARE = (
+    0.5  # of the motion at a nonlinear law: nobody puts a stop a hand's breadth from a hanging plate
+)
 
 
-def unchanged(reality: Reality) -> Reality:
+def keep_reality(reality: Reality) -> Reality:
     """Leave a structure as it is."""
     return reality
 
@@ -33,7 +34,7 @@ def unchanged(reality: Reality) -> Reality:
 class Mount:
     """A dynamic stiffness between motions of the structure."""
 
-    motions: tuple[Pair, ...]
+    motions: tuple[Motion, ...]
     stiffness: DynamicStiffness
 
 
@@ -49,7 +50,7 @@ class Effect:
         Of an effect outside the table.
     location, parameters : mapping
         As in ``diagnosis.json``, parameters as plain numbers.
-    change : callable
+    change_reality : callable
         What it does to the structure.
     mounts : tuple of Mount
         What it attaches.
@@ -61,32 +62,32 @@ class Effect:
         Transfer functions of channels, besides their gain.
     crosstalk : tuple of (to, from, factor)
         Signals that leak into other channels.
-    moved : mapping of str to int
+    sensor_nodes : mapping of str to int
         Channels, and the node where the sensor really is.
     saturation : mapping of str to float
-        Channels, and the part of their peak where an amplifier bends.
+        Channels, and the fraction of their peak where an amplifier bends.
     law : Law, optional
         A nonlinear force, acting on `law_motion`.
-    law_motion : Pair, optional
+    law_motion : Motion, optional
         First point minus second.
     drift : float
-        Relative change of all frequencies from the first blow to the last.
+        Relative change of all frequencies from the first impact to the last.
     """
 
     name: str
     kind: str | None = None
     location: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    change: Callable[[Reality], Reality] = unchanged
+    change_reality: Callable[[Reality], Reality] = keep_reality
     mounts: tuple[Mount, ...] = ()
     damping_factor: float = 1.0
     modulus: Gain | None = None
     gains: Mapping[str, Gain] = field(default_factory=dict)
     crosstalk: tuple[tuple[str, str, float], ...] = ()
-    moved: Mapping[str, int] = field(default_factory=dict)
+    sensor_nodes: Mapping[str, int] = field(default_factory=dict)
     saturation: Mapping[str, float] = field(default_factory=dict)
     law: Law | None = None
-    law_motion: Pair | None = None
+    law_motion: Motion | None = None
     drift: float = 0.0
 
     @property
@@ -96,8 +97,8 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Bench:
-    """What is known when an effect is drawn: the specimen on its test bench, still without the effect.
+class EffectTarget:
+    """The specimen that an effect is drawn for, in its test, still without the effect.
 
     Parameters
     ----------
@@ -109,10 +110,10 @@ class Bench:
         Nodes that move well in some mode of the band.
     mass_kg : float
         Of all that moves.
-    swing : callable
-        Largest motion and velocity at a motion `Pair` over all blows, m and m/s: scales of nonlinear effects.
-    vibration : callable
-        Largest motion at a `Pair` without that of a free structure as a whole, m.
+    peak_motion : callable
+        Largest displacement and velocity of a `Motion` over all records, m and m/s: scales of nonlinear effects.
+    peak_vibration : callable
+        Largest displacement of a `Motion` without that of a free structure as a whole, m.
     """
 
     specimen: Specimen
@@ -121,8 +122,8 @@ class Bench:
     modes: Modes
     nodes: tuple[int, ...]
     mass_kg: float
-    swing: Callable[[Pair], tuple[float, float]]
-    vibration: Callable[[Pair], float]
+    peak_motion: Callable[[Motion], tuple[float, float]]
+    peak_vibration: Callable[[Motion], float]
 
     @property
     def in_band(self) -> NDArray[np.bool_]:
@@ -139,32 +140,37 @@ class Bench:
         """Return the translation of a node."""
         return Point(node, self.specimen.direction)
 
-    def shapes(self, motion: Pair) -> FloatArray:
-        """(n_modes,) mass-normalised shapes at a motion."""
-        row = self.structure.row(motion[0]) - (0 if motion[1] is None else self.structure.row(motion[1]))
-        return row @ self.modes.shapes
+    def shapes(self, motion: Motion) -> FloatArray:
+        """Return the (n_modes,) mass-normalised shapes of a motion."""
+        return np.asarray(self.structure.motion_row(motion) @ self.modes.shapes)
 
-    def is_vibration(self, motion: Pair) -> bool:
-        """Whether a motion is mostly vibration, and not the drift of a free structure in its cords."""
-        return not self.structure.n_rigid or self.vibration(motion) > LEAST_VIBRATION * self.swing(motion)[0]
+    def is_mostly_vibration(self, motion: Motion) -> bool:
+        """Whether a motion is mostly vibration, and not the drift of a free structure in its suspension."""
+        return (
+            not self.structure.n_rigid
+            or self.peak_vibration(motion) > LEAST_VIBRATION_SHARE * self.peak_motion(motion)[0]
+        )
 
-    def stiffness(self, motion: Pair) -> float:
-        """Stiffness against a motion by the modes of the band, N/m: a scale for springs."""
+    def stiffness(self, motion: Motion) -> float:
+        """Return the stiffness against a motion by the modes of the band, N/m: a scale for springs."""
         shapes = self.shapes(motion)[self.in_band]
         return float(1 / np.sum(shapes**2 / self.modes.omega_rad_s[self.in_band] ** 2))
 
-    def damping(self, motion: Pair) -> float:
-        """Damper that gives the best mode of the band as much damping as it has, N s/m: a scale for dampers."""
+    def damping(self, motion: Motion) -> float:
+        """Return the damper that doubles the damping of the mode it damps best, N s/m: a scale for dampers."""
         shapes, omega = self.shapes(motion)[self.in_band], self.modes.omega_rad_s[self.in_band]
         return float((2 * self.set_up.damping_ratio * omega / shapes**2).min())
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+Draw = Callable[[np.random.Generator, EffectTarget], Effect | None]
+
+
+def draw_log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """Draw a positive number whose logarithm is uniform, with four digits."""
     return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
 
 
-def constant(matrix: list[list[float]] | FloatArray, factor: Gain) -> DynamicStiffness:
-    """Dynamic stiffness that is a fixed matrix times a function of s."""
-    fixed = np.asarray(matrix, dtype=float)
-    return lambda s: factor(s)[:, None, None] * fixed
+def make_dynamic_stiffness(matrix: list[list[float]] | FloatArray, factor: Gain) -> DynamicStiffness:
+    """Make a dynamic stiffness that is a constant matrix times a function of s."""
+    constant = np.asarray(matrix, dtype=float)
+    return lambda s: factor(s)[:, None, None] * constant

@@ -1,52 +1,49 @@
-"""Nonlinear effects: the last part of the contract's table. Sizes follow what the place does in the strongest blow."""
+"""Nonlinear effects: the last part of the contract's table. Sizes follow the motion of their location."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from frf_testbench.simulator.effects.dissipative import spring_motion
-from frf_testbench.simulator.effects.effect import Bench, Effect, Pair, log_uniform
+from frf_testbench.simulator.effects.dissipative import spring_extension
+from frf_testbench.simulator.effects.effect import Draw, Effect, EffectTarget, draw_log_uniform
 from frf_testbench.simulator.signals.laws import Coulomb, Gap, PowerSpring
 from frf_testbench.simulator.structures.frames import FrameDrawing
+from frf_testbench.simulator.structures.structure import Motion
 
-Draw = Callable[[np.random.Generator, Bench], Effect | None]
 
-
-def draw_place(rng: np.random.Generator, bench: Bench) -> tuple[Pair, dict[str, object]]:
-    """Draw a node that blows move, or a spring of a frame.
+def draw_law_location(rng: np.random.Generator, target: EffectTarget) -> tuple[Motion, dict[str, object]]:
+    """Draw a node that the test moves, or a spring of a frame.
 
     Parameters
     ----------
     rng : Generator
         Of the case.
-    bench : Bench
-        The specimen on its test bench.
+    target : EffectTarget
+        The specimen in its test.
 
     Returns
     -------
-    motion : Pair
-        What the law feels.
+    motion : Motion
+        What the law acts on.
     location : dict
         As in ``diagnosis.json``.
     """
-    drawing = bench.specimen.drawing
+    drawing = target.specimen.drawing
     if isinstance(drawing, FrameDrawing) and rng.random() < 0.5:
         spring = drawing.springs[int(rng.integers(len(drawing.springs)))]
-        return spring_motion(bench, spring.id), {"springs": [spring.id]}
-    place: Pair | None = None
-    while place is None or not bench.swing(place)[0]:  # members of a grid may be at rest while others move
-        node = int(rng.choice(bench.nodes))
-        place = bench.point(node), None
-    return place, {"nodes": [node]}
+        return spring_extension(target, spring.id), {"springs": [spring.id]}
+    motion: Motion | None = None
+    while motion is None or not target.peak_motion(motion)[0]:  # members of a grid may be at rest while others move
+        node = int(rng.choice(target.nodes))
+        motion = target.point(node), None
+    return motion, {"nodes": [node]}
 
 
-def cubic_stiffness(rng: np.random.Generator, bench: Bench) -> Effect:
+def draw_cubic_stiffness(rng: np.random.Generator, target: EffectTarget) -> Effect:
     """Draw a hardening cubic spring."""
-    motion, location = draw_place(rng, bench)
-    largest, _ = bench.swing(motion)
-    cubic = log_uniform(rng, 0.1, 8) * bench.stiffness(motion) / largest**2
+    motion, location = draw_law_location(rng, target)
+    largest, _ = target.peak_motion(motion)
+    cubic = draw_log_uniform(rng, 0.1, 8) * target.stiffness(motion) / largest**2
     return Effect(
         name="cubic_stiffness",
         location=location,
@@ -56,12 +53,12 @@ def cubic_stiffness(rng: np.random.Generator, bench: Bench) -> Effect:
     )
 
 
-def gap_contact(rng: np.random.Generator, bench: Bench) -> Effect:
-    """Draw a stop that is touched in strong blows."""
-    motion, location = draw_place(rng, bench)
-    largest, _ = bench.swing(motion)
+def draw_gap_contact(rng: np.random.Generator, target: EffectTarget) -> Effect:
+    """Draw a stop that is touched in strong records."""
+    motion, location = draw_law_location(rng, target)
+    largest, _ = target.peak_motion(motion)
     gap = float(f"{largest * rng.uniform(0.08, 0.7):.4g}")
-    stiffness = log_uniform(rng, 0.1, 20) * bench.stiffness(motion)
+    stiffness = draw_log_uniform(rng, 0.1, 20) * target.stiffness(motion)
     return Effect(
         name="gap_contact",
         location=location,
@@ -71,11 +68,11 @@ def gap_contact(rng: np.random.Generator, bench: Bench) -> Effect:
     )
 
 
-def dry_friction(rng: np.random.Generator, bench: Bench) -> Effect:
+def draw_dry_friction(rng: np.random.Generator, target: EffectTarget) -> Effect:
     """Draw Coulomb friction."""
-    motion, location = draw_place(rng, bench)
-    largest, _ = bench.swing(motion)
-    friction = log_uniform(rng, 3e-4, 0.02) * bench.stiffness(motion) * largest
+    motion, location = draw_law_location(rng, target)
+    largest, _ = target.peak_motion(motion)
+    friction = draw_log_uniform(rng, 3e-4, 0.02) * target.stiffness(motion) * largest
     return Effect(
         name="dry_friction",
         location=location,
@@ -85,4 +82,6 @@ def dry_friction(rng: np.random.Generator, bench: Bench) -> Effect:
     )
 
 
-DRAWS: dict[str, Draw] = {draw.__name__: draw for draw in (cubic_stiffness, gap_contact, dry_friction)}
+DRAWS: dict[str, Draw] = {
+    draw.__name__.removeprefix("draw_"): draw for draw in (draw_cubic_stiffness, draw_gap_contact, draw_dry_friction)
+}

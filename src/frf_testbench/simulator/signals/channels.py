@@ -25,7 +25,7 @@ class AntiAlias:
     attenuation_db : float
         In the stopband.
     symmetric : bool
-        Linear phase: it rings before the blow too. Otherwise the minimum-phase filter of the same gain.
+        Linear phase: it rings before an impact too. Otherwise the minimum-phase filter of the same gain.
     """
 
     passband: float = 0.42
@@ -34,7 +34,7 @@ class AntiAlias:
     symmetric: bool = True
 
     def taps(self, oversampling: int) -> FloatArray:
-        """Impulse response at the oversampled rate; an odd number of taps."""
+        """Return the impulse response at the oversampled rate; an odd number of taps."""
         width = 2 * (self.stopband - self.passband) / oversampling
         count, beta = signal.kaiserord(self.attenuation_db, width)
         cutoff = (self.passband + self.stopband) / oversampling
@@ -42,13 +42,13 @@ class AntiAlias:
         return np.asarray(taps if self.symmetric else signal.minimum_phase(taps, half=False))
 
     def gain(self, grid: LaplaceGrid) -> ComplexArray:
-        """(n_lines,) transfer function on the lines of a grid; without delay where it is symmetric."""
+        """Return the (n_lines,) transfer function on the lines of a grid; without delay where it is symmetric."""
         taps = self.taps(grid.oversampling)
         steps = np.arange(taps.size) - (taps.size // 2 if self.symmetric else 0)
         delay = steps / (grid.rate_hz * grid.oversampling)
-        placed = np.zeros(grid.n_padded * grid.oversampling)
-        placed[steps] = taps * np.exp(-grid.sigma_1_s * delay)  # negative steps wrap to the end
-        return np.fft.rfft(placed)[: grid.n_padded // 2 + 1]
+        impulse_response = np.zeros(grid.n_padded * grid.oversampling)
+        impulse_response[steps] = taps * np.exp(-grid.sigma_1_s * delay)  # negative steps wrap to the end
+        return np.fft.rfft(impulse_response)[: grid.n_padded // 2 + 1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ class Noise:
     pink_fraction: float = 0.0
 
     def draw(self, rng: np.random.Generator, n: int) -> FloatArray:
-        """(n,) noise."""
+        """Draw (n,) noise."""
         white = rng.standard_normal(n)
         lines = np.fft.rfft(rng.standard_normal(n))
         lines /= np.sqrt(np.maximum(np.arange(lines.size), 1))

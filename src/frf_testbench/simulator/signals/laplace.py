@@ -56,13 +56,14 @@ class LaplaceGrid:
     def s(self) -> ComplexArray:
         """(n_lines,) lines from zero to half the sampling rate."""
         lines = np.arange(self.n_padded // 2 + 1) * self.rate_hz / self.n_padded
-        return self.sigma_1_s + 2j * np.pi * lines
+        return np.asarray(self.sigma_1_s + 2j * np.pi * lines, np.complex128)
 
     @property
     def fine_s(self) -> ComplexArray:
         """Lines from zero to half the oversampled rate."""
         n = self.n_padded * self.oversampling
-        return self.sigma_1_s + 2j * np.pi * np.arange(n // 2 + 1) * self.rate_hz / self.n_padded
+        lines = np.arange(n // 2 + 1)
+        return np.asarray(self.sigma_1_s + 2j * np.pi * lines * self.rate_hz / self.n_padded, np.complex128)
 
     def spectrum(self, fine: FloatArray, *, all_lines: bool = False) -> ComplexArray:
         """Transform of a signal at the oversampled rate.

@@ -1,7 +1,7 @@
 """Force laws of nonlinear springs, gaps, friction and hysteresis.
 
-A law is asked once a step for its force at the end of the step. Motion and velocity at the place, without the law's own
-force of this step, are ``w`` and ``v``; its force f moves the place by ``-beta f`` and changes the velocity by
+A law is asked once a step for its force at the end of the step. Motion and velocity at its location, without the law's
+own force of this step, are ``w`` and ``v``; its force f moves the location by ``-beta f`` and changes the velocity by
 ``-gamma f``. So every law solves its own small equation, and stiff contact and sticking need no iteration over the
 structure.
 """
@@ -20,22 +20,22 @@ NEWTON_STEPS = 3  # from a guess that is exact to first order in a small beta
 
 
 class Law(Protocol):
-    """A force law between a place and the ground, or across a spring.
+    """A force law between a point and the ground, or across a spring.
 
-    A law that can hold the place still keeps its force constant within a step: with a linear one it would ring.
+    A law that can hold its location still keeps its force constant within a step: with a linear one it would ring.
     """
 
     @property
-    def held(self) -> bool:
+    def is_constant_within_step(self) -> bool:
         """Whether the force is constant within a step."""
         ...
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
-        """(n_blows,) restoring force at the end of a step, N; called once a step, in order."""
+        """Return the (n_records,) restoring force at the end of a step, N; called once a step, in order."""
         ...
 
-    def restart(self, n_blows: int) -> None:
-        """Forget the past."""
+    def restart(self, n_records: int) -> None:
+        """Forget the past, before `n_records` records are computed side by side."""
         ...
 
 
@@ -45,9 +45,9 @@ class PowerSpring:
 
     stiffness: float
     power: int
-    held: ClassVar[bool] = False
+    is_constant_within_step: ClassVar[bool] = False
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Nothing to forget."""
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
@@ -66,9 +66,9 @@ class Gap:
 
     stiffness: float
     gap: float
-    held: ClassVar[bool] = False
+    is_constant_within_step: ClassVar[bool] = False
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Nothing to forget."""
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
@@ -83,16 +83,16 @@ class TwoSided:
 
     stiffness: float
     gap: float
-    held: ClassVar[bool] = False
+    is_constant_within_step: ClassVar[bool] = False
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Nothing to forget."""
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
         """Solve in closed form."""
         del v, gamma
-        beyond = w - np.clip(w, -self.gap, self.gap)
-        return beyond * (self.stiffness / (1 + beta * self.stiffness))
+        overlap = w - np.clip(w, -self.gap, self.gap)
+        return overlap * (self.stiffness / (1 + beta * self.stiffness))
 
 
 @dataclass(kw_only=True)
@@ -100,9 +100,9 @@ class Coulomb:
     """Dry friction with sticking."""
 
     friction: float
-    held: ClassVar[bool] = True
+    is_constant_within_step: ClassVar[bool] = True
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Nothing to forget."""
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
@@ -116,9 +116,9 @@ class SquareDrag:
     """Force ``drag v |v|``."""
 
     drag: float
-    held: ClassVar[bool] = False
+    is_constant_within_step: ClassVar[bool] = False
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Nothing to forget."""
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
@@ -135,12 +135,12 @@ class BoucWen:
 
     stiffness: float
     yield_m: float
-    held: ClassVar[bool] = False
+    is_constant_within_step: ClassVar[bool] = False
 
-    def restart(self, n_blows: int) -> None:
+    def restart(self, n_records: int) -> None:
         """Start without history."""
-        self._z = np.zeros(n_blows)
-        self._w = np.zeros(n_blows)
+        self._z = np.zeros(n_records)
+        self._w = np.zeros(n_records)
 
     def force(self, w: FloatArray, v: FloatArray, beta: float, gamma: float) -> FloatArray:
         """Explicit in the slope of the hysteresis, implicit in the force."""
@@ -150,7 +150,7 @@ class BoucWen:
         slope = np.where(loading, 1 - np.minimum(np.abs(self._z) / self.yield_m, 1), 1.0)
         stiff = self.stiffness * slope
         # u - w_old = (w - beta k z) - w_old with z = z_old + slope (u - w_old)
-        moved = (w - beta * self.stiffness * self._z - self._w) / (1 + beta * stiff)
-        self._z = self._z + slope * moved
-        self._w = self._w + moved
+        increment = (w - beta * self.stiffness * self._z - self._w) / (1 + beta * stiff)
+        self._z = self._z + slope * increment
+        self._w = self._w + increment
         return self.stiffness * self._z

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from frf_testbench.simulator.structures.points import Structure
+from frf_testbench.simulator.structures.structure import Structure
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -43,7 +43,7 @@ class Modes:
 
 
 def solve_modes(structure: Structure) -> Modes:
-    """All modes of a structure.
+    """Solve for all modes of a structure.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class ModalReceptance:
     modulus : callable, optional
         Factor of the whole stiffness matrix at `s`.
     attachments : tuple of Attachment
-        Whatever has a dynamic stiffness of its own.
+        Parts with a dynamic stiffness of their own.
     """
 
     omega_rad_s: FloatArray
@@ -101,15 +101,17 @@ class ModalReceptance:
     attachments: tuple[Attachment, ...] = ()
 
     def __call__(self, s: ComplexArray, outputs: list[int], inputs: list[int]) -> ComplexArray:
-        """(n_s, n_outputs, n_inputs) receptance at `s`, m/N."""
+        """Return the (n_s, n_outputs, n_inputs) receptance at `s`, m/N."""
         if not self.attachments:
-            return self._bare(s, self._rows(outputs), self._rows(inputs))
+            return self._without_attachments(s, self._rows(outputs), self._rows(inputs))
         P = np.vstack([a.rows for a in self.attachments])
         D = self._dynamic_stiffness(s, len(P))
-        H_op = self._bare(s, self._rows(outputs), P)
-        H_pi = self._bare(s, P, self._rows(inputs))
-        inner = np.eye(len(P)) + self._bare(s, P, P) @ D
-        return self._bare(s, self._rows(outputs), self._rows(inputs)) - H_op @ D @ np.linalg.solve(inner, H_pi)
+        H_op = self._without_attachments(s, self._rows(outputs), P)
+        H_pi = self._without_attachments(s, P, self._rows(inputs))
+        inner = np.eye(len(P)) + self._without_attachments(s, P, P) @ D
+        return self._without_attachments(s, self._rows(outputs), self._rows(inputs)) - H_op @ D @ np.linalg.solve(
+            inner, H_pi
+        )
 
     def _rows(self, indices: list[int]) -> FloatArray:
         return np.eye(len(self.shapes))[indices]
@@ -123,8 +125,8 @@ class ModalReceptance:
             start = stop
         return D
 
-    def _bare(self, s: ComplexArray, left: FloatArray, right: FloatArray) -> ComplexArray:
-        """Receptance without attachments."""
+    def _without_attachments(self, s: ComplexArray, left: FloatArray, right: FloatArray) -> ComplexArray:
+        """Return the receptance without attachments."""
         modulus = np.ones_like(s) if self.modulus is None else self.modulus(s)
         square = self.omega_rad_s**2
         gains = 1 / (
@@ -136,7 +138,7 @@ class ModalReceptance:
         return total + left @ self.static @ right.T / modulus[:, None, None]
 
 
-def modal_receptance(
+def make_receptance(
     modes: Modes,
     rows: FloatArray,
     damping_ratio: FloatArray,
@@ -144,7 +146,7 @@ def modal_receptance(
     *,
     modulus: DynamicStiffness | None = None,
 ) -> ModalReceptance:
-    """Receptance between rows of a structure with modal damping.
+    """Make the receptance between rows of a structure with modal damping.
 
     Parameters
     ----------
@@ -168,8 +170,8 @@ def modal_receptance(
     n_modes = max(int(np.count_nonzero(modes.frequencies_hz <= highest_hz)), 1)
     high, omega = shapes[:, n_modes:], modes.omega_rad_s[n_modes:]
     ratio = np.full(n_modes, damping_ratio[-1])
-    n_given = min(n_modes, damping_ratio.size)
-    ratio[:n_given] = damping_ratio[:n_given]
+    n_ratios = min(n_modes, damping_ratio.size)
+    ratio[:n_ratios] = damping_ratio[:n_ratios]
     return ModalReceptance(
         omega_rad_s=modes.omega_rad_s[:n_modes],
         damping_ratio=ratio,

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from frf_testbench.simulator.structures.points import Point, Structure
-from frf_testbench.simulator.structures.reality import Reality, hang
-from frf_testbench.simulator.structures.splines import SplineBasis, spline_basis
+from frf_testbench.simulator.structures.reality import Reality
+from frf_testbench.simulator.structures.splines import SplineBasis, make_spline_basis
+from frf_testbench.simulator.structures.structure import Point, Structure, suspend
 
 FloatArray = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ class BeamDrawing:
 
 
 def build_beam(drawing: BeamDrawing, reality: Reality | None = None, *, intervals: int = INTERVALS) -> Structure:
-    """Rayleigh-Ritz model of a beam.
+    """Build the Rayleigh-Ritz model of a beam.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def build_beam(drawing: BeamDrawing, reality: Reality | None = None, *, interval
         nodes=nodes,
         n_rigid=drawing.n_rigid,
     )
-    return hang(reality.finish(beam), reality.cords_hz)
+    return suspend(reality.add_extras(beam), reality.suspension_hz)
 
 
 class _Builder:
@@ -138,14 +138,16 @@ class _Builder:
         self.drawing, self.reality = drawing, reality
         self.timoshenko = (reality.formulation or drawing.formulation) == "timoshenko"
         steps = {drawing.position(n) for s in drawing.sections for n in (s.first, s.last + 1)}
-        steps |= {drawing.position(n) for (a, b), _ in reality.softened for n in (a, b + 1)}
+        steps |= {drawing.position(n) for first, last, _ in reality.softened_segments for n in (first, last + 1)}
         nodes = {*reality.all_stations, *(part.node for part in drawing.parts)}
         loads = {drawing.position(node) for node in nodes}
         # a step makes the curvature jump, a force the shear force; with shear flexibility both make corners of w
         kinks = dict.fromkeys(loads, 0 if self.timoshenko else 2) | dict.fromkeys(steps, 0 if self.timoshenko else 1)
-        self.deflection = spline_basis(drawing.length_m, intervals, kinks)
+        self.deflection = make_spline_basis(drawing.length_m, intervals, kinks)
         slopes = dict.fromkeys(loads, 1) | dict.fromkeys(steps, 0)
-        self.slope: SplineBasis | None = spline_basis(drawing.length_m, intervals, slopes) if self.timoshenko else None
+        self.slope: SplineBasis | None = (
+            make_spline_basis(drawing.length_m, intervals, slopes) if self.timoshenko else None
+        )
 
     @property
     def size(self) -> int:
@@ -153,15 +155,15 @@ class _Builder:
 
     def row(self, x: float, direction: str) -> FloatArray:
         """Motion at a position for unit generalised coordinates; ``ry`` is minus the slope."""
-        where = np.array([x])
+        position = np.array([x])
         row = np.zeros(self.size)
         n_w = self.deflection.size
         if direction == "z":
-            row[:n_w] = self.deflection.values(where)[0]
+            row[:n_w] = self.deflection.values(position)[0]
         elif self.slope:
-            row[n_w:] = -self.slope.values(where)[0]
+            row[n_w:] = -self.slope.values(position)[0]
         else:
-            row[:n_w] = -self.deflection.values(where, 1)[0]
+            row[:n_w] = -self.deflection.values(position, 1)[0]
         return row
 
     def held_rows(self) -> FloatArray:
@@ -199,11 +201,11 @@ class _Builder:
         width, thickness = self.drawing.rectangle(x)
         area, second_moment = width * thickness, width * thickness**3 / 12
         xi = x / self.drawing.length_m
-        softness = self.reality.stiffness_ratio * self.reality.stiffness(xi)
-        for (first, last), ratio in self.reality.softened:
+        relative_stiffness = self.reality.stiffness_ratio * self.reality.stiffness(xi)
+        for first, last, ratio in self.reality.softened_segments:
             inside = (x > self.drawing.position(first)) & (x < self.drawing.position(last + 1))
-            softness = np.where(inside, ratio * softness, softness)
-        bending = weights * self.drawing.youngs_modulus_pa * second_moment * softness
+            relative_stiffness = np.where(inside, ratio * relative_stiffness, relative_stiffness)
+        bending = weights * self.drawing.youngs_modulus_pa * second_moment * relative_stiffness
         line_mass = weights * self.drawing.density_kg_m3 * area * self.reality.density(xi)
         value, slope = self._fields(x, 0), self._fields(x, 1)
         mass = _gram(value, line_mass)
@@ -212,7 +214,7 @@ class _Builder:
             return mass, stiffness + _gram(self._fields(x, 2), bending)
         turn, curvature = self._slopes(x, 0), self._slopes(x, 1)
         modulus = self.drawing.youngs_modulus_pa / (2 * (1 + self.drawing.poisson_ratio))
-        shear = weights * self.drawing.shear_coefficient * modulus * area * softness
+        shear = weights * self.drawing.shear_coefficient * modulus * area * relative_stiffness
         rotary = line_mass * second_moment / area
         return mass + _gram(turn, rotary), stiffness + _gram(curvature, bending) + _gram(slope - turn, shear)
 

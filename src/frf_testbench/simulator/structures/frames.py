@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.structures.points import Point, Structure
-from frf_testbench.simulator.structures.reality import Reality, hang
+from frf_testbench.simulator.structures.reality import Reality
+from frf_testbench.simulator.structures.structure import Point, Structure, suspend
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class FrameDrawing:
 
 
 def build_frame(drawing: FrameDrawing, reality: Reality | None = None) -> Structure:
-    """Matrices of a frame.
+    """Build the matrices of a frame.
 
     Parameters
     ----------
@@ -62,24 +62,28 @@ def build_frame(drawing: FrameDrawing, reality: Reality | None = None) -> Struct
     """
     reality = reality or Reality()
     n = len(drawing.masses_kg)
-    at = np.zeros(1)
-    masses = [m * float(reality.density(at, part=i)[0]) for i, m in enumerate(drawing.masses_kg)]
+    origin = np.zeros(1)
+    masses = [m * float(reality.density(origin, part=i)[0]) for i, m in enumerate(drawing.masses_kg)]
     stiffness = np.zeros((n + 1, n + 1))
     for i, spring in enumerate(drawing.springs):
         row = np.zeros(n + 1)
         row[spring.nodes[0]], row[spring.nodes[1]] = -1, 1
-        factor = float(reality.stiffness(at, part=i)[0]) * reality.stiffness_ratio * reality.ratio(spring.id)
+        factor = (
+            float(reality.stiffness(origin, part=i)[0])
+            * reality.stiffness_ratio
+            * reality.stiffness_ratio_of(spring.id)
+        )
         stiffness += factor * spring.stiffness_n_m * np.outer(row, row)
 
-    def row_of(point: Point) -> FloatArray:
+    def point_row(point: Point) -> FloatArray:
         return np.eye(n + 1)[point.node, 1:]  # the ground does not move
 
     frame = Structure(
         mass=np.diag(masses),
         stiffness=stiffness[1:, 1:],
-        row=row_of,
+        row=point_row,
         nodes={node: (float(node), 0.0, 0.0) for node in range(1, n + 1)},
         direction=drawing.direction,
         n_rigid=drawing.n_rigid,
     )
-    return hang(reality.finish(frame), reality.cords_hz)
+    return suspend(reality.add_extras(frame), reality.suspension_hz)

@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.structures.points import Point, Structure
-from frf_testbench.simulator.structures.reality import Reality, hang
+from frf_testbench.simulator.structures.reality import Reality
+from frf_testbench.simulator.structures.structure import Point, Structure, suspend
 
 FloatArray = NDArray[np.float64]
 
@@ -122,7 +122,8 @@ class GridDrawing:
     def held(self, node: int) -> tuple[str, ...]:
         """Directions that a support holds."""
         kind = self.supports.get(node)
-        return {"clamped": ("z", "rx", "ry"), "pinned": ("z",), None: ()}[kind]
+        directions: dict[str | None, tuple[str, ...]] = {"clamped": ("z", "rx", "ry"), "pinned": ("z",), None: ()}
+        return directions[kind]
 
 
 def _divide(
@@ -134,14 +135,15 @@ def _divide(
         a, b = np.array(nodes[start]), np.array(nodes[stop])
         for i in range(1, count):
             number = max(nodes) + 1
-            nodes[number] = tuple((a + (b - a) * i / count).tolist())
+            x, y, z = (a + (b - a) * i / count).tolist()
+            nodes[number] = (x, y, z)
             chain.append(number)
         chain.append(stop)
     return tuple(chain)
 
 
 def build_grid(drawing: GridDrawing, reality: Reality | None = None) -> Structure:
-    """Model of a grid with long elements of high degree.
+    """Build the model of a grid with long elements of high degree.
 
     Parameters
     ----------
@@ -170,11 +172,11 @@ def build_grid(drawing: GridDrawing, reality: Reality | None = None) -> Structur
         nodes=drawing.layout[0],
         n_rigid=drawing.n_rigid,
     )
-    return hang(reality.finish(grid), reality.cords_hz)
+    return suspend(reality.add_extras(grid), reality.suspension_hz)
 
 
 def _bending(xi: FloatArray, length: float, derivative: int) -> FloatArray:
-    """Cubic end functions (w, slope, w, slope) and bubbles on -1..1, differentiated along the beam."""
+    """Evaluate cubic end functions (w, slope, w, slope) and bubbles on -1..1, differentiated along the beam."""
     p = np.polynomial.Polynomial
     half = length / 2
     ends = [p([2, -3, 0, 1]) / 4, p([1, -1, -1, 1]) * half / 4, p([2, 3, 0, -1]) / 4, p([-1, -1, 1, 1]) * half / 4]
@@ -185,7 +187,7 @@ def _bending(xi: FloatArray, length: float, derivative: int) -> FloatArray:
 
 
 def _torsion(xi: FloatArray, length: float, derivative: int) -> FloatArray:
-    """Linear end functions and bubbles on -1..1."""
+    """Evaluate linear end functions and bubbles on -1..1."""
     p = np.polynomial.Polynomial
     bubbles = [p([1, 0, -1]) * np.polynomial.Legendre.basis(j).convert(kind=p) for j in range(BUBBLES)]
     shapes = (p([0.5, -0.5]), p([0.5, 0.5]), *bubbles)
@@ -250,17 +252,17 @@ class _Mesh:
         for element in self.elements:
             member, half = self.members[element.member], element.length / 2
             along = (element.start + half * (1 + xi)) / drawing.size_m[0 if member.along_x else 1]
-            soft = reality.stiffness(along, part=element.member) * half * weights
-            soft *= reality.stiffness_ratio * reality.ratio(member.name)
-            heavy = reality.density(along, part=element.member) * half * weights * drawing.density_kg_m3
-            for shapes, where, elastic, inert, order in (
+            stiffness_weights = reality.stiffness(along, part=element.member) * half * weights
+            stiffness_weights *= reality.stiffness_ratio * reality.stiffness_ratio_of(member.name)
+            mass_weights = reality.density(along, part=element.member) * half * weights * drawing.density_kg_m3
+            for shapes, functions, elastic, inert, order in (
                 (_bending, element.bending, drawing.youngs_modulus_pa * member.bending_moment, member.area, 2),
                 (_torsion, element.torsion, shear_modulus * member.torsion_constant, member.polar_moment, 1),
             ):
-                index, sign = np.array([i for i, _ in where]), np.array([s for _, s in where])
+                index, sign = np.array([i for i, _ in functions]), np.array([s for _, s in functions])
                 strain, value = sign * shapes(xi, element.length, order), sign * shapes(xi, element.length, 0)
-                stiffness[np.ix_(index, index)] += elastic * strain.T @ (soft[:, None] * strain)
-                mass[np.ix_(index, index)] += inert * value.T @ (heavy[:, None] * value)
+                stiffness[np.ix_(index, index)] += elastic * strain.T @ (stiffness_weights[:, None] * strain)
+                mass[np.ix_(index, index)] += inert * value.T @ (mass_weights[:, None] * value)
         return mass, stiffness
 
     def row(self, point: Point) -> FloatArray:
@@ -280,20 +282,20 @@ class _Mesh:
         along_x = self.members[element.member].along_x
         x = np.array([xi])
         if point.direction == "z":
-            where, values = element.bending, _bending(x, element.length, 0)[0]
+            functions, values = element.bending, _bending(x, element.length, 0)[0]
         elif (point.direction == "ry") == along_x:  # the slope
-            where, values = element.bending, (-1 if along_x else 1) * _bending(x, element.length, 1)[0]
+            functions, values = element.bending, (-1 if along_x else 1) * _bending(x, element.length, 1)[0]
         else:
-            where, values = element.torsion, _torsion(x, element.length, 0)[0]
-        for (i, sign), value in zip(where, values, strict=True):
+            functions, values = element.torsion, _torsion(x, element.length, 0)[0]
+        for (i, sign), value in zip(functions, values, strict=True):
             row[i] += sign * value
         return row
 
     def _locate(self, point: Point) -> tuple[_Element, float]:
-        """Element that holds a point, and the place within it."""
+        """Find the element that holds a point, and the position within it."""
         index = next(i for i, member in enumerate(self.members) if point.node in member.nodes)
         member = self.members[index]
-        place = self._along(member, point.node) + point.offset_m[0 if member.along_x else 1]
-        mine = [element for element in self.elements if element.member == index]
-        element = next((e for e in mine if place <= e.start + e.length), mine[-1])
-        return element, 2 * (place - element.start) / element.length - 1
+        position = self._along(member, point.node) + point.offset_m[0 if member.along_x else 1]
+        elements = [element for element in self.elements if element.member == index]
+        element = next((e for e in elements if position <= e.start + e.length), elements[-1])
+        return element, 2 * (position - element.start) / element.length - 1

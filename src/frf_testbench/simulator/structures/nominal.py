@@ -16,11 +16,18 @@ from scipy.linalg import eigh, null_space, svd
 from frf_testbench.simulator.structures.beams import BeamDrawing
 from frf_testbench.simulator.structures.frames import FrameDrawing, build_frame
 from frf_testbench.simulator.structures.grids import GridDrawing
-from frf_testbench.simulator.structures.plates import PlateDrawing, free_functions, panel_term, plate_matrix, plate_row
-from frf_testbench.simulator.structures.points import Point, Structure
-from frf_testbench.simulator.structures.splines import spline_basis
+from frf_testbench.simulator.structures.plates import (
+    PlateDrawing,
+    assemble_plate_matrix,
+    evaluate_plate_row,
+    make_panel_term,
+    select_free_functions,
+)
+from frf_testbench.simulator.structures.splines import make_spline_basis
+from frf_testbench.simulator.structures.structure import Point, Structure
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int_]
 Dof = tuple[int, str]
 
 PLATE_ELEMENTS = 15  # at least, to a side: 5e-5 in the frequencies in band
@@ -51,7 +58,7 @@ class NominalModel:
         """Return the model as a structure, to compare it with the truth."""
 
         def row(point: Point) -> FloatArray:
-            return np.eye(len(self.dofs))[self.dofs.index((point.node, point.direction))]
+            return np.asarray(np.eye(len(self.dofs))[self.dofs.index((point.node, point.direction))])
 
         direction = self.dofs[0][1]
         return Structure(
@@ -64,15 +71,22 @@ class NominalModel:
         )
 
 
-def _assemble(size: int, elements: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+def _assemble(size: int, elements: list[tuple[IntArray, FloatArray]]) -> FloatArray:
     total = np.zeros((size, size))
     for index, matrix in elements:
         total[np.ix_(index, index)] += matrix
     return total
 
 
+def _add(matrices: list[FloatArray]) -> FloatArray:
+    total = matrices[0].copy()
+    for matrix in matrices[1:]:
+        total = total + matrix
+    return total
+
+
 def _timoshenko_element(length: float, phi: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Stiffness over EI/l^3, translational mass over rho A l, rotary mass over rho I / l; DOFs w, slope, w, slope.
+    """Give stiffness over EI/l^3, translational mass over rho A l, rotary mass over rho I / l; DOFs w, slope, w, slope.
 
     Przemieniecki (1968), sections 5.6 and 11.3; phi = 12 EI / (k G A l^2).
     """
@@ -95,8 +109,8 @@ def _timoshenko_element(length: float, phi: float) -> tuple[FloatArray, FloatArr
     return stiffness, (weights * deflection) @ deflection.T, (weights * slope) @ slope.T
 
 
-def nominal_beam(drawing: BeamDrawing) -> NominalModel:
-    """Two-node elements as in the model file."""
+def build_nominal_beam(drawing: BeamDrawing) -> NominalModel:
+    """Build the two-node elements of the model file."""
     size = 2 * (drawing.elements + 1)
     length = drawing.length_m / drawing.elements
     shear_modulus = drawing.youngs_modulus_pa / (2 * (1 + drawing.poisson_ratio))
@@ -132,8 +146,8 @@ def nominal_beam(drawing: BeamDrawing) -> NominalModel:
     )
 
 
-def nominal_grid(drawing: GridDrawing) -> NominalModel:
-    """Cubic elements between all nodes of a grid; one group a member."""
+def build_nominal_grid(drawing: GridDrawing) -> NominalModel:
+    """Build cubic elements between all nodes of a grid; one group a member."""
     nodes, members = drawing.layout
     size = 3 * max(nodes)
     shear_modulus = drawing.youngs_modulus_pa / (2 * (1 + drawing.poisson_ratio))
@@ -162,72 +176,71 @@ def nominal_grid(drawing: GridDrawing) -> NominalModel:
     parts = {name: (k[pick], m[pick]) for name, (k, m) in groups.items()}
     return NominalModel(
         dofs=tuple(dofs[i] for i in free),
-        mass=sum(m for _, m in parts.values()),
-        stiffness=sum(k for k, _ in parts.values()),
+        mass=_add([m for _, m in parts.values()]),
+        stiffness=_add([k for k, _ in parts.values()]),
         groups=parts,
         nodes=nodes,
         n_rigid=drawing.n_rigid,
     )
 
 
-def nominal_plate(drawing: PlateDrawing) -> NominalModel:
-    """Bicubic elements, reduced to the DOFs of the nodes; one group a panel."""
+def build_nominal_plate(drawing: PlateDrawing) -> NominalModel:
+    """Build bicubic elements, reduced to the DOFs of the nodes; one group a panel."""
     counts = (drawing.nodes_x - 1, drawing.nodes_y - 1)
     bases = []
     for size, count in zip(drawing.size_m, counts, strict=True):
         fineness = -(-PLATE_ELEMENTS // count)
         lines = {float(x): 1 for x in np.linspace(0, size, fineness * count + 1)[1:-1]}
-        bases.append(spline_basis(size, 1, lines, degree=3))
+        bases.append(make_spline_basis(size, 1, lines, degree=3))
     pair = (bases[0], bases[1])
-    free = free_functions(drawing, pair)
+    free = select_free_functions(drawing, pair)
     pick = np.ix_(free, free)
-    panels = {
-        f"panel_{i}": tuple(
-            plate_matrix(drawing, pair, [panel_term(drawing, i, 1.0)], mass=mass)[pick] for mass in (False, True)
-        )
-        for i in range(1, 5)
-    }
+    panels = {}
+    for i in range(1, 5):
+        terms = [make_panel_term(drawing, i, 1.0)]
+        stiffness, mass = (assemble_plate_matrix(drawing, pair, terms, mass=mass)[pick] for mass in (False, True))
+        panels[f"panel_{i}"] = (stiffness, mass)
     nodes = [node for node in drawing.nodes if not drawing.held(node)]
     dofs = [(node, direction) for node in nodes for direction in ("z", "rx", "ry")]
-    rows = np.array([plate_row(pair, drawing.nodes[node], direction)[free] for node, direction in dofs])
+    rows = np.array([evaluate_plate_row(pair, drawing.nodes[node], direction)[free] for node, direction in dofs])
     moving = np.abs(rows).max(axis=1) > 1e-9 * np.abs(rows).max()
     T = _reduction(list(panels.values()), rows[moving], drawing.n_rigid + 8)
     groups = {name: (T.T @ k @ T, T.T @ m @ T) for name, (k, m) in panels.items()}
     return NominalModel(
         dofs=tuple(dof for dof, moves in zip(dofs, moving, strict=True) if moves),
-        mass=sum(m for _, m in groups.values()),
-        stiffness=sum(k for k, _ in groups.values()),
+        mass=_add([m for _, m in groups.values()]),
+        stiffness=_add([k for k, _ in groups.values()]),
         groups=groups,
         nodes={node: drawing.nodes[node] for node in nodes},
         n_rigid=drawing.n_rigid,
     )
 
 
-def _reduction(parts: list[tuple[FloatArray, ...]], rows: FloatArray, n_modes: int) -> FloatArray:
-    """Motions of all coordinates for unit motions of the rows.
+def _reduction(parts: list[tuple[FloatArray, FloatArray]], rows: FloatArray, n_modes: int) -> FloatArray:
+    """Compute the motions of all coordinates for unit motions of the rows.
 
     They span the lowest modes, how these change with the stiffness of each part, and the static shapes of all loads
     at the rows that do not excite these.
     """
-    stiffness, mass = (sum(part[i] for part in parts) for i in (0, 1))
+    stiffness, mass = (_add([part[i] for part in parts]) for i in (0, 1))
     squares, shapes = eigh(stiffness, mass)
     n_exact = n_modes + 4
     high, high_squares = shapes[:, n_exact:], squares[n_exact:]
     changes = np.hstack(
         [(high.T @ part[0] @ shapes[:, :n_modes]) / (high_squares[:, None] - squares[:n_modes]) for part in parts[:-1]]
     )  # of all parts together the modes do not change
-    stretch = np.sqrt(high_squares)[:, None]
-    strained = stretch * changes
+    scale = np.sqrt(high_squares)[:, None]  # in the norm of the elastic energy
+    strained = scale * changes
     directions, sizes, _ = svd(strained / np.linalg.norm(strained, axis=0), full_matrices=False)
-    kept = directions[:, sizes > 0.05 * sizes[0]] / stretch
-    low = np.hstack([shapes[:, :n_exact], high @ kept])
+    corrections = directions[:, sizes > 0.05 * sizes[0]] / scale
+    low = np.hstack([shapes[:, :n_exact], high @ corrections])
     static = high / high_squares @ (rows @ high).T
     basis = np.hstack([low, static @ null_space((rows @ low).T)])
     return np.asarray(basis @ np.linalg.inv(rows @ basis))
 
 
-def nominal_frame(drawing: FrameDrawing) -> NominalModel:
-    """Matrices of a frame as drawn."""
+def build_nominal_frame(drawing: FrameDrawing) -> NominalModel:
+    """Build the matrices of a frame as drawn."""
     frame = build_frame(drawing)
     n = len(drawing.masses_kg)
     return NominalModel(

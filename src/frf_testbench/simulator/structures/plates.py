@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.structures.points import Point, Structure
-from frf_testbench.simulator.structures.reality import Reality, Variation, hang
-from frf_testbench.simulator.structures.splines import SplineBasis, spline_basis
+from frf_testbench.simulator.structures.reality import Reality, Variation
+from frf_testbench.simulator.structures.splines import SplineBasis, make_spline_basis
+from frf_testbench.simulator.structures.structure import Point, Structure, suspend
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 INTERVALS = 20  # 2e-8 in the frequencies in band, 0.2 % in the residual compliance at a driving point
 
@@ -77,16 +78,17 @@ class PlateDrawing:
     def held(self, node: int) -> bool:
         """Whether a support holds a node."""
         x, y, _ = self.nodes[node]
-        on = {"left": x == 0, "right": x == self.size_m[0], "bottom": y == 0, "top": y == self.size_m[1]}
-        return any(on[edge] for edge in self.edges)
+        on_edge = {"left": x == 0, "right": x == self.size_m[0], "bottom": y == 0, "top": y == self.size_m[1]}
+        return any(on_edge[edge] for edge in self.edges)
 
 
 Function = Callable[[FloatArray], FloatArray]
 Term = tuple[float, Function, Function]  # amplitude, function of x/a, function of y/b
+Bases = tuple[SplineBasis, SplineBasis]  # along x and y
 
 
-def plate_matrix(drawing: PlateDrawing, bases: tuple[SplineBasis, ...], terms: list[Term], *, mass: bool) -> FloatArray:
-    """Mass or stiffness matrix on a product basis.
+def assemble_plate_matrix(drawing: PlateDrawing, bases: Bases, terms: list[Term], *, mass: bool) -> FloatArray:
+    """Assemble the mass or stiffness matrix on a product basis.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ def plate_matrix(drawing: PlateDrawing, bases: tuple[SplineBasis, ...], terms: l
 
 
 def _grams(basis: SplineBasis, factor: Function) -> dict[tuple[int, int], FloatArray]:
-    """Integrals of factor times derivatives i and j of the functions."""
+    """Integrate factor times derivatives i and j of the functions."""
     x, weights = basis.quadrature()
     weighted = weights * factor(x / basis.knots[-1])
     values = {i: basis.values(x, i) for i in range(3)}
@@ -126,7 +128,7 @@ def _grams(basis: SplineBasis, factor: Function) -> dict[tuple[int, int], FloatA
     return {(i, j): values[i].T @ (weighted[:, None] * values[j]) for i, j in pairs}
 
 
-def terms_of(field: Variation) -> list[Term]:
+def expand_field(field: Variation) -> list[Term]:
     """Write a field around 1 as a sum of products."""
     terms: list[Term] = [(1.0, np.ones_like, np.ones_like)]
     for (j, k), amplitude in np.ndenumerate(field.cosines):
@@ -139,19 +141,19 @@ def _cosine(order: int) -> Function:
     return lambda u: np.cos(order * np.pi * u)
 
 
-def panel_term(drawing: PlateDrawing, panel: int, amplitude: float) -> Term:
+def make_panel_term(drawing: PlateDrawing, panel: int, amplitude: float) -> Term:
     """Return a factor that holds on one panel: 1 at the origin, 2 right of it, 3 above it, 4 the last one."""
-    at = [split / size for split, size in zip(drawing.split_m, drawing.size_m, strict=True)]
+    borders = [split / size for split, size in zip(drawing.split_m, drawing.size_m, strict=True)]
     right, above = (panel - 1) % 2, (panel - 1) // 2
-    return amplitude, _half(at[0], upper=right == 1), _half(at[1], upper=above == 1)
+    return amplitude, _step(borders[0], upper=right == 1), _step(borders[1], upper=above == 1)
 
 
-def _half(at: float, *, upper: bool) -> Function:
-    return lambda u: ((u > at) == upper).astype(float)
+def _step(border: float, *, upper: bool) -> Function:
+    return lambda u: ((u > border) == upper).astype(float)
 
 
 def build_plate(drawing: PlateDrawing, reality: Reality | None = None, *, intervals: int = INTERVALS) -> Structure:
-    """Rayleigh-Ritz model of a plate.
+    """Build the Rayleigh-Ritz model of a plate.
 
     Parameters
     ----------
@@ -168,38 +170,42 @@ def build_plate(drawing: PlateDrawing, reality: Reality | None = None, *, interv
         Its rows know ``z``, ``rx`` and ``ry`` at every node, with offsets along x and y.
     """
     reality = reality or Reality()
-    bases = tuple(
-        spline_basis(size, intervals, {at: 1}) for size, at in zip(drawing.size_m, drawing.split_m, strict=True)
+    along_x, along_y = (
+        make_spline_basis(size, intervals, {border: 1})
+        for size, border in zip(drawing.size_m, drawing.split_m, strict=True)
     )
-    panels = [panel_term(drawing, i, reality.ratio(f"panel_{i}") - 1) for i in range(1, 5)]
-    soft = [*terms_of(reality.stiffness), *(term for term in panels if term[0])]
-    free = free_functions(drawing, bases)
-    stiffness = reality.stiffness_ratio * plate_matrix(drawing, bases, soft, mass=False)[np.ix_(free, free)]
-    mass = plate_matrix(drawing, bases, terms_of(reality.density), mass=True)[np.ix_(free, free)]
+    bases = (along_x, along_y)
+    panels = [make_panel_term(drawing, i, reality.stiffness_ratio_of(f"panel_{i}") - 1) for i in range(1, 5)]
+    stiffness_terms = [*expand_field(reality.stiffness), *(term for term in panels if term[0])]
+    free = select_free_functions(drawing, bases)
+    stiffness = (
+        reality.stiffness_ratio * assemble_plate_matrix(drawing, bases, stiffness_terms, mass=False)[np.ix_(free, free)]
+    )
+    mass = assemble_plate_matrix(drawing, bases, expand_field(reality.density), mass=True)[np.ix_(free, free)]
 
     def row(point: Point) -> FloatArray:
         x, y, _ = drawing.nodes[point.node]
-        place = (x + point.offset_m[0], y + point.offset_m[1], 0.0)
-        return plate_row(bases, place, point.direction)[free]
+        position = (x + point.offset_m[0], y + point.offset_m[1], 0.0)
+        return evaluate_plate_row(bases, position, point.direction)[free]
 
     plate = Structure(mass=mass, stiffness=stiffness, row=row, nodes=drawing.nodes, n_rigid=drawing.n_rigid)
-    return hang(reality.finish(plate), reality.cords_hz)
+    return suspend(reality.add_extras(plate), reality.suspension_hz)
 
 
-def plate_row(bases: tuple[SplineBasis, ...], place: tuple[float, float, float], direction: str = "z") -> FloatArray:
-    """Return the motion of a place for unit coordinates, before supports; rx is dw/dy and ry is -dw/dx."""
+def evaluate_plate_row(bases: Bases, position: tuple[float, float, float], direction: str = "z") -> FloatArray:
+    """Return the motion at a position for unit coordinates, before supports; rx is dw/dy and ry is -dw/dx."""
     order = {"z": (0, 0), "rx": (0, 1), "ry": (1, 0)}[direction]
-    along = [basis.values(np.array([at]), n)[0] for basis, at, n in zip(bases, place, order, strict=False)]
-    return (-1 if direction == "ry" else 1) * np.kron(*along)
+    along_x, along_y = (basis.values(np.array([position[i]]), order[i])[0] for i, basis in enumerate(bases))
+    return np.asarray((-1 if direction == "ry" else 1) * np.kron(along_x, along_y))
 
 
-def free_functions(drawing: PlateDrawing, bases: tuple[SplineBasis, ...]) -> FloatArray:
+def select_free_functions(drawing: PlateDrawing, bases: Bases) -> IntArray:
     """Return indices of the product functions that the supports leave free."""
-    keep = []
+    masks = []
     for basis, first, last in zip(bases, ("left", "bottom"), ("right", "top"), strict=True):
-        n_held = {"clamped": 2, "pinned": 1, None: 0}
+        n_held: dict[str | None, int] = {"clamped": 2, "pinned": 1, None: 0}
         mask = np.ones(basis.size, dtype=bool)
         mask[: n_held[drawing.edges.get(first)]] = False
         mask[basis.size - n_held[drawing.edges.get(last)] :] = False
-        keep.append(mask)
-    return np.flatnonzero(np.kron(*keep))
+        masks.append(mask)
+    return np.flatnonzero(np.kron(*masks))

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh, eigvalsh
 
-from frf_testbench.simulator.structures.points import Point, Structure
+from frf_testbench.simulator.structures.structure import Point, Structure
 
 FloatArray = NDArray[np.float64]
-Key = tuple[int, int] | str  # [first, last] element of a beam, the id of a spring, the name of a group
+PartKey = tuple[int, int] | str  # [first, last] element of a beam, the id of a spring, the name of a group
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,7 +29,7 @@ class Variation:
     parts: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __call__(self, xi: FloatArray, eta: FloatArray | float = 0.0, *, part: int | None = None) -> FloatArray:
-        """Return the factor at normalised places 0..1, within a part."""
+        """Return the factor at normalised positions 0..1, within a part."""
         total = np.ones(np.broadcast(xi, eta).shape)
         for (j, k), amplitude in np.ndenumerate(self.cosines):
             total += amplitude * np.cos(j * np.pi * np.asarray(xi)) * np.cos(k * np.pi * np.asarray(eta))
@@ -52,15 +51,15 @@ class Extra:
     mass : float
         kg, or kg m^2 on a rotation.
     stiffness : float
-        N/m, or N m/rad on a rotation; to the ground, or to `other`.
-    other : Point, optional
-        The other end of the spring.
+        N/m, or N m/rad on a rotation; to the ground, or to `second_point`.
+    second_point : Point, optional
+        Second end of the spring.
     """
 
     point: Point
     mass: float = 0.0
     stiffness: float = 0.0
-    other: Point | None = None
+    second_point: Point | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,66 +84,41 @@ class Reality:
         Masses and springs.
     stations : tuple of int
         Nodes where forces act: the shear force may jump there.
-    cords_hz : float
-        Highest rigid-body frequency of a free structure in its cords; 0 for a structure that needs none.
+    suspension_hz : float
+        Highest rigid-body frequency of a free structure in its suspension; 0 for a structure that needs none.
     """
 
     stiffness: Variation = field(default_factory=Variation)
     density: Variation = field(default_factory=Variation)
     stiffness_ratio: float = 1.0
-    softened: tuple[tuple[Key, float], ...] = ()
+    softened: tuple[tuple[PartKey, float], ...] = ()
     formulation: str | None = None
     axial_load_n: float = 0.0
     released: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     extras: tuple[Extra, ...] = ()
     stations: tuple[int, ...] = ()
-    cords_hz: float = 0.0
+    suspension_hz: float = 0.0
 
     @property
     def all_stations(self) -> set[int]:
         """Nodes where forces act, those of extra parts among them."""
-        ends = [point.node for extra in self.extras for point in (extra.point, extra.other) if point is not None]
+        ends = [point.node for extra in self.extras for point in (extra.point, extra.second_point) if point is not None]
         return {*self.stations, *ends} - {0}
 
-    def finish(self, structure: Structure) -> Structure:
+    def add_extras(self, structure: Structure) -> Structure:
         """Put extra masses and springs on a structure."""
         for extra in self.extras:
             if extra.mass:
                 structure = structure.with_mass(extra.point, extra.mass)
             if extra.stiffness:
-                structure = structure.with_spring(extra.point, extra.stiffness, extra.other)
+                structure = structure.with_spring(extra.point, extra.stiffness, extra.second_point)
         return structure
 
-    def ratio(self, key: Key) -> float:
-        """Real over drawn stiffness of a spring or group."""
-        return float(np.prod([value for name, value in self.softened if name == key]))
+    @property
+    def softened_segments(self) -> list[tuple[int, int, float]]:
+        """First and last element of segments of a beam, and their real over drawn stiffness."""
+        return [(*key, ratio) for key, ratio in self.softened if not isinstance(key, str)]
 
-
-def hang(structure: Structure, cords_hz: float) -> Structure:
-    """Hang a free structure in soft cords.
-
-    Parameters
-    ----------
-    structure : Structure
-        With rigid-body motions.
-    cords_hz : float
-        Highest frequency it then has as a rigid body; 0 leaves it as it is.
-
-    Returns
-    -------
-    Structure
-        Cords at two or four outer nodes.
-    """
-    if not cords_hz:
-        return structure
-    _, shapes = eigh(structure.stiffness, structure.mass, subset_by_index=(0, structure.n_rigid - 1))
-    corners = {
-        min(structure.nodes, key=lambda node: float(np.dot(structure.nodes[node], way)))
-        for way in ((1, 0.9, 0), (-1, 0.9, 0), (1, -0.9, 0), (-1, -0.9, 0))
-    }
-    rows = np.array([structure.row(Point(node, structure.direction)) for node in sorted(corners)]) @ shapes
-    highest = eigvalsh(rows.T @ rows).max()
-    factor = (2 * np.pi * cords_hz) ** 2 / highest
-    for node in sorted(corners):
-        structure = structure.with_spring(Point(node, structure.direction), factor)
-    return structure
+    def stiffness_ratio_of(self, name: str) -> float:
+        """Return the real over the drawn stiffness of a spring or group."""
+        return float(np.prod([ratio for key, ratio in self.softened if key == name]))

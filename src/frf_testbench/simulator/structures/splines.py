@@ -52,7 +52,7 @@ class SplineBasis:
         return (middle[:, None] + half[:, None] * points).ravel(), (half[:, None] * weights).ravel()
 
 
-def spline_basis(length: float, intervals: int, kinks: dict[float, int], *, degree: int = 5) -> SplineBasis:
+def make_spline_basis(length: float, intervals: int, kinks: dict[float, int], *, degree: int = 5) -> SplineBasis:
     """B-splines on [0, length] with reduced smoothness at some positions.
 
     Parameters

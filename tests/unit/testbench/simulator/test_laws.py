@@ -8,17 +8,17 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from frf_testbench.simulator.effects.nonlinear import draw_place
-from frf_testbench.simulator.signals.hammer import Blow
-from frf_testbench.simulator.signals.integrate import _weights, law_force
+from frf_testbench.simulator.effects.nonlinear import draw_law_location
+from frf_testbench.simulator.signals.forces import Impact
 from frf_testbench.simulator.signals.laplace import LaplaceGrid
 from frf_testbench.simulator.signals.laws import BoucWen, Coulomb, Gap, PowerSpring, SquareDrag, TwoSided
 from frf_testbench.simulator.signals.receptance import ModalReceptance
+from frf_testbench.simulator.signals.time_stepping import integrate_law_force, step_weights
 
 OMEGA = 2 * np.pi * np.array([20.0, 57.0, 130.0])
 RATIO = np.full(3, 0.005)
 SHAPES = np.array([[1.0, -0.8, 0.7], [0.6, 0.9, -0.5]])  # struck point, place of the law
-BLOW = Blow(peak_n=50.0, start_s=0.01, contact_s=0.004)
+IMPACT = Impact(peak_n=50.0, start_s=0.01, contact_s=0.004)
 STIFFNESS = 1 / np.sum(SHAPES[1] ** 2 / OMEGA**2)  # of the place
 SWING = 7.5e-4  # of the place without a law, m
 SMOOTH = 2e-3  # change of the responses when the steps are doubled again, for smooth laws
@@ -28,21 +28,21 @@ MODEL = ModalReceptance(omega_rad_s=OMEGA, damping_ratio=RATIO, shapes=SHAPES, s
 
 def simulate(law, oversampling):
     grid = LaplaceGrid(n_samples=250, rate_hz=500.0, oversampling=oversampling)
-    drive = grid.spectrum(BLOW.force(grid.fine_time_s), all_lines=True)
-    w = MODEL(grid.fine_s, [1], [0])[:, 0, 0] * drive
+    excitation = grid.spectrum(IMPACT.force(grid.fine_time_s), all_lines=True)
+    w = MODEL(grid.fine_s, [1], [0])[:, 0, 0] * excitation
     step = 1 / (500.0 * oversampling)
-    force = law_force(
+    force = integrate_law_force(
         MODEL, np.array([0.0, 1.0]), law, grid.fine_signal(w)[None], grid.fine_signal(grid.fine_s * w)[None], step
     )[0]
-    felt = grid.spectrum(force) * (np.exp(grid.s * step / 2) if law.held else 1.0)
-    direct = MODEL(grid.s, [1], [0])[:, 0, 0] * grid.spectrum(BLOW.force(grid.fine_time_s))
+    felt = grid.spectrum(force) * (np.exp(grid.s * step / 2) if law.is_constant_within_step else 1.0)
+    direct = MODEL(grid.s, [1], [0])[:, 0, 0] * grid.spectrum(IMPACT.force(grid.fine_time_s))
     return grid.signal(direct - MODEL(grid.s, [1], [1])[:, 0, 0] * felt)
 
 
 def integrate(force):
     def derivative(time, state):
         q, p = state[:3], state[3:]
-        load = SHAPES[0] * BLOW.force(np.array([time]))[0] - SHAPES[1] * force(SHAPES[1] @ q, SHAPES[1] @ p)
+        load = SHAPES[0] * IMPACT.force(np.array([time]))[0] - SHAPES[1] * force(SHAPES[1] @ q, SHAPES[1] @ p)
         return np.concatenate([p, load - 2 * RATIO * OMEGA * p - OMEGA**2 * q])
 
     time = np.arange(250) / 500.0
@@ -117,21 +117,21 @@ def test_a_law_knows_that_its_force_moves_its_place(law, force):
     assert_allclose(got, force(w - 0.05 * got, v - 0.3 * got), rtol=1e-6, atol=1e-9)  # three steps of Newton's method
 
 
-def test_a_law_sits_where_blows_move_something():
-    bench = SimpleNamespace(
+def test_a_law_sits_where_impacts_move_something():
+    target = SimpleNamespace(
         specimen=SimpleNamespace(drawing=None),
         nodes=(1, 2),
         point=int,
-        swing=lambda motion: (float(motion[0] == 2), 0.0),
+        peak_motion=lambda motion: (float(motion[0] == 2), 0.0),
     )
     for seed in range(10):
-        assert draw_place(np.random.default_rng(seed), bench) == ((2, None), {"nodes": [2]})
+        assert draw_law_location(np.random.default_rng(seed), target) == ((2, None), {"nodes": [2]})
 
 
 def test_weights_of_a_step_are_integrals():
     u = (np.arange(200_000) + 0.5) / 200_000
     for a in (-0.001 + 0.005j, -0.02 + 0.3j, -0.3 + 4j):
-        decay, first, last = _weights(np.array([a]))
+        decay, first, last = step_weights(np.array([a]))
         kernel = np.exp(a * (1 - u))
         assert_allclose(decay[0], np.exp(a), rtol=1e-12)
         assert_allclose(first[0], np.mean(kernel * (1 - u)), rtol=1e-8)  # midpoint rule on 200 000 steps
@@ -150,7 +150,7 @@ def test_a_stiff_mode_and_its_static_compliance_feel_the_same_law(law):
     motion = 1e-3 * np.sin(2 * np.pi * 25 * time) * np.minimum(time / 0.02, 1)
     velocity = np.gradient(motion, time)
     one, other = (
-        law_force(model, np.array([0.0, 1.0]), law, motion[None], velocity[None], 1 / 20_000)[0]
+        integrate_law_force(model, np.array([0.0, 1.0]), law, motion[None], velocity[None], 1 / 20_000)[0]
         for model in (summed, static)
     )
     assert np.linalg.norm(one - other) < 0.05 * np.linalg.norm(one)  # the stiff mode is not quite static

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from frf_testbench.simulator.effects.dissipative import lossy
+from frf_testbench.simulator.effects.dissipative import make_lossy_modulus
 from frf_testbench.simulator.signals.channels import AntiAlias, Noise, quantise
-from frf_testbench.simulator.signals.hammer import Blow, draw_blows
+from frf_testbench.simulator.signals.forces import Impact, draw_impacts
 from frf_testbench.simulator.signals.laplace import LaplaceGrid
 from frf_testbench.simulator.signals.receptance import Attachment, ModalReceptance
 
@@ -21,15 +21,15 @@ def oscillator(frequency_hz, ratio, attachments=()):
 
 def test_the_response_of_an_oscillator_is_that_of_duhamels_integral():
     grid = LaplaceGrid(n_samples=2000, rate_hz=1000.0, oversampling=16)
-    blow = Blow(peak_n=10.0, start_s=0.02, contact_s=0.004)
-    force = grid.spectrum(blow.force(grid.fine_time_s)) * AntiAlias().gain(grid)
+    impact = Impact(peak_n=10.0, start_s=0.02, contact_s=0.004)
+    force = grid.spectrum(impact.force(grid.fine_time_s)) * AntiAlias().gain(grid)
     for frequency in (30.0, 200.0, 400.0):
         model = oscillator(frequency, 0.002)
         got = grid.signal(model(grid.s, [0], [0])[:, 0, 0] * force)
         omega = 2 * np.pi * frequency
         pole = complex(-0.002 * omega, omega * np.sqrt(1 - 0.002**2))
         contact = np.linspace(0.02, 0.024, 4001)
-        impulse = np.trapezoid(blow.force(contact) * np.exp(-pole * contact), contact)
+        impulse = np.trapezoid(impact.force(contact) * np.exp(-pole * contact), contact)
         time = np.arange(2000) / 1000
         expected = (impulse * np.exp(pole * time) / pole.imag).imag
         after = time > 0.12  # the filter rings for 0.08 s
@@ -38,8 +38,8 @@ def test_the_response_of_an_oscillator_is_that_of_duhamels_integral():
 
 def test_what_is_recorded_has_exactly_the_transfer_function_of_the_structure():
     grid = LaplaceGrid(n_samples=4096, rate_hz=1000.0)
-    blow = Blow(peak_n=10.0, start_s=0.05, contact_s=0.002)
-    filtered = grid.spectrum(blow.force(grid.fine_time_s)) * AntiAlias().gain(grid)
+    impact = Impact(peak_n=10.0, start_s=0.05, contact_s=0.002)
+    filtered = grid.spectrum(impact.force(grid.fine_time_s)) * AntiAlias().gain(grid)
     model = oscillator(60.0, 0.01)
     force, motion = grid.signal(filtered), grid.signal(model(grid.s, [0], [0])[:, 0, 0] * filtered)
     sigma = 12 / 4.096  # an exponential window makes the cut-off record exact at s = sigma + i omega
@@ -59,7 +59,7 @@ def test_a_spring_attached_by_its_dynamic_stiffness_shifts_the_resonance():
 
 def test_a_lossy_stiffness_has_its_loss_factor_throughout_and_is_causal():
     band = (20.0, 1000.0)
-    stiffness = lossy(0.05, band)
+    stiffness = make_lossy_modulus(0.05, band)
     on_axis = stiffness(2j * np.pi * np.geomspace(*band, 50))
     assert_allclose(on_axis.imag / on_axis.real, 0.05, rtol=2e-3)  # the solids end somewhere
     assert_allclose(stiffness(2j * np.pi * np.array([np.sqrt(20 * 1000)])).real, 1, rtol=1e-9)
@@ -91,10 +91,10 @@ def test_quantised_values_are_multiples_of_the_step_within_the_range():
     assert values.max() == 2.0 - 2.0 / 128
 
 
-def test_blows_spread_over_the_levels_asked_for():
-    blows = draw_blows(np.random.default_rng(3), 6, peak_n=100.0, spread=8.0, contact_s=1e-3, start_s=0.01)
-    peaks = [blow.peak_n for blow in blows]
+def test_impacts_spread_over_the_levels_asked_for():
+    impacts = draw_impacts(np.random.default_rng(3), 6, peak_n=100.0, spread=8.0, contact_s=1e-3, start_s=0.01)
+    peaks = [impact.peak_n for impact in impacts]
     assert max(peaks) == 100.0
     assert 5 < max(peaks) / min(peaks) < 12
     time = np.linspace(0, 0.02, 20_001)
-    assert_allclose(max(blows[0].force(time)), blows[0].peak_n, rtol=1e-3)  # the grid hardly misses the top
+    assert_allclose(max(impacts[0].force(time)), impacts[0].peak_n, rtol=1e-3)  # the grid hardly misses the top

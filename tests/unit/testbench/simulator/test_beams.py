@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 
 from frf_testbench.simulator.signals.receptance import solve_modes
 from frf_testbench.simulator.structures.beams import BeamDrawing, PointPart, Section, build_beam
-from frf_testbench.simulator.structures.points import Point
 from frf_testbench.simulator.structures.reality import Reality
+from frf_testbench.simulator.structures.structure import Point
 
 CLOSED_FORM = 1e-7  # roots of the characteristic equations are given to 1e-9
 MESH = 2e-6  # what doubling the number of splines still moves in the first six frequencies

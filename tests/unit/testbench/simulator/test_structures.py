@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from frf_testbench.simulator.signals.receptance import modal_receptance, solve_modes
+from frf_testbench.simulator.signals.receptance import make_receptance, solve_modes
 from frf_testbench.simulator.structures.frames import FrameDrawing, Spring, build_frame
 from frf_testbench.simulator.structures.grids import GridDrawing, Member, build_grid
-from frf_testbench.simulator.structures.nominal import nominal_grid, nominal_plate
+from frf_testbench.simulator.structures.nominal import build_nominal_grid, build_nominal_plate
 from frf_testbench.simulator.structures.plates import PlateDrawing, build_plate
-from frf_testbench.simulator.structures.points import Point
 from frf_testbench.simulator.structures.reality import Extra, Reality, Variation
+from frf_testbench.simulator.structures.structure import Point
 
 EIGENSOLVER = 1e-9  # what a dense generalised eigenproblem leaves of exact matrices
 SPLINES = 2e-6  # of a plate on 20 intervals, in its first six frequencies
@@ -40,12 +40,12 @@ def test_a_uniform_chain_has_the_frequencies_of_the_textbook():
     assert_allclose(omega, 2 * np.sqrt(1e5 / 2) * np.sin((2 * k - 1) * np.pi / (2 * 19)), rtol=EIGENSOLVER)
 
 
-def test_a_free_chain_hangs_in_cords_as_soft_as_asked():
+def test_a_free_chain_has_a_suspension_as_soft_as_asked():
     drawing = chain(6, ends="none")
-    bare, hung = (solve_modes(build_frame(drawing, Reality(cords_hz=hz))) for hz in (0.0, 0.4))
+    bare, hung = (solve_modes(build_frame(drawing, Reality(suspension_hz=hz))) for hz in (0.0, 0.4))
     assert drawing.n_rigid == 1
     assert_allclose(hung.frequencies_hz[0], 0.4, rtol=1e-3)  # the flexible modes give a little
-    assert_allclose(hung.frequencies_hz[1:], bare.frequencies_hz[1:], rtol=1e-3)  # and feel the cords a little
+    assert_allclose(hung.frequencies_hz[1:], bare.frequencies_hz[1:], rtol=1e-3)  # and feel the suspension a little
 
 
 def test_reality_changes_a_frame_as_it_says():
@@ -55,7 +55,7 @@ def test_reality_changes_a_frame_as_it_says():
         stiffness_ratio=2.0,
         extras=(
             Extra(point=Point(3, "x"), mass=1.5),
-            Extra(point=Point(1, "x"), stiffness=3e4, other=Point(3, "x")),
+            Extra(point=Point(1, "x"), stiffness=3e4, second_point=Point(3, "x")),
             Extra(point=Point(2, "x"), stiffness=1e4),
         ),
         density=Variation(parts=np.array([0.01, 0.0, 0.0])),
@@ -83,7 +83,7 @@ def test_a_plate_moves_as_a_rigid_body_without_strain():
 
 def test_softened_panels_of_truth_and_nominal_plate_agree():
     softened = build_plate(PLATE, Reality(softened=(("panel_2", 0.7),)))
-    nominal = nominal_plate(PLATE)
+    nominal = build_nominal_plate(PLATE)
     stiffness, _ = nominal.groups["panel_2"]
     changed = replace(nominal, stiffness=nominal.stiffness - 0.3 * stiffness)
     truth, model = (solve_modes(one).frequencies_hz[3:9] for one in (softened, changed.structure()))
@@ -93,12 +93,12 @@ def test_softened_panels_of_truth_and_nominal_plate_agree():
 @pytest.mark.parametrize(
     ("truth", "nominal"),
     [
-        (build_grid(GRID), nominal_grid(GRID)),
+        (build_grid(GRID), build_nominal_grid(GRID)),
         (
             build_grid(replace(GRID, supports={1: "clamped", 6: "pinned"})),
-            nominal_grid(replace(GRID, supports={1: "clamped", 6: "pinned"})),
+            build_nominal_grid(replace(GRID, supports={1: "clamped", 6: "pinned"})),
         ),
-        (build_plate(PLATE), nominal_plate(PLATE)),
+        (build_plate(PLATE), build_nominal_plate(PLATE)),
     ],
     ids=["free grid", "held grid", "plate"],
 )
@@ -109,7 +109,7 @@ def test_nominal_matrices_have_the_frequencies_of_the_truth(truth, nominal):
 
 
 def test_groups_add_up_to_the_whole():
-    for model in (nominal_grid(GRID), nominal_plate(PLATE)):
+    for model in (build_nominal_grid(GRID), build_nominal_plate(PLATE)):
         for i, whole in enumerate((model.stiffness, model.mass)):
             total = sum(parts[i] for parts in model.groups.values())
             assert_allclose(total, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
@@ -156,8 +156,8 @@ def test_modes_above_the_sum_enter_by_their_static_compliance():
     modes = solve_modes(frame)
     rows = np.array([frame.row(Point(node, "x")) for node in (4, 5)])
     ratio, s = np.full(30, 0.01), 2j * np.pi * np.linspace(0.1, modes.frequencies_hz[1], 20)
-    whole = modal_receptance(modes, rows, ratio, np.inf)(s, [0, 1], [0, 1])
-    cut = modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[15]))(s, [0, 1], [0, 1])
+    whole = make_receptance(modes, rows, ratio, np.inf)(s, [0, 1], [0, 1])
+    cut = make_receptance(modes, rows, ratio, float(modes.frequencies_hz[15]))(s, [0, 1], [0, 1])
     assert_allclose(cut, whole, rtol=1e-2)  # the square of the frequency ratio, of a small part
-    bare = replace(modal_receptance(modes, rows, ratio, float(modes.frequencies_hz[15])), static=np.zeros((2, 2)))
+    bare = replace(make_receptance(modes, rows, ratio, float(modes.frequencies_hz[15])), static=np.zeros((2, 2)))
     assert np.abs(bare(s, [0], [0]) / whole[:, :1, :1] - 1).max() > 0.05

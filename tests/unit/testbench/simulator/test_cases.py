@@ -17,12 +17,12 @@ from typer.testing import CliRunner
 import frf_testbench.simulator
 from frf_testbench.cli import app
 from frf_testbench.simulator.cases.case import make_case
-from frf_testbench.simulator.cases.detectability import make_lines
-from frf_testbench.simulator.cases.nuisance import make_ruler
-from frf_testbench.simulator.cases.specimens import KINDS
-from frf_testbench.simulator.cases.world import make_world
-from frf_testbench.simulator.effects.catalogue import CONTRACT, NONLINEAR, OUTSIDE, kinds_for
+from frf_testbench.simulator.cases.detectability import predict_frf_noise
+from frf_testbench.simulator.cases.frf_distance import make_distance
+from frf_testbench.simulator.cases.system import build_system
+from frf_testbench.simulator.effects.catalogue import CATALOGUE, NONLINEAR, OUT_OF_CATALOGUE, select_effects
 from frf_testbench.simulator.self_check import check_nominal, check_step
+from frf_testbench.simulator.specimens import KINDS
 
 ROOT = Path(frf_testbench.simulator.__file__).parent
 ALGEBRA = 1e-9  # two ways to the same receptance, in double precision
@@ -56,7 +56,7 @@ TABLE = {  # of the contract: what a location and the parameters of each effect 
     "gap_contact": ({"nodes", "springs"}, {"gap_m", "contact_stiffness_N_m"}),
     "dry_friction": ({"nodes", "springs"}, {"friction_N"}),
 }
-LINEAR = [name for name in CONTRACT if name not in NONLINEAR]
+LINEAR = [name for name in CATALOGUE if name not in NONLINEAR]
 RUNS_AWAY = 103000050  # the seed of a stiff stop
 
 
@@ -105,22 +105,22 @@ def test_each_linear_effect_changes_what_is_measured(effect):
     assert truth["effect"] == effect
     assert truth["detectability"]["frf_change"] > CHANGED
     assert truth["detectability"]["ratio_rms"] >= 3
-    lines = case.world.set_up.lines_hz
-    with_effect, without = case.world.measured_frf(lines), case.base.measured_frf(lines)
+    lines = case.system.set_up.lines_hz
+    with_effect, without = case.system.measured_frf(lines), case.base_system.measured_frf(lines)
     assert np.linalg.norm(with_effect - without) / np.linalg.norm(without) > CHANGED
 
 
-def test_signs_of_sensors_and_blows_turn_the_frf_round():
-    world = make_case(31, "null", structure="clamped-pinned", analyse=False).base
-    set_up = world.set_up
+def test_signs_of_sensors_and_impacts_turn_the_frf_round():
+    system = make_case(31, "null", structure="clamped-pinned", analyse=False).base_system
+    set_up = system.set_up
     turned = replace(
         set_up,
         sensors=tuple(replace(sensor, sign=-sensor.sign) for sensor in set_up.sensors),
-        struck=((set_up.struck[0][0], -set_up.struck[0][1]), *set_up.struck[1:]),
+        excited_points=((set_up.excited_points[0][0], -set_up.excited_points[0][1]), *set_up.excited_points[1:]),
     )
-    other = make_world(world.specimen, turned, world.scatter, ())
+    other = build_system(system.specimen, turned, system.scatter, ())
     lines = set_up.lines_hz
-    expected = -world.measured_frf(lines)
+    expected = -system.measured_frf(lines)
     expected[:, :, 0] *= -1
     assert_allclose(other.measured_frf(lines), expected, rtol=ALGEBRA)
 
@@ -137,28 +137,28 @@ def test_locations_and_parameters_are_those_of_the_contract():
 
 def test_a_resonator_is_two_masses_and_a_spring():
     case = make_case(4, "attached_resonator", structure="frame")
-    world = case.world
+    system = case.system
     node, values = case.truth["location"]["nodes"][0], case.truth["parameters"]
-    n = len(world.structure.mass)
+    n = len(system.structure.mass)
     omega = 2 * np.pi * values["frequency_hz"]
     link = np.zeros(n + 1)
     link[node - 1], link[n] = -1, 1
     M = np.zeros((n + 1, n + 1))
-    M[:n, :n] = world.structure.mass
+    M[:n, :n] = system.structure.mass
     M[n, n] = values["mass_kg"]
     # modal damping and scattered frequencies of the frame, as matrices
-    omegas = world.receptance.omega_rad_s
-    inverse = world.structure.mass @ world.modes.shapes
+    omegas = system.receptance.omega_rad_s
+    inverse = system.structure.mass @ system.modes.shapes
     K, C = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
     K[:n, :n] = inverse @ np.diag(omegas**2) @ inverse.T
-    C[:n, :n] = inverse @ np.diag(2 * world.receptance.damping_ratio * omegas) @ inverse.T
+    C[:n, :n] = inverse @ np.diag(2 * system.receptance.damping_ratio * omegas) @ inverse.T
     K += values["mass_kg"] * omega**2 * np.outer(link, link)
     C += values["mass_kg"] * 2 * values["damping_ratio"] * omega * np.outer(link, link)
-    s = 2j * np.pi * np.linspace(*world.set_up.band_hz, 50)
+    s = 2j * np.pi * np.linspace(*system.set_up.band_hz, 50)
     direct = np.array([np.linalg.inv(one**2 * M + one * C + K)[:n, :n] for one in s])
-    rows = [sensor.node - 1 for sensor in world.set_up.sensors]
-    columns = [struck - 1 for struck, _ in world.set_up.struck]
-    got = world.receptance(s, world.sensor_rows, world.struck_rows)
+    rows = [sensor.node - 1 for sensor in system.set_up.sensors]
+    columns = [struck - 1 for struck, _ in system.set_up.excited_points]
+    got = system.receptance(s, system.sensor_rows, system.excited_rows)
     assert_allclose(got, direct[:, rows][:, :, columns], rtol=1e-7)  # the inverse of the direct matrix
 
 
@@ -174,11 +174,11 @@ def test_channels_are_late_filtered_and_scaled_as_defined():
         ),
     ):
         case = make_case(12, effect, structure="frame")
-        lines = case.world.set_up.lines_hz
-        ratio = case.world.measured_frf(lines) / case.base.measured_frf(lines)
+        lines = case.system.set_up.lines_hz
+        ratio = case.system.measured_frf(lines) / case.base_system.measured_frf(lines)
         channel = case.truth["location"]["channels"][0]
         expected = factor(case.truth["parameters"], 2j * np.pi * lines)
-        columns = [sensor.column for sensor in case.world.set_up.sensors]
+        columns = [sensor.column for sensor in case.system.set_up.sensors]
         if channel == "force":
             assert_allclose(ratio, np.broadcast_to((1 / expected)[:, None, None], ratio.shape), rtol=ALGEBRA)
             continue
@@ -189,29 +189,29 @@ def test_channels_are_late_filtered_and_scaled_as_defined():
 
 def test_a_moved_sensor_sees_what_its_new_node_does():
     case = make_case(3, "sensor_misplaced", structure="frame")
-    set_up = case.world.set_up
+    set_up = case.system.set_up
     channel, node = case.truth["location"]["channels"][0], case.truth["location"]["nodes"][0]
     i = [sensor.column for sensor in set_up.sensors].index(channel)
     there = replace(set_up, sensors=tuple(replace(s, node=node) if s.column == channel else s for s in set_up.sensors))
-    moved = make_world(case.world.specimen, there, case.world.scatter, ())
+    moved = build_system(case.system.specimen, there, case.system.scatter, ())
     lines = set_up.lines_hz
-    assert_allclose(case.world.measured_frf(lines), moved.measured_frf(lines), rtol=ALGEBRA)
+    assert_allclose(case.system.measured_frf(lines), moved.measured_frf(lines), rtol=ALGEBRA)
     assert set_up.sensors[i].node != node
 
 
 def test_scatter_stays_within_the_tolerances_of_the_contract():
     for seed, kind in enumerate(("cantilever", "free-free", "frame", "grid")):
         case = make_case(seed, "null", structure=kind, analyse=False)
-        low, high = case.world.set_up.band_hz
-        ideal, real = case.ideal.modes.frequencies_hz, case.base.modes.frequencies_hz
+        low, high = case.system.set_up.band_hz
+        ideal, real = case.ideal_system.modes.frequencies_hz, case.base_system.modes.frequencies_hz
         inside = (ideal >= low) & (ideal <= high)
         assert (
             1e-6 < np.abs(real[inside] / ideal[inside] - 1).max() < 1.2e-3
         )  # three sources of up to 0.05, 0.02, 0.04 %
-        ratios = np.array(case.truth["test"]["true_damping"]) / case.world.set_up.damping_ratio
+        ratios = np.array(case.truth["test"]["true_damping"]) / case.system.set_up.damping_ratio
         assert ratios.min() > 0.69
         assert ratios.max() < 1.31
-        assert all(abs(gain - 1) <= 0.005 for gain in case.world.scatter.gains.values())
+        assert all(abs(gain - 1) <= 0.005 for gain in case.system.scatter.gains.values())
 
 
 def test_the_same_seed_gives_the_same_case():
@@ -235,7 +235,7 @@ def test_one_sensor_cannot_tell_its_gain_from_that_of_the_force():
     case = next(
         c
         for c in (make_case(seed, "sensor_gain", structure="frame") for seed in range(90, 130))
-        if len(c.world.set_up.sensors) == 1
+        if len(c.system.set_up.sensors) == 1
     )
     twin = case.truth["equivalents"][0]
     assert twin["effect"] == "sensor_gain"
@@ -247,40 +247,42 @@ def test_one_sensor_cannot_tell_its_gain_from_that_of_the_force():
 
 def test_what_nobody_knows_costs_its_prior_and_no_more():
     case = make_case(33, "null", structure="stepped", analyse=False)
-    world = case.base
-    ruler = make_ruler(world, make_lines(world, case.drives, case.noise))
-    model = world.receptance
+    system = case.base_system
+    distance = make_distance(system, predict_frf_noise(system, case.excitations, case.noise))
+    model = system.receptance
     faster, damped = model.omega_rad_s.copy(), model.damping_ratio.copy()
     faster[0] *= 1 + 2e-5
     damped[1] *= 1 + 0.01
     others = [
-        replace(world, receptance=replace(model, omega_rad_s=faster)),
-        replace(world, receptance=replace(model, damping_ratio=damped)),
+        replace(system, receptance=replace(model, omega_rad_s=faster)),
+        replace(system, receptance=replace(model, damping_ratio=damped)),
         replace(
-            world,
+            system,
             scatter=replace(
-                world.scatter, gains={**world.scatter.gains, "force": world.scatter.gains["force"] * 1.001}
+                system.scatter, gains={**system.scatter.gains, "force": system.scatter.gains["force"] * 1.001}
             ),
         ),
     ]
     for other in others:
-        frf = other.measured_frf(ruler.frequencies_hz)
-        assert 0 < ruler.nats(frf) < 1
-        assert 0.5 * ruler.scale * np.sum(ruler.whiten(frf) ** 2) > 30 * ruler.nats(frf)
-    assert ruler.nats(ruler.truth) == 0
+        frf = other.measured_frf(distance.frequencies_hz)
+        assert 0 < distance.measure(frf) < 1
+        assert 0.5 * distance.scale * np.sum(distance.whiten(frf) ** 2) > 30 * distance.measure(frf)
+    assert distance.measure(distance.truth) == 0
 
 
 def test_a_frequency_that_moves_far_for_a_resonance_but_within_its_tolerance_costs_its_prior():
     """By a part of a resonance's width: to the first order that would be ten times as much."""
     case = make_case(33, "null", structure="stepped", analyse=False)
-    ringing = replace(case.base.receptance, damping_ratio=0.2 * case.base.receptance.damping_ratio)
-    world = replace(case.base, receptance=ringing)
-    ruler = make_ruler(world, make_lines(world, case.drives, case.noise))
-    faster = world.receptance.omega_rad_s.copy()
+    ringing = replace(case.base_system.receptance, damping_ratio=0.2 * case.base_system.receptance.damping_ratio)
+    system = replace(case.base_system, receptance=ringing)
+    distance = make_distance(system, predict_frf_noise(system, case.excitations, case.noise))
+    faster = system.receptance.omega_rad_s.copy()
     faster[0] *= 1 + 1e-3  # two standard deviations
-    frf = replace(world, receptance=replace(world.receptance, omega_rad_s=faster)).measured_frf(ruler.frequencies_hz)
-    assert 0.5 < ruler.nats(frf) < 2.1
-    assert 0.5 * ruler.scale * np.sum(ruler.residuals(frf) ** 2) > 5 * ruler.nats(frf)
+    frf = replace(system, receptance=replace(system.receptance, omega_rad_s=faster)).measured_frf(
+        distance.frequencies_hz
+    )
+    assert 0.5 < distance.measure(frf) < 2.1
+    assert 0.5 * distance.scale * np.sum(distance.misfit(frf) ** 2) > 5 * distance.measure(frf)
 
 
 def test_two_effects_are_both_there():
@@ -289,7 +291,7 @@ def test_two_effects_are_both_there():
     assert all(one["ratio_rms"] >= 3 for one in case.truth["detectability"]["each"])
 
 
-def test_a_law_shows_in_blows_of_different_levels():
+def test_a_law_shows_in_impacts_of_different_levels():
     case = concealed("cubic_stiffness")
     assert case.truth["nonlinear"]
     assert case.truth["detectability"]["level_change"] > 0.01
@@ -297,20 +299,20 @@ def test_a_law_shows_in_blows_of_different_levels():
 
 
 def test_the_catalogue_is_that_of_the_contract():
-    assert set(TABLE) == set(CONTRACT)
-    assert len(OUTSIDE) >= 10
+    assert set(TABLE) == set(CATALOGUE)
+    assert len(OUT_OF_CATALOGUE) >= 10
 
 
 def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match="no effect 'ghost'"):
-        kinds_for(np.random.default_rng(0), "ghost", KINDS)
+        select_effects(np.random.default_rng(0), "ghost", KINDS)
 
 
 def test_what_is_written_is_what_a_user_hands_in(tmp_path):
     options = ["--seed", "3", "--effect", "grounded_spring", "--structure", "grid", "--out", str(tmp_path / "c")]
     outcome = CliRunner().invoke(app, ["simulate", *options])
     assert outcome.exit_code == 0
-    assert "recordings" in outcome.output
+    assert "records; answers in" in outcome.output
     folder = tmp_path / "c"
     test, model, run = (tomllib.loads((folder / f"{n}.toml").read_text()) for n in ("test", "model", "pipeline"))
     truth = json.loads((tmp_path / "truth" / "c.json").read_text())
@@ -336,7 +338,7 @@ def test_what_is_written_is_what_a_user_hands_in(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", OUTSIDE)
+@pytest.mark.parametrize("kind", OUT_OF_CATALOGUE)
 def test_each_effect_outside_the_contract_can_be_drawn(kind):
     case = make_case(17, f"unknown:{kind}")
     assert case.truth["unknown_kind"] == kind

@@ -1,4 +1,4 @@
-"""The test of a specimen: band, sampling, struck points, sensors, levels."""
+"""The test of a specimen: band, sampling, excited points, sensors, levels."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from frf_testbench.simulator.cases.specimens import Specimen
 from frf_testbench.simulator.signals.channels import AntiAlias
 from frf_testbench.simulator.signals.receptance import Modes
-from frf_testbench.simulator.structures.points import Point, Structure
+from frf_testbench.simulator.specimens import Specimen
+from frf_testbench.simulator.structures.structure import Point, Structure
 
 FloatArray = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ RATES_HZ = (
     4096, 5000, 5120, 6400, 8000, 8192, 10000, 10240, 12500, 12800, 16000, 20000, 20480, 25600, 32000, 40960, 51200,
     65536, 102400,
 )  # fmt: skip
-LENGTHS = (6000, 8192, 10000, 16384, 20000)
+RECORD_LENGTHS = (6000, 8192, 10000, 16384, 20000)
 QUANTITIES = {  # unit, SI value of the unit, power of s that makes it from a displacement
     "acceleration": (("m/s^2", 1.0), ("g_0", 9.80665)),
     "velocity": (("m/s", 1.0), ("mm/s", 1e-3)),
@@ -27,7 +27,7 @@ QUANTITIES = {  # unit, SI value of the unit, power of s that makes it from a di
 }
 ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LONGEST_CONTACT = 1.7  # of a hammer's tip, times the upper edge of the band
-MARGIN = 0.3  # sensors and blows sit where some mode moves at least this much of its largest motion
+MARGIN = 0.3  # sensors and excited points sit where some mode moves at least this much of its largest motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,39 +54,39 @@ class SetUp:
         Where the model is fitted.
     rate_hz, n_samples
         Of each record.
-    struck : tuple of (node, sign)
-        Driven points.
+    excited_points : tuple of (node, sign)
+        Where a hammer strikes or a shaker drives.
     sensors : tuple of Sensor
         Output channels.
-    blows_each : int
-        Blows or records at each driven point.
+    records_each : int
+        Records at each excited point.
     points : tuple of int
         Nodes of interest that are not measured.
     damping_ratio : float
         What the model file says of all modes.
     peak_n, spread, contact_s, start_s
-        Strongest blow, strongest over weakest, contact time, and when the tip touches; of a shaker, its largest RMS.
+        Strongest impact, strongest over weakest, contact time, and when the tip touches; of a shaker, its largest RMS.
     burst : float
         Part of a random record that is driven.
     running : bool
         The shaker has been running before the record starts.
     bits : int
         Of the converter.
-    offset : float
-        Largest constant of a converter's channel, over its largest signal.
+    dc_offset : float
+        Largest dc offset of a channel, over its largest signal.
     filter : AntiAlias
         Of the converter.
     in_one_file : bool
-        The recorder runs on from blow to blow of a struck point: what one leaves is still there when the next comes.
+        The recorder runs on from impact to impact at a point: what one leaves is still there when the next comes.
     """
 
     kind: str
     band_hz: tuple[float, float]
     rate_hz: float
     n_samples: int
-    struck: tuple[tuple[int, int], ...]
+    excited_points: tuple[tuple[int, int], ...]
     sensors: tuple[Sensor, ...]
-    blows_each: int
+    records_each: int
     points: tuple[int, ...]
     damping_ratio: float
     peak_n: float
@@ -96,7 +96,7 @@ class SetUp:
     burst: float
     running: bool
     bits: int
-    offset: float
+    dc_offset: float
     filter: AntiAlias
     in_one_file: bool
 
@@ -107,8 +107,8 @@ class SetUp:
         return lines[(lines >= self.band_hz[0]) & (lines <= self.band_hz[1])]
 
 
-def _band(rng: np.random.Generator, frequencies_hz: FloatArray, n_modes: int) -> tuple[float, float]:
-    """From below the first mode to between two modes."""
+def _draw_band(rng: np.random.Generator, frequencies_hz: FloatArray, n_modes: int) -> tuple[float, float]:
+    """Draw a band from below the first mode to between two modes."""
     last = int(rng.integers(min(3, n_modes), n_modes + 1)) - 1
     if last + 1 < frequencies_hz.size:
         gaps = frequencies_hz[1:] / frequencies_hz[:-1]
@@ -120,23 +120,23 @@ def _band(rng: np.random.Generator, frequencies_hz: FloatArray, n_modes: int) ->
     return float(f"{0.45 * frequencies_hz[0]:.3g}"), float(f"{high:.3g}")
 
 
-def _timing(
+def _draw_timing(
     rng: np.random.Generator, band: tuple[float, float], first_hz: float, kind: str, longest: int
 ) -> tuple[float, int, float]:
     """Draw sampling rate, record length and a damping ratio that lets the record nearly decay."""
     fast = (rate for rate in RATES_HZ if rate >= rng.uniform(2.7, 4.3) * band[1])
     rate = float(next(fast, RATES_HZ[-1]))
-    n_samples = int(rng.choice([n for n in LENGTHS if n <= longest]))
+    n_samples = int(rng.choice([n for n in RECORD_LENGTHS if n <= longest]))
     ratio = float(np.exp(rng.uniform(np.log(0.0008), np.log(0.01))))
-    left = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.15))))
-    needed = np.log(1 / left) / (2 * np.pi * first_hz * n_samples / rate)
+    remaining_amplitude = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.15))))
+    least_ratio = np.log(1 / remaining_amplitude) / (2 * np.pi * first_hz * n_samples / rate)
     if kind == "random":
-        needed *= 0.5
-    return rate, n_samples, float(f"{min(max(ratio, needed), 0.03):.2g}")
+        least_ratio *= 0.5
+    return rate, n_samples, float(f"{min(max(ratio, least_ratio), 0.03):.2g}")
 
 
-def moving_nodes(structure: Structure, modes: Modes, band: tuple[float, float], margin: float) -> list[int]:
-    """Nodes where some mode of the band moves well.
+def select_moving_nodes(structure: Structure, modes: Modes, band: tuple[float, float], margin: float) -> list[int]:
+    """Select the nodes where some mode of the band moves well.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def draw_set_up(
     structure, modes
         The specimen without scatter.
     levels : bool
-        At least three blows of different levels, and not too long records: for what depends on level.
+        At least three impacts of different levels, and not too long records: for what depends on level.
 
     Returns
     -------
@@ -184,49 +184,51 @@ def draw_set_up(
     """
     habits = rng.spawn(1)[0]  # of who tests; does not change what is drawn of the specimen
     flexible = modes.frequencies_hz[structure.n_rigid :]
-    band = _band(rng, flexible, specimen.n_modes)
+    band = _draw_band(rng, flexible, specimen.n_modes)
     kind = "random" if rng.random() < 0.25 else "hammer"
-    rate, n_samples, ratio = _timing(rng, band, float(flexible[0]), kind, 10000 if levels else 20000)
-    nodes = moving_nodes(structure, modes, band, MARGIN)
-    n_struck = 1 if kind == "random" else int(rng.choice([1, 2, 3], p=[0.5, 0.25, 0.25]))
-    struck = rng.permutation(nodes)[: min(n_struck, len(nodes))].tolist()
+    rate, n_samples, ratio = _draw_timing(rng, band, float(flexible[0]), kind, 10000 if levels else 20000)
+    nodes = select_moving_nodes(structure, modes, band, MARGIN)
+    n_excited = 1 if kind == "random" else int(rng.choice([1, 2, 3], p=[0.5, 0.25, 0.25]))
+    excited_nodes = rng.permutation(nodes)[: min(n_excited, len(nodes))].tolist()
     n_sensors = min(int(rng.choice([1, 2, 3, 4, 5, 6], p=[0.12, 0.28, 0.24, 0.16, 0.1, 0.1])), len(nodes))
-    places = rng.permutation(nodes)[:n_sensors].tolist()
-    unmeasured = [node for node in nodes if node not in places]
+    sensor_nodes = rng.permutation(nodes)[:n_sensors].tolist()
+    unmeasured_nodes = [node for node in nodes if node not in sensor_nodes]
     n_points = int(rng.choice([0, 1, 2], p=[0.1, 0.45, 0.45]))
-    blows = int(rng.integers(4 if levels else 3, 6 if n_struck == 1 else 5)) if kind == "hammer" else 3
+    n_records = int(rng.integers(4 if levels else 3, 6 if n_excited == 1 else 5)) if kind == "hammer" else 3
     return SetUp(
         kind=kind,
         band_hz=band,
         rate_hz=rate,
         n_samples=n_samples,
-        struck=tuple((node, int(rng.choice([1, 1, -1]))) for node in struck),
-        sensors=_sensors(rng, places, free=structure.n_rigid > 0),
-        blows_each=blows,
-        points=tuple(rng.permutation(unmeasured)[:n_points].tolist()),
+        excited_points=tuple((node, int(rng.choice([1, 1, -1]))) for node in excited_nodes),
+        sensors=_draw_sensors(rng, sensor_nodes, free=structure.n_rigid > 0),
+        records_each=n_records,
+        points=tuple(rng.permutation(unmeasured_nodes)[:n_points].tolist()),
         damping_ratio=ratio,
         peak_n=float(np.clip(specimen.mass_kg * 10 ** rng.uniform(1.5, 3.0), 3, 800)),
         spread=float(rng.uniform(5, 10)),
         contact_s=float(rng.uniform(0.9, LONGEST_CONTACT) / band[1]),
-        start_s=_lead(habits, rate, float(rng.integers(60, 130)), band[1]),
+        start_s=_draw_lead(habits, rate, float(rng.integers(60, 130)), band[1]),
         burst=float(rng.choice([1.0, 1.0, 0.7])),
         running=bool(rng.random() < 0.3),
         bits=int(rng.choice([16, 24, 24])),
-        offset=float(10 ** habits.uniform(-5, -3)) if habits.random() < 0.3 else 0.0,
+        dc_offset=float(10 ** habits.uniform(-5, -3)) if habits.random() < 0.3 else 0.0,
         filter=AntiAlias(symmetric=bool(rng.random() < 0.75)),
         in_one_file=kind == "hammer" and bool(habits.random() < 0.2),
     )
 
 
-def _lead(rng: np.random.Generator, rate_hz: float, usual: float, highest_hz: float) -> float:
-    """When the tip touches: one recorder in five begins only just before it, within the ringing of its filter."""
-    samples = rng.integers(3, 21) + 0.5 * LONGEST_CONTACT * rate_hz / highest_hz if rng.random() < 0.2 else usual
+def _draw_lead(rng: np.random.Generator, rate_hz: float, usual_samples: float, highest_hz: float) -> float:
+    """Draw when the tip touches: one recorder in five begins only just before, within the ringing of its filter."""
+    samples = (
+        rng.integers(3, 21) + 0.5 * LONGEST_CONTACT * rate_hz / highest_hz if rng.random() < 0.2 else usual_samples
+    )
     return float(samples / rate_hz)
 
 
-def _sensors(rng: np.random.Generator, places: list[int], *, free: bool) -> tuple[Sensor, ...]:
-    others = ["acceleration"] if free else ["acceleration", "velocity", "displacement"]
-    quantity = str(rng.choice(others, p=[1.0] if free else [0.8, 0.14, 0.06]))
+def _draw_sensors(rng: np.random.Generator, nodes: list[int], *, free: bool) -> tuple[Sensor, ...]:
+    quantities = ["acceleration"] if free else ["acceleration", "velocity", "displacement"]
+    quantity = str(rng.choice(quantities, p=[1.0] if free else [0.8, 0.14, 0.06]))
     unit, unit_si = QUANTITIES[quantity][int(rng.integers(len(QUANTITIES[quantity])))]
     prefix = {"acceleration": "acc", "velocity": "vel", "displacement": "disp"}[quantity]
     return tuple(
@@ -238,5 +240,5 @@ def _sensors(rng: np.random.Generator, places: list[int], *, free: bool) -> tupl
             unit=unit,
             unit_si=unit_si,
         )
-        for i, node in enumerate(places)
+        for i, node in enumerate(nodes)
     )

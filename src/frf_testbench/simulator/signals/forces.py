@@ -13,8 +13,8 @@ RISE, FALL = 1.7, 2.1  # exponents of u^RISE (1 - u)^FALL: a hammer's pulse rise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Blow:
-    """One blow of a hammer.
+class Impact:
+    """One impact of a hammer.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Blow:
     contact_s : float
         How long it touches.
     rebound : tuple of float
-        Delay, s, and size, as a fraction, of a second contact; empty for a clean blow.
+        Delay, s, and size, as a fraction, of a second contact; empty for a clean impact.
     """
 
     peak_n: float
@@ -34,7 +34,7 @@ class Blow:
     rebound: tuple[float, ...] = ()
 
     def force(self, time_s: FloatArray) -> FloatArray:
-        """(n,) force, N."""
+        """Return the (n,) force, N."""
         force = self.peak_n * _pulse((time_s - self.start_s) / self.contact_s)
         if self.rebound:
             delay, size = self.rebound
@@ -49,10 +49,10 @@ def _pulse(u: FloatArray) -> FloatArray:
     return np.asarray(inside**RISE * (1 - inside) ** FALL / (top**RISE * (1 - top) ** FALL))
 
 
-def draw_blows(
+def draw_impacts(
     rng: np.random.Generator, count: int, *, peak_n: float, spread: float, contact_s: float, start_s: float
-) -> tuple[Blow, ...]:
-    """Blows of one person at one place: different levels, nearly the same pulse.
+) -> tuple[Impact, ...]:
+    """Draw the impacts of one person at one point: different levels, nearly the same pulse.
 
     Parameters
     ----------
@@ -71,14 +71,14 @@ def draw_blows(
 
     Returns
     -------
-    tuple of Blow
+    tuple of Impact
         In random order of level.
     """
     levels = spread ** -np.linspace(0, 1, count) if count > 1 else np.ones(1)
     levels = rng.permutation(levels * np.exp(0.05 * rng.standard_normal(count)))
     levels /= levels.max()
     return tuple(
-        Blow(
+        Impact(
             peak_n=peak_n * level,
             start_s=start_s + contact_s * rng.uniform(-0.5, 0.5),
             contact_s=contact_s * level**-0.1 * float(np.exp(0.02 * rng.standard_normal())),
@@ -87,10 +87,10 @@ def draw_blows(
     )
 
 
-def random_force(
+def draw_random_force(
     rng: np.random.Generator, time_s: FloatArray, band_hz: tuple[float, float], *, taper_s: float, burst: float = 1.0
 ) -> FloatArray:
-    """Band-limited random force of unit RMS, from rest to rest.
+    """Draw a band-limited random force of unit RMS, from rest to rest.
 
     Parameters
     ----------
@@ -99,11 +99,11 @@ def random_force(
     time_s : (n,) array
         Uniform times.
     band_hz : tuple of float
-        Edges of the band that is driven.
+        Edges of the band that is excited.
     taper_s : float
         Length of the rise and of the fall.
     burst : float
-        Part of the record that is driven.
+        Fraction of the record that is excited.
 
     Returns
     -------
@@ -112,9 +112,9 @@ def random_force(
     """
     n, step = time_s.size, float(time_s[1] - time_s[0])
     frequencies = np.fft.rfftfreq(n, step)
-    driven = np.flatnonzero((frequencies >= band_hz[0]) & (frequencies <= band_hz[1]))
+    excited = np.flatnonzero((frequencies >= band_hz[0]) & (frequencies <= band_hz[1]))
     lines = np.zeros(frequencies.size, dtype=complex)  # the same force at any oversampling
-    lines[driven] = rng.standard_normal(driven.size) + 1j * rng.standard_normal(driven.size)
+    lines[excited] = rng.standard_normal(excited.size) + 1j * rng.standard_normal(excited.size)
     force = np.fft.irfft(lines, n)
     end = burst * time_s[-1]
     rise = np.clip(np.minimum(time_s, end - time_s) / taper_s, 0, 1)
