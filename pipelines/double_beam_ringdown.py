@@ -69,8 +69,8 @@ def main(folder: Path, out: Path) -> None:
             low, high = one.at(np.array([amplitude.min(), amplitude.max()]))
             print(
                 f"  {quantity}: {low:.6g} to {high:.6g} {UNITS[quantity]}; {one.offset:.6g} {one.change:+.3g} A^p, "
-                f"p = {one.power:.2f} (95 %: {one.power_low:.2f} to {one.power_high:.2f}); leaves {one.left:.2g}, "
-                f"a constant {one.left_by_constant:.2g}"
+                f"p = {one.power:.2f} (95 %: {one.power_low:.2f} to {one.power_high:.2f}); leaves {one.misfit:.2g}, "
+                f"a constant {one.misfit_of_constant:.2g}"
             )
         print(f"  {name_family(law['frequency_hz'], law['damping_ratio'])}")
     rows = [

@@ -1,7 +1,7 @@
 """How frequency and damping of modes depend on amplitude, from responses that ring down on their own.
 
 Within a short window a mode decays as exp(lambda t) with the pole lambda of its amplitude there; from window to window
-the amplitude falls and the pole moves. No force, no model and no level of blows is needed. Each window is fitted by a
+the amplitude falls and the pole moves. No force, no model and no level of impacts is needed. Each window is fitted by a
 sum of damped sinusoids (Gauss-Newton steps on the poles; amplitudes are linear), the noise is what is left.
 
 What the poles do with amplitude A tells families of laws apart: a cubic spring moves the frequency with A^2 and leaves
@@ -30,7 +30,7 @@ SETTLED = 1e-9  # relative change of the poles
 SLOWEST, FASTEST = 1e-5, 0.2  # damping ratios that are believed
 FARTHEST = 0.03  # relative: a frequency that runs away from its mode
 STANDS_OUT = 5.0  # standard deviations: a weaker amplitude is noise
-MOST_LEFT = 0.1  # of the signal: a window that is left so much of shows something else
+LARGEST_MISFIT = 0.1  # of the signal: a window that is fitted worse shows something else
 ROUNDS = 3  # of weights
 HOLDS = 0.33  # of the scatter about a constant: what a law by amplitude may leave
 POWERS = np.concatenate([np.arange(-1.0, -0.2, 0.05), np.arange(0.25, 3.05, 0.05)])
@@ -62,8 +62,8 @@ class RingdownTrack:
     def above(self, amplitude: float) -> RingdownTrack:
         """Keep the windows from the first one on until the mode falls to an amplitude."""
         low = np.flatnonzero(self.amplitude <= amplitude)
-        kept = slice(0, int(low[0]) if len(low) else len(self.amplitude))
-        return RingdownTrack(**{part.name: getattr(self, part.name)[kept] for part in fields(self)})
+        windows = slice(0, int(low[0]) if len(low) else len(self.amplitude))
+        return RingdownTrack(**{part.name: getattr(self, part.name)[windows] for part in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,9 +78,9 @@ class AmplitudeLaw:
         Times A^power.
     power, power_low, power_high : float
         Best one and its 95 % interval, by leaving out one ring-down at a time.
-    left : float
-        Median of what is left, times 1.48: the standard deviation of a normal distribution.
-    left_by_constant : float
+    misfit : float
+        Median of what the law leaves, times 1.48: the standard deviation of a normal distribution.
+    misfit_of_constant : float
         The same for a quantity that does not depend on amplitude.
     """
 
@@ -89,13 +89,13 @@ class AmplitudeLaw:
     power: float
     power_low: float
     power_high: float
-    left: float
-    left_by_constant: float
+    misfit: float
+    misfit_of_constant: float
 
     @property
     def holds(self) -> bool:
         """The quantity depends on the amplitude of this mode, and on little else."""
-        return self.left < HOLDS * self.left_by_constant
+        return self.misfit < HOLDS * self.misfit_of_constant
 
     def at(self, amplitude: FloatArray) -> FloatArray:
         """Evaluate at amplitudes."""
@@ -138,9 +138,9 @@ def track_ringdown(
     rows = []
     for first in range(0, len(signal) - n + 1, max(round(WINDOWS_APART * n), 1)):
         fit = _fit(np.asarray(signal[first : first + n], float), step_s, poles)
-        near = np.abs(fit.poles.imag / start[:, 0].imag - 1) < FARTHEST
-        poles = np.where(near, fit.poles, start[:, 0])
-        rows.append(((first + (n - 1) / 2) * step_s, fit, near))
+        is_close = np.abs(fit.poles.imag / start[:, 0].imag - 1) < FARTHEST
+        poles = np.where(is_close, fit.poles, start[:, 0])
+        rows.append(((first + (n - 1) / 2) * step_s, fit, is_close))
     return [_track(rows, mode) for mode in range(len(poles))]
 
 
@@ -168,17 +168,17 @@ def fit_amplitude_law(tracks: Sequence[RingdownTrack], quantity: str) -> Amplitu
         raise InputError("how a mode depends on amplitude needs two ring-downs at least, to see how far they agree")
     std = {"frequency_hz": "frequency_std_hz", "damping_ratio": "damping_ratio_std"}[quantity]
     sets = [(track.amplitude, getattr(track, quantity), getattr(track, std)) for track in tracks]
-    offset, change, power, left, constant = _power_law(sets)
-    others = np.array([_power_law(sets[:i] + sets[i + 1 :])[2] for i in range(len(sets))])
-    spread = 1.96 * np.sqrt((len(sets) - 1) * np.mean((others - others.mean()) ** 2))  # jackknife
+    offset, change, power, misfit, misfit_of_constant = _fit_power_law(sets)
+    powers = np.array([_fit_power_law(sets[:i] + sets[i + 1 :])[2] for i in range(len(sets))])
+    spread = 1.96 * np.sqrt((len(sets) - 1) * np.mean((powers - powers.mean()) ** 2))  # jackknife
     return AmplitudeLaw(
         offset=offset,
         change=change,
         power=power,
         power_low=power - spread,
         power_high=power + spread,
-        left=left,
-        left_by_constant=constant,
+        misfit=misfit,
+        misfit_of_constant=misfit_of_constant,
     )
 
 
@@ -209,25 +209,28 @@ def name_family(frequency: AmplitudeLaw, damping: AmplitudeLaw) -> str:
     return families.get((float(moves), float(damps)), "none of the simple families alone")
 
 
-def _power_law(sets: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> tuple[float, float, float, float, float]:
-    """Offset, change, power, and what is left with it and without; what fits leave counts beside their own errors."""
+def _fit_power_law(
+    sets: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
+) -> tuple[float, float, float, float, float]:
+    """Fit offset, change and power; the misfits of the law and of a constant count beside the errors of the values."""
     amplitude, values, std = (np.concatenate(parts) for parts in zip(*sets, strict=True))
-    constant = _size(values - np.median(values))
-    best, left = (float(np.median(values)), 0.0, 1.0), constant
+    misfit_of_constant = _robust_std(values - np.median(values))
+    best, misfit = (float(np.median(values)), 0.0, 1.0), misfit_of_constant
     for _ in range(ROUNDS):
-        weight = 1 / np.hypot(std, left)
+        weight = 1 / np.hypot(std, misfit)
         costs = []
         for power in POWERS:
             columns = np.stack([np.ones_like(amplitude), amplitude**power], 1) * weight[:, None]
-            found, *_ = np.linalg.lstsq(columns, values * weight, rcond=None)
-            costs.append((float(np.sum((values * weight - columns @ found) ** 2)), *found.tolist(), float(power)))
+            solution, *_ = np.linalg.lstsq(columns, values * weight, rcond=None)
+            cost = float(np.sum((values * weight - columns @ solution) ** 2))
+            costs.append((cost, *solution.tolist(), float(power)))
         _, *numbers = min(costs)
         best = (numbers[0], numbers[1], numbers[2])
-        left = _size(values - best[0] - best[1] * amplitude ** best[2])
-    return (*best, left, constant)
+        misfit = _robust_std(values - best[0] - best[1] * amplitude ** best[2])
+    return (*best, misfit, misfit_of_constant)
 
 
-def _size(values: FloatArray) -> float:
+def _robust_std(values: FloatArray) -> float:
     return float(1.48 * np.median(np.abs(values)))
 
 
@@ -244,59 +247,61 @@ def _fit(signal: FloatArray, step_s: float, poles: ComplexArray) -> _Window:
     """Fit damped sinusoids, whose amplitudes are those in the middle of the window."""
     time = np.asarray(step_s * (np.arange(len(signal)) - (len(signal) - 1) / 2), float)
     for _ in range(STEPS):
-        columns, found = _amplitudes(signal, time, poles)
-        slopes = _slopes(time, poles, found)
-        left = signal - columns @ found
-        step = solve_scaled_columns(np.hstack([columns, slopes]), left, CUT)[columns.shape[1] :]
+        columns, amplitudes = _fit_amplitudes(signal, time, poles)
+        slopes = _differentiate_by_poles(time, poles, amplitudes)
+        misfit = signal - columns @ amplitudes
+        step = solve_scaled_columns(np.hstack([columns, slopes]), misfit, CUT)[columns.shape[1] :]
         change = step[: len(poles)] + 1j * step[len(poles) :]
         decay = np.clip(-(poles + change).real / np.abs(poles), SLOWEST, FASTEST) * np.abs(poles)
         poles = -decay + 1j * (poles + change).imag
         if np.abs(change).max() < SETTLED * np.abs(poles).max():
             break
-    columns, found = _amplitudes(signal, time, poles)
-    all_columns = np.hstack([columns, _slopes(time, poles, found)])
-    left = signal - columns @ found
-    variance = float(left @ left) / max(len(signal) - all_columns.shape[1], 1)
+    columns, amplitudes = _fit_amplitudes(signal, time, poles)
+    all_columns = np.hstack([columns, _differentiate_by_poles(time, poles, amplitudes)])
+    misfit = signal - columns @ amplitudes
+    variance = float(misfit @ misfit) / max(len(signal) - all_columns.shape[1], 1)
     scaled, sizes = scale_columns(all_columns)
     covariance = variance * np.linalg.pinv(scaled.T @ scaled, hermitian=True) / sizes / sizes[:, None]
     return _Window(
         poles=poles,
-        amplitude=np.hypot(*found[: 2 * len(poles)].reshape(2, -1)),
+        amplitude=np.hypot(*amplitudes[: 2 * len(poles)].reshape(2, -1)),
         amplitude_std=float(np.sqrt(2 * variance / len(signal))),
         covariance=covariance[columns.shape[1] :, columns.shape[1] :],
         misfit=float(np.sqrt(variance) / max(signal.std(), 1e-300)),
     )
 
 
-def _amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Columns of cosines, sines and a constant, and how much of each is in a signal."""
+def _fit_amplitudes(signal: FloatArray, time: FloatArray, poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Fit the amplitudes of cosines, sines and a constant to a signal; the columns come with them."""
     turning = np.exp(np.outer(time, poles))
     columns = np.hstack([turning.real, turning.imag, np.ones((len(time), 1))])
     return columns, solve_scaled_columns(columns, signal, CUT)
 
 
-def _slopes(time: FloatArray, poles: ComplexArray, found: FloatArray) -> FloatArray:
-    """Change of the signal by real and imaginary parts of the poles."""
+def _differentiate_by_poles(time: FloatArray, poles: ComplexArray, amplitudes: FloatArray) -> FloatArray:
+    """Differentiate the signal by real and imaginary parts of the poles."""
     n = len(poles)
-    moved = np.exp(np.outer(time, poles)) * (found[:n] - 1j * found[n : 2 * n]) * time[:, None]
-    return np.hstack([moved.real, -moved.imag])
+    complex_amplitudes = amplitudes[:n] - 1j * amplitudes[n : 2 * n]
+    slopes = np.exp(np.outer(time, poles)) * complex_amplitudes * time[:, None]
+    return np.hstack([slopes.real, -slopes.imag])
 
 
 def _track(rows: list[tuple[float, _Window, FloatArray]], mode: int) -> RingdownTrack:
-    kept = [
+    windows = [
         (time, fit)
-        for time, fit, near in rows
-        if near[mode] and fit.amplitude[mode] > STANDS_OUT * fit.amplitude_std and fit.misfit < MOST_LEFT
+        for time, fit, is_close in rows
+        if is_close[mode] and fit.amplitude[mode] > STANDS_OUT * fit.amplitude_std and fit.misfit < LARGEST_MISFIT
     ]
-    poles = np.array([fit.poles[mode] for _, fit in kept])
+    poles = np.array([fit.poles[mode] for _, fit in windows])
     n = len(rows[0][1].poles)
     size = np.abs(poles)
     decay_std, turn_std = (
-        np.sqrt([fit.covariance[row, row] for _, fit in kept]) if kept else np.zeros(0) for row in (mode, n + mode)
+        np.sqrt([fit.covariance[row, row] for _, fit in windows]) if windows else np.zeros(0)
+        for row in (mode, n + mode)
     )
     return RingdownTrack(
-        time_s=np.array([time for time, _ in kept]),
-        amplitude=np.array([fit.amplitude[mode] for _, fit in kept]),
+        time_s=np.array([time for time, _ in windows]),
+        amplitude=np.array([fit.amplitude[mode] for _, fit in windows]),
         frequency_hz=size / (2 * np.pi),
         damping_ratio=-poles.real / size,
         frequency_std_hz=turn_std / (2 * np.pi),
