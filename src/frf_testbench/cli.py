@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -84,6 +85,21 @@ def prove(
         cases=cases,
         answers=answers,
     )
+
+
+@app.command()
+def validation(
+    scores: Annotated[list[Path], typer.Argument(metavar="SCORES.json", help="Of proofs, in the order of the page.")],
+    out: Annotated[Path, typer.Option("--out", help="The page, in Markdown.")],
+) -> None:
+    """Write the figures of proofs as a page of the documentation."""
+    from frf_testbench.proof.validation import ScoresError, write_validation
+
+    try:
+        write_validation(scores, out)
+    except ScoresError as error:
+        print(f"frf-testbench: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
 
 
 @app.command()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 NONLINEAR = ("cubic_stiffness", "gap_contact", "dry_friction")
 UNKNOWN = "unknown"
-COVER = 1.959964  # standard deviations to each side of a 95 % interval
+COVERAGE_FACTOR = 1.959964  # standard deviations to each side of a 95 % interval
+
+Location = Mapping[str, Any]
 
 
 class AnswerError(Exception):
@@ -19,7 +21,7 @@ class AnswerError(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Value:
+class Estimate:
     """A number that a diagnosis gives.
 
     Parameters
@@ -36,8 +38,8 @@ class Value:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cause:
-    """An effect at its place: what is true, or what a diagnosis says.
+class Component:
+    """An effect at its location: what is true, or what a diagnosis says.
 
     Parameters
     ----------
@@ -45,28 +47,28 @@ class Cause:
         Of the contract's table, or ``unknown``.
     location : mapping
         As in ``diagnosis.json``.
-    parameters : mapping of str to float, str or Value
+    parameters : mapping of str to float, str or Estimate
         Plain in an answer, with an interval in a diagnosis.
-    probability, gain : float
-        Of a diagnosis: probability, and evidence in nats.
-    places : tuple of mapping
-        Of a diagnosis: all places that are possible.
-    nonlinear : bool
+    probability, log_evidence_gain : float
+        Of a diagnosis.
+    possible_locations : tuple of mapping
+        Of a diagnosis: all that it holds possible.
+    is_nonlinear : bool
         Of an answer: whether it depends on level.
     """
 
     effect: str
-    location: Mapping[str, Any] = field(default_factory=dict)
-    parameters: Mapping[str, float | str | Value] = field(default_factory=dict)
+    location: Location = field(default_factory=dict)
+    parameters: Mapping[str, float | str | Estimate] = field(default_factory=dict)
     probability: float = 1.0
-    gain: float = 0.0
-    places: tuple[Mapping[str, Any], ...] = ()
-    nonlinear: bool = False
+    log_evidence_gain: float = 0.0
+    possible_locations: tuple[Location, ...] = ()
+    is_nonlinear: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """The answer to a case.
+    """The answer to a case. Evidence is a log Bayes factor; it is None where the answer does not say.
 
     Parameters
     ----------
@@ -74,33 +76,36 @@ class Truth:
         Of the case.
     group : str
         ``linear``, ``null``, ``nonlinear``, ``pair`` or ``unknown``.
-    causes : tuple of Cause
+    components : tuple of Component
         None for a null, two for a pair.
-    equivalents : tuple of Cause
+    equivalents : tuple of Component
         Other answers that are right as well.
     kind : str
         Of an effect outside the table.
     structure : str
         Kind of the specimen.
-    evidence_nats, separation_nats, place_separation_nats : float, optional
-        Of the effect, and from the closest other effect and place; None where the answers do not say.
-    each_nats : tuple of float
-        Of a pair: evidence for each effect when the other is there.
-    has_evidence : bool
-        Whether the answers say how much evidence there is.
+    seed : int, optional
+        Of the simulator.
+    evidence, effect_separation, location_separation : float, optional
+        Of the effect, and over the closest other effect and the closest other location.
+    pair_evidence : tuple of float
+        Of a pair: for each effect beside the other.
+    states_evidence : bool
+        Whether the answer says how much evidence there is.
     """
 
     name: str
     group: str
-    causes: tuple[Cause, ...]
-    equivalents: tuple[Cause, ...] = ()
+    components: tuple[Component, ...]
+    equivalents: tuple[Component, ...] = ()
     kind: str = ""
     structure: str = ""
-    evidence_nats: float | None = None
-    separation_nats: float | None = None
-    place_separation_nats: float | None = None
-    each_nats: tuple[float, ...] = ()
-    has_evidence: bool = False
+    seed: int | None = None
+    evidence: float | None = None
+    effect_separation: float | None = None
+    location_separation: float | None = None
+    pair_evidence: tuple[float, ...] = ()
+    states_evidence: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,26 +116,26 @@ class Diagnosis:
     ----------
     verdict : str
         ``consistent``, ``explained``, ``unexplained``, or ``failed`` where there is none.
-    findings, alternatives : tuple of Cause
+    findings, alternatives : tuple of Component
         The most probable first.
-    places : tuple of mapping
-        Locations that an unexplained mismatch is traced to.
-    before, after : mapping of str to float
+    locations : tuple of mapping
+        Of the findings, and where an unexplained mismatch is traced to.
+    error_before, error_after : mapping of str to float
         Normalised FRF errors: ``training`` and ``held_out``.
-    ambiguous : tuple of frozenset of str
+    ambiguity_sets : tuple of frozenset of str
         Effects that cannot be told apart.
-    held_over_noise : float, optional
-        Error on held-out blows after, over that of noise alone.
+    held_out_over_noise : float, optional
+        Error on held-out records after, over that of noise alone.
     """
 
     verdict: str
-    findings: tuple[Cause, ...] = ()
-    alternatives: tuple[Cause, ...] = ()
-    places: tuple[Mapping[str, Any], ...] = ()
-    before: Mapping[str, float] = field(default_factory=dict)
-    after: Mapping[str, float] = field(default_factory=dict)
-    ambiguous: tuple[frozenset[str], ...] = ()
-    held_over_noise: float | None = None
+    findings: tuple[Component, ...] = ()
+    alternatives: tuple[Component, ...] = ()
+    locations: tuple[Location, ...] = ()
+    error_before: Mapping[str, float] = field(default_factory=dict)
+    error_after: Mapping[str, float] = field(default_factory=dict)
+    ambiguity_sets: tuple[frozenset[str], ...] = ()
+    held_out_over_noise: float | None = None
 
 
 FAILED = Diagnosis(verdict="failed")
@@ -154,47 +159,52 @@ def read_truth(path: Path) -> Truth:
     AnswerError
         If it is no answer.
     """
-    table = _read(path)
+    table = _read_table(path)
     if "effect" not in table:
         raise AnswerError(f"{path} is no answer: it has no 'effect'")
-    shown = table.get("detectability", {})
+    detectability = table.get("detectability", {})
     if "effects" in table:
-        causes = tuple(_true_cause(one) for one in table["effects"])
+        components = tuple(_read_true_component(entry) for entry in table["effects"])
+    elif table["effect"] == "null":
+        components = ()
     else:
-        causes = () if table["effect"] == "null" else (_true_cause(table, level="level_change" in shown),)
+        components = (_read_true_component(table, depends_on_level="level_change" in detectability),)
     return Truth(
         name=path.stem,
-        group=_group(causes),
-        causes=causes,
-        equivalents=tuple(_true_cause(one) for one in table.get("equivalents", [])),
-        kind=next((one["unknown_kind"] for one in table.get("effects", [table]) if one.get("unknown_kind")), ""),
+        group=_name_group(components),
+        components=components,
+        equivalents=tuple(_read_true_component(entry) for entry in table.get("equivalents", [])),
+        kind=next((entry["unknown_kind"] for entry in table.get("effects", [table]) if entry.get("unknown_kind")), ""),
         structure=table.get("structure", {}).get("kind", ""),
-        evidence_nats=shown.get("evidence_nats"),
-        separation_nats=shown.get("separation_nats"),
-        place_separation_nats=shown.get("place_separation_nats"),
-        each_nats=tuple(one["evidence_nats"] for one in shown.get("each", []) if "evidence_nats" in one),
-        has_evidence="evidence_nats" in shown,
+        seed=table.get("seed"),
+        evidence=detectability.get("evidence_nats"),
+        effect_separation=detectability.get("separation_nats"),
+        location_separation=detectability.get("place_separation_nats"),
+        pair_evidence=tuple(
+            entry["evidence_nats"] for entry in detectability.get("each", []) if "evidence_nats" in entry
+        ),
+        states_evidence="evidence_nats" in detectability,
     )
 
 
-def _true_cause(table: Mapping[str, Any], *, level: bool = False) -> Cause:
+def _read_true_component(table: Mapping[str, Any], *, depends_on_level: bool = False) -> Component:
     effect = table["effect"]
-    return Cause(
+    return Component(
         effect=effect,
         location=table.get("location", {}),
         parameters=table.get("parameters", {}),
-        nonlinear=bool(table.get("nonlinear", effect in NONLINEAR or level)),
+        is_nonlinear=bool(table.get("nonlinear", effect in NONLINEAR or depends_on_level)),
     )
 
 
-def _group(causes: tuple[Cause, ...]) -> str:
-    if not causes:
+def _name_group(components: Sequence[Component]) -> str:
+    if not components:
         return "null"
-    if any(cause.effect == UNKNOWN for cause in causes):
+    if any(component.effect == UNKNOWN for component in components):
         return "unknown"
-    if len(causes) > 1:
+    if len(components) > 1:
         return "pair"
-    return "nonlinear" if causes[0].effect in NONLINEAR else "linear"
+    return "nonlinear" if components[0].effect in NONLINEAR else "linear"
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
@@ -215,57 +225,58 @@ def read_diagnosis(path: Path) -> Diagnosis:
     AnswerError
         If it is not what the contract says.
     """
-    table = _read(path)
+    table = _read_table(path)
     if table.get("verdict") not in ("consistent", "explained", "unexplained"):
         raise AnswerError(f"{path}: the verdict is {table.get('verdict')!r}, not consistent, explained or unexplained")
     try:
-        findings = tuple(_said_cause(one) for one in table.get("findings", []) if one.get("significant", True))
-        alternatives = tuple(_said_cause(one) for one in table.get("alternatives", []))
+        findings = tuple(_read_finding(entry) for entry in table.get("findings", []) if entry.get("significant", True))
+        alternatives = tuple(_read_finding(entry) for entry in table.get("alternatives", []))
     except (KeyError, TypeError, ValueError) as error:
         raise AnswerError(f"{path}: a finding or an alternative is not what the contract says ({error!r})") from None
     fit = table.get("fit", {})
     mismatch = table.get("mismatch", {})
-    places = [mismatch["location"]] if mismatch.get("location") else []
+    mismatch_locations = [mismatch["location"]] if mismatch.get("location") else []
     return Diagnosis(
         verdict=table["verdict"],
         findings=findings,
         alternatives=alternatives,
-        places=(*(one.location for one in findings), *places),
-        before=_numbers(fit.get("before", {})),
-        after=_numbers(fit.get("after", {})),
-        ambiguous=tuple(frozenset(one["effects"]) for one in table.get("ambiguity", [])),
-        held_over_noise=fit.get("after", {}).get("held_out_over_noise"),
+        locations=(*(finding.location for finding in findings), *mismatch_locations),
+        error_before=_select_numbers(fit.get("before", {})),
+        error_after=_select_numbers(fit.get("after", {})),
+        ambiguity_sets=tuple(frozenset(entry["effects"]) for entry in table.get("ambiguity", [])),
+        held_out_over_noise=fit.get("after", {}).get("held_out_over_noise"),
     )
 
 
-def _said_cause(table: Mapping[str, Any]) -> Cause:
-    return Cause(
+def _read_finding(table: Mapping[str, Any]) -> Component:
+    parameters = table.get("parameters", {})
+    return Component(
         effect=table["effect"],
         location=table.get("location", {}),
-        parameters={name: _value(value) for name, value in table.get("parameters", {}).items() if value is not None},
+        parameters={name: _read_parameter(entry) for name, entry in parameters.items() if entry is not None},
         probability=float(table.get("probability", 1.0)),
-        gain=float(table.get("log_evidence_gain", 0.0)),
-        places=tuple(table.get("location_set", ())),
-        nonlinear=table["effect"] in NONLINEAR,
+        log_evidence_gain=float(table.get("log_evidence_gain", 0.0)),
+        possible_locations=tuple(table.get("location_set", ())),
+        is_nonlinear=table["effect"] in NONLINEAR,
     )
 
 
-def _value(entry: Mapping[str, Any] | float | str) -> Value | str:
-    """Read a number with its interval: as given, or from the standard deviation; an open end is infinite."""
+def _read_parameter(entry: Mapping[str, Any] | float | str) -> Estimate | str:
+    """Read a number with its interval: as stated, or from the standard deviation; an open end is infinite."""
     if isinstance(entry, str):
         return entry
     if not isinstance(entry, Mapping):
-        return Value(value=float(entry), low=float(entry), high=float(entry))
+        return Estimate(value=float(entry), low=float(entry), high=float(entry))
     value, std = float(entry["value"]), float(entry.get("std") or 0.0)
-    low, high = entry.get("ci95") or (value - COVER * std, value + COVER * std)
-    return Value(value=value, low=-math.inf if low is None else low, high=math.inf if high is None else high)
+    low, high = entry.get("ci95") or (value - COVERAGE_FACTOR * std, value + COVERAGE_FACTOR * std)
+    return Estimate(value=value, low=-math.inf if low is None else low, high=math.inf if high is None else high)
 
 
-def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
+def _select_numbers(table: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, value in table.items() if isinstance(value, int | float)}
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_table(path: Path) -> dict[str, Any]:
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

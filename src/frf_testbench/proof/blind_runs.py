@@ -11,7 +11,7 @@ from pathlib import Path
 import tomlkit
 
 from frf_ipz.toml_files import read_text
-from frf_testbench.proof.commands import Step, code_digest, public_command, read_done, run_all
+from frf_testbench.proof.commands import Step, compute_code_digest, find_public_command, read_outcome, run_all
 from frf_testbench.proof.plan import Folders
 
 
@@ -33,16 +33,16 @@ def diagnose_all(
     command : sequence of str, optional
         Instead of the public command.
     """
-    words = list(command or public_command())
+    command_words = list(command or find_public_command())
 
-    def commands(name: str) -> list[list[str]]:
+    def list_commands(name: str) -> list[list[str]]:
         out = folders.diagnosed / name
         shutil.rmtree(out, ignore_errors=True)
-        pipeline = write_pipeline(folders, name, applying=True)
-        return [[*words, "diagnose", str(pipeline), "--out", str(out), "--quiet"]]
+        pipeline = write_pipeline(folders, name, applies=True)
+        return [[*command_words, "diagnose", str(pipeline), "--out", str(out), "--quiet"]]
 
-    jobs = {name: partial(commands, name) for name in names}
-    run_all(jobs, folders.diagnosed, workers=workers, code=code_digest(), step=step)
+    jobs = {name: partial(list_commands, name) for name in names}
+    run_all(jobs, folders.diagnosed, workers=workers, code=compute_code_digest(), step=step)
 
 
 def predict_all(
@@ -53,7 +53,7 @@ def predict_all(
     Parameters
     ----------
     names : sequence of str
-        Cases that `worth_predicting` holds for.
+        Cases that `is_worth_predicting` holds for.
     folders : Folders
         Where they are.
     workers : int
@@ -63,35 +63,35 @@ def predict_all(
     command : sequence of str, optional
         Instead of the public command.
     """
-    words = list(command or public_command())
+    command_words = list(command or find_public_command())
 
-    def commands(name: str) -> list[list[str]]:
-        result = []
-        for label, applying in (("with", True), ("without", False)):
+    def list_commands(name: str) -> list[list[str]]:
+        commands = []
+        for label, applies in (("with", True), ("without", False)):
             out = folders.predicted / name / label
             shutil.rmtree(out, ignore_errors=True)
             shutil.copytree(folders.diagnosed / name, out)  # FRFs, fit and diagnosis are used again
-            pipeline = write_pipeline(folders, name, applying=applying)
-            result.append([*words, "predict", str(pipeline), "--out", str(out), "--quiet"])
-        return result
+            pipeline = write_pipeline(folders, name, applies=applies)
+            commands.append([*command_words, "predict", str(pipeline), "--out", str(out), "--quiet"])
+        return commands
 
-    jobs = {name: partial(commands, name) for name in names}
-    run_all(jobs, folders.predicted, workers=workers, code=code_digest(), step=step)
+    jobs = {name: partial(list_commands, name) for name in names}
+    run_all(jobs, folders.predicted, workers=workers, code=compute_code_digest(), step=step)
 
 
-def worth_predicting(name: str, folders: Folders) -> bool:
+def is_worth_predicting(name: str, folders: Folders) -> bool:
     """Whether a case has points of interest and its diagnosis explained something."""
     path = folders.diagnosed / name / "diagnosis.json"
-    done = read_done(folders.diagnosed, name)
-    if done is None or done.status or not path.is_file():
+    outcome = read_outcome(folders.diagnosed, name)
+    if outcome is None or outcome.status or not path.is_file():
         return False
     pipeline = tomlkit.parse(read_text(folders.cases / name / "pipeline.toml"))
     verdict = json.loads(path.read_text(encoding="utf-8")).get("verdict")
     return verdict == "explained" and bool(pipeline.get("predict", {}).get("points"))
 
 
-def write_pipeline(folders: Folders, name: str, *, applying: bool) -> Path:
-    """Write a case's pipeline file anew, with or without a diagnosis that flows on; the case itself is left alone.
+def write_pipeline(folders: Folders, name: str, *, applies: bool) -> Path:
+    """Write a case's pipeline file anew, with or without a diagnosis that flows on; the case itself stays as it is.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def write_pipeline(folders: Folders, name: str, *, applying: bool) -> Path:
         Where the case is.
     name : str
         Of the case.
-    applying : bool
+    applies : bool
         Whether the run diagnoses, and its finding flows on into updating and prediction.
 
     Returns
@@ -114,11 +114,11 @@ def write_pipeline(folders: Folders, name: str, *, applying: bool) -> Path:
         if key in head:
             head[key] = str(case / head[key])
     options = document.pop("diagnose", None)
-    if applying:
+    if applies:
         options = tomlkit.table() if options is None else options
         options["apply"] = True
         document["diagnose"] = options
-    path = folders.root / "pipelines" / f"{name}_{'with' if applying else 'without'}.toml"
+    path = folders.root / "pipelines" / f"{name}_{'with' if applies else 'without'}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     return path.resolve()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,13 +20,14 @@ from pathlib import Path
 import frf_ipz
 
 LONGEST_S = 900.0  # of one command
+STOPPED = -9  # exit status of a command that took too long: of SIGKILL, on every system
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 Step = Callable[[], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Done:
+class CommandOutcome:
     """How a command went.
 
     Parameters
@@ -33,8 +36,10 @@ class Done:
         Its exit status; negative where it was stopped.
     message : str
         Last line that it wrote to the error stream.
-    wall_s, cpu_s : float
-        Time it took, and processor time with all its threads.
+    wall_s : float
+        Time it took.
+    cpu_s : float or None
+        Processor time with all its threads and children; None where the system does not tell.
     code : str
         Digest of the package that ran.
     """
@@ -42,17 +47,24 @@ class Done:
     status: int
     message: str
     wall_s: float
-    cpu_s: float
+    cpu_s: float | None
     code: str
 
 
-def public_command() -> list[str]:
-    """Return the command that a user types, of the environment that runs this."""
-    return [str(Path(sys.executable).with_name("frf-ipz"))]
+def find_public_command() -> list[str]:
+    """Find the command that a user types, of the environment that runs this.
+
+    Returns
+    -------
+    list of str
+        Its path, or the interpreter with the module where no script is installed.
+    """
+    script = shutil.which("frf-ipz", path=str(Path(sys.executable).parent))
+    return [script] if script else [sys.executable, "-m", "frf_ipz.cli.main"]
 
 
-def code_digest() -> str:
-    """Digest of the package's source: what it diagnosed before a change is diagnosed again."""
+def compute_code_digest() -> str:
+    """Digest the package's source: what it diagnosed before a change is diagnosed again."""
     root = Path(frf_ipz.__file__).parent
     total = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
@@ -82,41 +94,59 @@ def run_all(
     logs.mkdir(parents=True, exist_ok=True)
 
     def work(name: str) -> None:
-        if not is_done(logs, name, code):
-            done = [Done(status=0, message="", wall_s=0.0, cpu_s=0.0, code=code)]
-            for command in jobs[name]():
-                done.append(run(command, code=code))
-                if done[-1].status:
-                    break
-            last = done[-1]
-            total = Done(
-                status=last.status,
-                message=last.message,
-                wall_s=sum(one.wall_s for one in done),
-                cpu_s=sum(one.cpu_s for one in done),
-                code=code,
-            )
-            (logs / f"{name}.json").write_text(json.dumps(asdict(total), indent=1) + "\n", encoding="utf-8")
+        if not is_finished(logs, name, code):
+            outcome = run_chain(jobs[name](), code=code)
+            (logs / f"{name}.json").write_text(json.dumps(asdict(outcome), indent=1) + "\n", encoding="utf-8")
         step()
 
     with ThreadPoolExecutor(workers) as pool:
-        for done in [pool.submit(work, name) for name in jobs]:
-            done.result()
+        for future in [pool.submit(work, name) for name in jobs]:
+            future.result()
 
 
-def is_done(logs: Path, name: str, code: str) -> bool:
+def run_chain(commands: Sequence[Sequence[str]], *, code: str) -> CommandOutcome:
+    """Run commands one after the other until one fails.
+
+    Parameters
+    ----------
+    commands : sequence of sequence of str
+        What a user would type.
+    code : str
+        Digest of the package.
+
+    Returns
+    -------
+    CommandOutcome
+        Of the last one that ran, with the cost of all.
+    """
+    outcomes: list[CommandOutcome] = []
+    for command in commands:
+        outcomes.append(run(command, code=code))
+        if outcomes[-1].status:
+            break
+    costs = [outcome.cpu_s for outcome in outcomes if outcome.cpu_s is not None]
+    return CommandOutcome(
+        status=outcomes[-1].status if outcomes else 0,
+        message=outcomes[-1].message if outcomes else "",
+        wall_s=sum(outcome.wall_s for outcome in outcomes),
+        cpu_s=sum(costs) if len(costs) == len(outcomes) else None,
+        code=code,
+    )
+
+
+def is_finished(logs: Path, name: str, code: str) -> bool:
     """Whether a case has been worked on by this code."""
-    done = read_done(logs, name)
-    return done is not None and done.code == code
+    outcome = read_outcome(logs, name)
+    return outcome is not None and outcome.code == code
 
 
-def read_done(logs: Path, name: str) -> Done | None:
+def read_outcome(logs: Path, name: str) -> CommandOutcome | None:
     """Read how a command went; None where it has not run."""
     path = logs / f"{name}.json"
-    return Done(**json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
+    return CommandOutcome(**json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
 
 
-def run(command: Sequence[str], *, code: str, longest_s: float = LONGEST_S) -> Done:
+def run(command: Sequence[str], *, code: str, longest_s: float = LONGEST_S) -> CommandOutcome:
     """Run one command and wait for it.
 
     Parameters
@@ -126,32 +156,67 @@ def run(command: Sequence[str], *, code: str, longest_s: float = LONGEST_S) -> D
     code : str
         Digest of the package.
     longest_s : float
-        It is stopped after this time.
+        It is stopped after this time, with all processes that it has started.
 
     Returns
     -------
-    Done
+    CommandOutcome
         How it went.
     """
-    started = time.perf_counter()
+    start = time.perf_counter()
     process = subprocess.Popen(
         command,
         env={**os.environ, **ONE_THREAD},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
-        start_new_session=True,
+        start_new_session=True,  # a group of its own, so that it can be stopped as a whole; Windows ignores it
     )
-    alarm = threading.Timer(longest_s, lambda: os.killpg(process.pid, signal.SIGKILL))
+    has_ended = threading.Event()
+    was_stopped = threading.Event()
+
+    def stop() -> None:
+        if not has_ended.is_set():
+            was_stopped.set()
+            _stop_process_tree(process)
+
+    alarm = threading.Timer(longest_s, stop)
     alarm.start()
-    said = process.stderr.read().decode(errors="replace").strip().splitlines()
-    process.stderr.close()
-    _, status, usage = os.wait4(process.pid, 0)
+    lines = _read_error_stream(process)
+    status, cpu_s = _wait(process)
+    has_ended.set()
     alarm.cancel()
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return Done(
-        status=process.returncode,
-        message=said[-1] if said else "",
-        wall_s=round(time.perf_counter() - started, 2),
-        cpu_s=round(usage.ru_utime + usage.ru_stime, 2),
+    return CommandOutcome(
+        status=STOPPED if was_stopped.is_set() else status,
+        message=lines[-1] if lines else "",
+        wall_s=round(time.perf_counter() - start, 2),
+        cpu_s=None if cpu_s is None else round(cpu_s, 2),
         code=code,
     )
+
+
+def _read_error_stream(process: subprocess.Popen[bytes]) -> list[str]:
+    if process.stderr is None:
+        return []
+    with process.stderr as stream:
+        return stream.read().decode(errors="replace").strip().splitlines()
+
+
+def _wait(process: subprocess.Popen[bytes]) -> tuple[int, float | None]:
+    """Wait for a process: its exit status, and its processor time where the system tells it."""
+    if not hasattr(os, "wait4"):
+        return process.wait(), None
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, usage.ru_utime + usage.ru_stime
+
+
+def _stop_process_tree(process: subprocess.Popen[bytes]) -> None:
+    """Stop a process and all that it has started."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError):  # it has ended just now
+            os.killpg(process.pid, signal.SIGKILL)
+        return
+    taskkill = shutil.which("taskkill")
+    if taskkill:
+        subprocess.run([taskkill, "/F", "/T", "/PID", str(process.pid)], check=False, capture_output=True)
+    process.kill()

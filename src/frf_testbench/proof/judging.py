@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from frf_testbench.proof.answers import NONLINEAR, UNKNOWN, Cause, Diagnosis, Truth, Value
-from frf_testbench.proof.places import EXACT, RANKS, WRONG, Layout, compare_places
+from frf_testbench.proof.answers import NONLINEAR, UNKNOWN, Component, Diagnosis, Estimate, Truth
+from frf_testbench.proof.locations import EXACT, RANKS, WRONG, Layout, compare_locations
 
-SET_NATS = 5.0  # what lies within this of the best explanation belongs to the reported set
-DETECTABLE_NATS = 100.0
-DECIDABLE_NATS, DECIDABLE_SEPARATION = 300.0, 15.0
-PLACED_SEPARATION = 3.0  # odds of 20 to 1 against the closest other place
-CONFIDENT = 0.9
+# log Bayes factors
+REPORTED_WITHIN = 5.0  # of the best explanation: what lies closer belongs to the reported set
+DETECTABLE = 100.0
+DECIDABLE, DECIDABLE_SEPARATION = 300.0, 15.0
+LOCATION_SEPARATION = 3.0  # odds of 20 to 1 against the closest other location
+
+CONFIDENT = 0.9  # probability
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +27,7 @@ class ParameterScore:
         Of which effect, and which parameter.
     error : float
         Relative; infinite where it is missing or a wrong word.
-    covered : bool
+    is_covered : bool
         Whether the 95 % interval holds the truth.
     is_number : bool
         False for a word: it counts in no median and no interval.
@@ -34,7 +36,7 @@ class ParameterScore:
     effect: str
     name: str
     error: float
-    covered: bool
+    is_covered: bool
     is_number: bool = True
 
 
@@ -46,81 +48,84 @@ class Judgement:
     ----------
     name, group, structure : str
         Of the case.
-    true, said : str
+    true_label, stated_label : str
         Rows and columns of the confusion matrix.
     verdict : str
         Or ``failed``.
-    detected : bool
-        Said to lack something.
-    right : bool
+    is_detected : bool
+        Stated to lack something.
+    is_right : bool
         Explained, and the effect named first is a true one or equivalent to it.
-    first_right : bool
+    first_is_right : bool
         The same whatever the verdict is.
-    place : str, optional
-        Of the effect named first, where that is right: ``exact``, ``near``, ``wrong``; None where it has no place.
+    seed : int, optional
+        Of the simulator.
+    location_match : str, optional
+        Of the effect named first, where that is right: ``exact``, ``near``, ``wrong``; None where it has no location.
     parameters : tuple of ParameterScore
-        Where name and place are right.
-    in_set, set_size
+        Where name and location are right.
+    is_in_reported_set, n_reported
         Whether the true effect is in the reported set, and how many effects that holds.
     probability : float
         Of the effect named first; nan where none is named.
-    detectable, decidable : bool or None
+    is_detectable, is_decidable : bool or None
         By the evidence in the answer; None where it says nothing.
     n_right, n_findings : int
         True effects among the findings, and all findings.
-    both_detectable : bool or None
+    both_are_detectable : bool or None
         Of a pair: each effect has evidence of its own.
-    pair_places : int
-        Of a pair: effects that are named and exactly placed.
-    substitute_nats : float or None
-        Outside the catalogue: how much worse the closest known effect at its place is.
-    flagged_place : str or None
-        Outside the catalogue, a law at a node or spring: how close the place of the mismatch is.
-    place_told : bool
-        The recordings tell the true place from the closest other one, as far as the answer says.
-    in_place_set : bool or None
-        Whether the true place is among those that are said to be possible; None where none are said.
-    before, held_out, held_over_noise : float
-        Errors on held-out blows before and after, and after over that of noise alone; nan where not given.
+    n_right_exact : int
+        Of a pair: effects that are named at exactly their location.
+    alternative_separation : float or None
+        Outside the catalogue: log Bayes factor over the closest known effect at its location.
+    mismatch_location_match : str or None
+        Outside the catalogue, a law at a node or spring: how close the location of the mismatch is.
+    location_is_decidable : bool
+        The recordings tell the true location from the closest other one, as far as the answer says.
+    is_in_location_set : bool or None
+        Whether the true location is among those that are stated as possible; None where none are stated.
+    held_out_before, held_out_after, held_out_over_noise : float
+        Errors on held-out records before and after, and after over that of noise alone; nan where not stated.
     """
 
     name: str
     group: str
     structure: str
-    true: str
-    said: str
+    true_label: str
+    stated_label: str
     verdict: str
-    detected: bool
-    right: bool
-    first_right: bool
-    place: str | None = None
+    is_detected: bool
+    is_right: bool
+    first_is_right: bool
+    seed: int | None = None
+    location_match: str | None = None
     parameters: tuple[ParameterScore, ...] = ()
-    in_set: bool = False
-    set_size: int = 0
+    is_in_reported_set: bool = False
+    n_reported: int = 0
     probability: float = math.nan
-    detectable: bool | None = None
-    decidable: bool | None = None
+    is_detectable: bool | None = None
+    is_decidable: bool | None = None
     n_right: int = 0
     n_findings: int = 0
-    both_detectable: bool | None = None
-    pair_places: int = 0
-    substitute_nats: float | None = None
-    flagged_place: str | None = None
-    place_told: bool = True
-    in_place_set: bool | None = None
-    before: float = math.nan
-    held_out: float = math.nan
-    held_over_noise: float = math.nan
+    both_are_detectable: bool | None = None
+    n_right_exact: int = 0
+    alternative_separation: float | None = None
+    mismatch_location_match: str | None = None
+    location_is_decidable: bool = True
+    is_in_location_set: bool | None = None
+    held_out_before: float = math.nan
+    held_out_after: float = math.nan
+    held_out_over_noise: float = math.nan
 
 
-def judge(truth: Truth, said: Diagnosis, layout: Layout) -> Judgement:
+def judge(truth: Truth, diagnosis: Diagnosis, layout: Layout) -> Judgement:
     """Judge a diagnosis.
 
     Parameters
     ----------
     truth : Truth
         The answer.
-    said : Diagnosis
+    diagnosis : Diagnosis
         What was said.
     layout : Layout
         Of the model.
@@ -130,143 +135,169 @@ def judge(truth: Truth, said: Diagnosis, layout: Layout) -> Judgement:
     Judgement
         What is counted.
     """
-    first = said.findings[0] if said.findings else None
-    option, place = _best(first, truth, layout) if first else (None, None)
-    first_right = option is not None
-    found = [places for places in (_found(cause, said, layout) for cause in truth.causes) if places]
-    reported = reported_set(said)
+    first = diagnosis.findings[0] if diagnosis.findings else None
+    option, match = _match_answer(first, truth, layout) if first else (None, None)
+    all_matches = [_match_findings(component, diagnosis, layout) for component in truth.components]
+    named_matches = [matches for matches in all_matches if matches]
+    reported = list_reported_effects(diagnosis)
+    is_explained = diagnosis.verdict == "explained"
     return Judgement(
         name=truth.name,
         group=truth.group,
         structure=truth.structure,
-        true=_true_label(truth),
-        said=first.effect if first and said.verdict == "explained" else said.verdict,
-        verdict=said.verdict,
-        detected=said.verdict in ("explained", "unexplained"),
-        right=first_right and said.verdict == "explained",
-        first_right=first_right,
-        place=place,
-        parameters=_parameters(option, first, place),
-        in_set=bool({cause.effect for cause in _accepted(truth)} & reported),
-        set_size=len(reported),
+        seed=truth.seed,
+        true_label=_label_truth(truth),
+        stated_label=first.effect if first and is_explained else diagnosis.verdict,
+        verdict=diagnosis.verdict,
+        is_detected=diagnosis.verdict in ("explained", "unexplained"),
+        is_right=option is not None and is_explained,
+        first_is_right=option is not None,
+        location_match=match,
+        parameters=_score_parameters(option, first, match),
+        is_in_reported_set=bool({component.effect for component in _list_right_answers(truth)} & reported),
+        n_reported=len(reported),
         probability=first.probability if first else math.nan,
-        detectable=_detectable(truth),
-        decidable=_decidable(truth),
-        n_right=len(found),
-        n_findings=len(said.findings),
-        both_detectable=min(truth.each_nats) > DETECTABLE_NATS if truth.each_nats else None,
-        pair_places=sum(places[0] in (EXACT, None) for places in found),
-        substitute_nats=truth.separation_nats if truth.group == "unknown" else None,
-        flagged_place=_flagged_place(truth, said, layout),
-        place_told=truth.place_separation_nats is None or truth.place_separation_nats > PLACED_SEPARATION,
-        in_place_set=_in_place_set(option, first, layout),
-        before=said.before.get("held_out", math.nan),
-        held_out=said.after.get("held_out", math.nan),
-        held_over_noise=math.nan if said.held_over_noise is None else said.held_over_noise,
+        is_detectable=_is_detectable(truth),
+        is_decidable=_is_decidable(truth),
+        n_right=len(named_matches),
+        n_findings=len(diagnosis.findings),
+        both_are_detectable=min(truth.pair_evidence) > DETECTABLE if truth.pair_evidence else None,
+        n_right_exact=sum(matches[0] in (EXACT, None) for matches in named_matches),
+        alternative_separation=truth.effect_separation if truth.group == "unknown" else None,
+        mismatch_location_match=_match_mismatch_location(truth, diagnosis, layout),
+        location_is_decidable=truth.location_separation is None or truth.location_separation > LOCATION_SEPARATION,
+        is_in_location_set=_is_in_location_set(option, first, layout),
+        held_out_before=diagnosis.error_before.get("held_out", math.nan),
+        held_out_after=diagnosis.error_after.get("held_out", math.nan),
+        held_out_over_noise=math.nan if diagnosis.held_out_over_noise is None else diagnosis.held_out_over_noise,
     )
 
 
-def _accepted(truth: Truth) -> tuple[Cause, ...]:
-    """Causes that are right answers: what is outside the catalogue cannot be named, but what is equivalent can."""
-    return tuple(one for one in (*truth.causes, *truth.equivalents) if one.effect != UNKNOWN)
+def _list_right_answers(truth: Truth) -> tuple[Component, ...]:
+    """List what is right: what is outside the catalogue cannot be named, but what is equivalent to it can."""
+    options = (*truth.components, *truth.equivalents)
+    return tuple(option for option in options if option.effect != UNKNOWN)
 
 
-def _best(said: Cause, truth: Truth, layout: Layout) -> tuple[Cause | None, str | None]:
+def _rank(match: str | None) -> int:
+    """Order matches; an effect without a location cannot be located wrong."""
+    return RANKS[EXACT] + 1 if match is None else RANKS[match]
+
+
+def _match_answer(finding: Component, truth: Truth, layout: Layout) -> tuple[Component | None, str | None]:
     """Find the right answer that a finding comes closest to; (None, None) where it names none.
 
-    An equivalent is right at its own place only.
+    An equivalent is right at its own location only.
     """
-    compared = []
-    for option in _accepted(truth):
-        if option.effect == said.effect:
-            place = compare_places(option.location, said.location, layout)
-            if option in truth.causes or place != WRONG:
-                compared.append((option, place))
-    return max(compared, key=lambda pair: RANKS.get(pair[1], 3), default=(None, None))
+    options: list[tuple[Component | None, str | None]] = []
+    for option in _list_right_answers(truth):
+        if option.effect == finding.effect:
+            match = compare_locations(option.location, finding.location, layout)
+            if option in truth.components or match != WRONG:
+                options.append((option, match))
+    return max(options, key=lambda pair: _rank(pair[1]), default=(None, None))
 
 
-def _found(cause: Cause, said: Diagnosis, layout: Layout) -> list[str | None]:
-    """Places of the findings that name a true cause, the closest first."""
-    places = [
-        compare_places(cause.location, one.location, layout) for one in said.findings if one.effect == cause.effect
-    ]
-    return sorted(places, key=lambda place: -RANKS.get(place, 3))
+def _match_findings(component: Component, diagnosis: Diagnosis, layout: Layout) -> list[str | None]:
+    """Compare the locations of all findings that name a true component, the closest first."""
+    namesakes = [finding for finding in diagnosis.findings if finding.effect == component.effect]
+    matches = [compare_locations(component.location, finding.location, layout) for finding in namesakes]
+    return sorted(matches, key=_rank, reverse=True)
 
 
-def reported_set(said: Diagnosis) -> set[str]:
-    """Effects that a diagnosis does not tell apart: those within 5 nats of the one named first, or said to be."""
-    if not said.findings:
+def list_reported_effects(diagnosis: Diagnosis) -> set[str]:
+    """List effects that a diagnosis does not tell apart: those close to the one named first, or stated to be.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was said.
+
+    Returns
+    -------
+    set of str
+        All findings among them; empty without findings.
+    """
+    if not diagnosis.findings:
         return set()
-    first = said.findings[0]
-    close = {one.effect for one in said.alternatives if one.gain >= first.gain - SET_NATS}
-    named = {effect for effects in said.ambiguous if first.effect in effects for effect in effects}
-    return {one.effect for one in said.findings} | close | named
+    first = diagnosis.findings[0]
+    limit = first.log_evidence_gain - REPORTED_WITHIN
+    close = {alternative.effect for alternative in diagnosis.alternatives if alternative.log_evidence_gain >= limit}
+    ambiguous = {effect for effects in diagnosis.ambiguity_sets if first.effect in effects for effect in effects}
+    return {finding.effect for finding in diagnosis.findings} | close | ambiguous
 
 
-def _in_place_set(option: Cause | None, said: Cause | None, layout: Layout) -> bool | None:
-    """Whether the true place of a right effect is among the possible ones; None for an effect without a place."""
-    if option is None or said is None or not said.places:
+def _is_in_location_set(option: Component | None, finding: Component | None, layout: Layout) -> bool | None:
+    """Whether the true location is among the possible ones; None for an effect without a location."""
+    if option is None or finding is None or not finding.possible_locations:
         return None
-    compared = [compare_places(option.location, place, layout) for place in said.places]
-    return None if None in compared else EXACT in compared
+    matches = [compare_locations(option.location, location, layout) for location in finding.possible_locations]
+    return None if None in matches else EXACT in matches
 
 
-def _parameters(option: Cause | None, said: Cause | None, place: str | None) -> tuple[ParameterScore, ...]:
-    """Compare numbers, where name and place are right."""
-    if option is None or said is None or place not in (EXACT, None):
+def _score_parameters(
+    option: Component | None, finding: Component | None, match: str | None
+) -> tuple[ParameterScore, ...]:
+    """Compare numbers, where name and location are right."""
+    if option is None or finding is None or match not in (EXACT, None):
         return ()
-    either = option.effect == "boundary_compliance"  # the contract: one stiffness and/or the other
-    given = [name for name in option.parameters if name in said.parameters]
-    names = given if either and given else list(option.parameters)
-    return tuple(_parameter(option.effect, name, option.parameters[name], said.parameters.get(name)) for name in names)
+    one_is_enough = option.effect == "boundary_compliance"  # the contract: one stiffness and/or the other
+    stated_names = [name for name in option.parameters if name in finding.parameters]
+    names = stated_names if one_is_enough and stated_names else list(option.parameters)
+    return tuple(
+        _score_parameter(option.effect, name, option.parameters[name], finding.parameters.get(name)) for name in names
+    )
 
 
-def _parameter(effect: str, name: str, truth: float | str | Value, said: float | str | Value | None) -> ParameterScore:
+def _score_parameter(
+    effect: str, name: str, truth: float | str | Estimate, stated: float | str | Estimate | None
+) -> ParameterScore:
     if isinstance(truth, str):
-        same = said == truth
-        return ParameterScore(effect=effect, name=name, error=0.0 if same else math.inf, covered=same, is_number=False)
-    if isinstance(truth, Value) or not isinstance(said, Value):
-        return ParameterScore(effect=effect, name=name, error=math.inf, covered=False)
-    error = abs(said.value - truth) / abs(truth)
-    return ParameterScore(effect=effect, name=name, error=error, covered=said.low <= truth <= said.high)
+        same = stated == truth
+        error = 0.0 if same else math.inf
+        return ParameterScore(effect=effect, name=name, error=error, is_covered=same, is_number=False)
+    if isinstance(truth, Estimate) or not isinstance(stated, Estimate):
+        return ParameterScore(effect=effect, name=name, error=math.inf, is_covered=False)
+    error = abs(stated.value - truth) / abs(truth)
+    return ParameterScore(effect=effect, name=name, error=error, is_covered=stated.low <= truth <= stated.high)
 
 
-def _true_label(truth: Truth) -> str:
+def _label_truth(truth: Truth) -> str:
     if truth.group == "unknown":
         return f"outside: {truth.kind or 'unnamed'}"
     if truth.group == "pair":
         return "two effects"
-    return truth.causes[0].effect if truth.causes else "nothing"
+    return truth.components[0].effect if truth.components else "nothing"
 
 
-def _detectable(truth: Truth) -> bool | None:
-    if not truth.causes or not truth.has_evidence or truth.evidence_nats is None:
+def _is_detectable(truth: Truth) -> bool | None:
+    if not truth.components or not truth.states_evidence or truth.evidence is None:
         return None
-    return truth.evidence_nats > DETECTABLE_NATS
+    return truth.evidence > DETECTABLE
 
 
-def _decidable(truth: Truth) -> bool | None:
-    """Evidence over 300 nats, and over 15 nats from the closest other effect where there is one."""
-    if truth.group != "linear" or not truth.has_evidence or truth.evidence_nats is None:
+def _is_decidable(truth: Truth) -> bool | None:
+    """Whether there is evidence enough, for the effect and over the closest other effect where there is one."""
+    if truth.group != "linear" or not truth.states_evidence or truth.evidence is None:
         return None
-    apart = truth.separation_nats is None or truth.separation_nats > DECIDABLE_SEPARATION
-    return truth.evidence_nats > DECIDABLE_NATS and apart and not truth.equivalents
+    is_apart = truth.effect_separation is None or truth.effect_separation > DECIDABLE_SEPARATION
+    return truth.evidence > DECIDABLE and is_apart and not truth.equivalents
 
 
-def _flagged_place(truth: Truth, said: Diagnosis, layout: Layout) -> str | None:
-    """Say how close the place of an unexplained mismatch is to that of an unknown law."""
-    cause = truth.causes[0] if truth.causes else None
-    if truth.group != "unknown" or cause is None or not cause.nonlinear or "channels" in cause.location:
+def _match_mismatch_location(truth: Truth, diagnosis: Diagnosis, layout: Layout) -> str | None:
+    """Compare the location of an unexplained mismatch with that of an unknown law."""
+    component = truth.components[0] if truth.components else None
+    if truth.group != "unknown" or component is None or not component.is_nonlinear or "channels" in component.location:
         return None
-    found = [compare_places(cause.location, place, layout) or "wrong" for place in said.places]
-    return max(found, key=RANKS.__getitem__, default="wrong")
+    matches = [compare_locations(component.location, location, layout) or WRONG for location in diagnosis.locations]
+    return max(matches, key=RANKS.__getitem__, default=WRONG)
 
 
 def is_wrong_name(judgement: Judgement) -> bool:
     """Whether something outside the catalogue got a confident name that is not equivalent to it."""
-    return judgement.verdict == "explained" and not judgement.right and judgement.probability > CONFIDENT
+    return judgement.verdict == "explained" and not judgement.is_right and judgement.probability > CONFIDENT
 
 
 def names_a_law(judgement: Judgement) -> bool:
     """Whether a nonlinear effect was named."""
-    return judgement.said in NONLINEAR
+    return judgement.stated_label in NONLINEAR

@@ -1,13 +1,13 @@
-"""Compare places: the same, within one node or element, or wrong."""
+"""Compare locations: the same, within one node or element, or wrong."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ KEYS = ("nodes", "elements", "springs", "groups", "channels")
 EXACT, NEAR, WRONG = "exact", "near", "wrong"
 RANKS = {EXACT: 2, NEAR: 1, WRONG: 0}
 SAME_LENGTH = 1.001  # of distances: drawn positions have nine digits
+
+Part = TypeVar("Part", int, str)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,12 +54,12 @@ class Layout:
         if a not in self.positions or b not in self.positions:
             return False
         distance = float(np.linalg.norm(np.subtract(self.positions[a], self.positions[b])))
-        return distance <= SAME_LENGTH * max(self._second(a), self._second(b))
+        return distance <= SAME_LENGTH * max(self._second_distance(a), self._second_distance(b))
 
-    def _second(self, node: int) -> float:
-        """Distance to the second nearest node."""
-        places = np.array([place for other, place in self.positions.items() if other != node])
-        return float(np.sort(np.linalg.norm(places - np.array(self.positions[node]), axis=1))[1])
+    def _second_distance(self, node: int) -> float:
+        """Return the distance to the second nearest node."""
+        neighbours = np.array([position for number, position in self.positions.items() if number != node])
+        return float(np.sort(np.linalg.norm(neighbours - np.array(self.positions[node]), axis=1))[1])
 
     def share_a_node(self, a: str, b: str) -> bool:
         """Whether two springs are the same or meet at a node; the ground is none."""
@@ -81,7 +83,8 @@ def read_layout(case: Path) -> Layout:
     """
     table = tomllib.loads(read_text(case / "model.toml"))
     if "lumped" in table:
-        return Layout(springs={one["id"]: tuple(one["nodes"]) for one in table["lumped"]["spring"]})
+        springs = table["lumped"]["spring"]
+        return Layout(springs={spring["id"]: (spring["nodes"][0], spring["nodes"][1]) for spring in springs})
     if "beam" in table:
         return Layout(ends={"left": 1, "right": table["beam"]["elements"] + 1})
     lines = read_text(case / table["matrices"]["dofs"]).split()
@@ -89,12 +92,12 @@ def read_layout(case: Path) -> Layout:
     return Layout(positions={int(row[0]): tuple(float(x) for x in row[2:5]) for row in rows})
 
 
-def compare_places(truth: Mapping[str, Any], said: Mapping[str, Any], layout: Layout) -> str | None:
-    """Compare a place with the true one.
+def compare_locations(truth: Mapping[str, Any], statement: Mapping[str, Any], layout: Layout) -> str | None:
+    """Compare a location with the true one.
 
     Parameters
     ----------
-    truth, said : mapping
+    truth, statement : mapping
         As ``location`` in ``diagnosis.json``. The end of a beam may be named by its side or by its node.
     layout : Layout
         Of the model.
@@ -102,36 +105,39 @@ def compare_places(truth: Mapping[str, Any], said: Mapping[str, Any], layout: La
     Returns
     -------
     str, or None
-        ``exact``, ``near`` (within one node or element) or ``wrong``; None for an effect without a place.
+        ``exact``, ``near`` (within one node or element) or ``wrong``; None for an effect without a location.
     """
-    if truth.get("end") and not said.get("end"):
+    if truth.get("end") and not statement.get("end"):
         node = layout.ends.get(truth["end"])
         truth = {"nodes": truth.get("nodes") or [node]}
     keys = ["end"] if truth.get("end") else [key for key in KEYS if truth.get(key)]
-    return min((_compare(key, truth[key], said.get(key), layout) for key in keys), key=RANKS.get, default=None)
+    matches = [_compare(key, truth[key], statement.get(key), layout) for key in keys]
+    return min(matches, key=RANKS.__getitem__, default=None)
 
 
-def _compare(key: str, truth: Any, said: Any, layout: Layout) -> str:  # noqa: ANN401 - a list or a name
-    if not said:
+def _compare(key: str, truth: Any, statement: Any, layout: Layout) -> str:  # noqa: ANN401 - a list or a name
+    if not statement:
         return WRONG
     if key == "elements":
-        return _stretch(truth, said)
+        return _compare_segments(truth, statement)
     if key == "end":
-        return EXACT if said == truth else WRONG
-    if sorted(said) == sorted(truth):
+        return EXACT if statement == truth else WRONG
+    if sorted(statement) == sorted(truth):
         return EXACT
-    close = {"nodes": layout.are_neighbours, "springs": layout.share_a_node}.get(key)
-    return NEAR if close and _pair_up(truth, said, close) else WRONG
+    is_near = (key == "nodes" and _are_paired(truth, statement, layout.are_neighbours)) or (
+        key == "springs" and _are_paired(truth, statement, layout.share_a_node)
+    )
+    return NEAR if is_near else WRONG
 
 
-def _stretch(truth: Sequence[int], said: Sequence[int]) -> str:
-    """Compare stretches [first, last] of elements."""
-    off = max(abs(said[0] - truth[0]), abs(said[-1] - truth[-1]))
-    return EXACT if off == 0 else NEAR if off == 1 else WRONG
+def _compare_segments(truth: Sequence[int], statement: Sequence[int]) -> str:
+    """Compare segments [first, last] of elements."""
+    distance = max(abs(statement[0] - truth[0]), abs(statement[-1] - truth[-1]))
+    return EXACT if distance == 0 else NEAR if distance == 1 else WRONG
 
 
-def _pair_up(truth: Sequence[Any], said: Sequence[Any], close: Any) -> bool:  # noqa: ANN401 - of nodes or springs
-    """Whether each of the one is close to one of the other."""
-    return len(truth) == len(said) and any(
-        all(close(a, b) for a, b in zip(truth, order, strict=True)) for order in permutations(said)
+def _are_paired(truth: Sequence[Part], statement: Sequence[Part], is_close: Callable[[Part, Part], bool]) -> bool:
+    """Whether each true part, a node or a spring, is close to a different one of the stated parts."""
+    return len(truth) == len(statement) and any(
+        all(is_close(a, b) for a, b in zip(truth, order, strict=True)) for order in permutations(statement)
     )

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from frf_testbench.simulator.effects.catalogue import CONTRACT, NONLINEAR, OUTSIDE
+from frf_testbench.simulator.effects.catalogue import CATALOGUE, NONLINEAR, OUT_OF_CATALOGUE
 
 FULL = {"linear": 200, "null": 100, "nonlinear": 60, "pair": 60, "unknown": 60}
-SLICE = {"linear": 8, "null": 4, "nonlinear": 3, "pair": 2, "unknown": 3}
+QUICK = {"linear": 8, "null": 4, "nonlinear": 3, "pair": 2, "unknown": 3}
 FIRST_SEEDS = {
     "linear": 161_000_000, "null": 162_000_000, "nonlinear": 163_000_000, "pair": 164_000_000, "unknown": 165_000_000,
 }  # fmt: skip
@@ -25,7 +25,7 @@ class Order:
     Parameters
     ----------
     name : str
-        Of its folder: it tells nothing about the effect.
+        Of its folder: it says nothing about the effect.
     group : str
         One of `FULL`.
     effect : str
@@ -74,14 +74,14 @@ class Folders:
         return self.root / "predicted"
 
 
-def turns(group: str) -> list[str]:
-    """Effects of a group in the order in which they take turns: the same for a slice and for all."""
+def list_effects(group: str) -> list[str]:
+    """List the effects of a group in the order in which they take turns: the same for a slice and for all."""
     effects = {
-        "linear": [name for name in CONTRACT if name not in NONLINEAR],
+        "linear": [name for name in CATALOGUE if name not in NONLINEAR],
         "null": ["null"],
-        "nonlinear": [name for name in CONTRACT if name in NONLINEAR],
+        "nonlinear": [name for name in CATALOGUE if name in NONLINEAR],
         "pair": ["pair"],
-        "unknown": [f"unknown:{kind}" for kind in OUTSIDE],
+        "unknown": [f"unknown:{kind}" for kind in OUT_OF_CATALOGUE],
     }[group]
     return [effects[i] for i in np.random.default_rng(ORDER_SEED).permutation(len(effects))]
 
@@ -104,7 +104,7 @@ def plan_cases(counts: dict[str, int], *, shift: int = 0) -> list[Order]:
     """
     orders = []
     for group, count in counts.items():
-        effects = turns(group)
+        effects = list_effects(group)
         for i in range(count):
             name = "case_" + hashlib.blake2s(f"{group} {i}".encode(), digest_size=5).hexdigest()
             seed = FIRST_SEEDS[group] + shift + i

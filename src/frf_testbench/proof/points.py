@@ -31,7 +31,7 @@ class PointErrors:
     diagnosed: float
 
 
-def point_errors(case: Path, truth: Path, predicted: Path) -> PointErrors | None:
+def compute_point_errors(case: Path, truth: Path, predicted: Path) -> PointErrors | None:
     """Compare predictions of a case with the truth.
 
     Parameters
@@ -53,22 +53,22 @@ def point_errors(case: Path, truth: Path, predicted: Path) -> PointErrors | None
         return None
     table = pd.read_csv(truth)
     diagnosed, without = (pd.read_parquet(file) for file in files)
-    nominal = nominal_frfs(case, diagnosed)
+    nominal = evaluate_nominal_model(case, diagnosed)
     return PointErrors(
-        nominal=frf_error(table, nominal),
-        without=frf_error(table, without),
-        diagnosed=frf_error(table, diagnosed),
+        nominal=compute_frf_error(table, nominal),
+        without=compute_frf_error(table, without),
+        diagnosed=compute_frf_error(table, diagnosed),
     )
 
 
-def nominal_frfs(case: Path, like: pd.DataFrame) -> pd.DataFrame:
+def evaluate_nominal_model(case: Path, prediction: pd.DataFrame) -> pd.DataFrame:
     """Evaluate the model as it was handed in, at the lines and points of a prediction.
 
     Parameters
     ----------
     case : Path
         Folder of the case.
-    like : DataFrame
+    prediction : DataFrame
         ``poi_frf.parquet``.
 
     Returns
@@ -77,16 +77,16 @@ def nominal_frfs(case: Path, like: pd.DataFrame) -> pd.DataFrame:
         With the same rows.
     """
     model = frf_ipz.read_model(case / "model.toml")
-    parts = []
-    for (output, source, quantity), rows in like.groupby(["output_dof", "input_dof", "quantity"], sort=False):
-        label = FrfLabel(frf_ipz.parse_dof(output), frf_ipz.parse_dof(source), frf_ipz.FrfQuantity(quantity))
+    frfs = []
+    for (output, source, quantity), rows in prediction.groupby(["output_dof", "input_dof", "quantity"], sort=False):
+        label = FrfLabel(frf_ipz.parse_dof(str(output)), frf_ipz.parse_dof(str(source)), frf_ipz.FrfQuantity(quantity))
         H = frf_ipz.model_frfs(model, [label], 2j * np.pi * rows["frequency_hz"].to_numpy())[:, 0]
-        parts.append(rows.assign(real=H.real, imag=H.imag))
-    return pd.concat(parts)
+        frfs.append(rows.assign(real=H.real, imag=H.imag))
+    return pd.concat(frfs)
 
 
-def frf_error(truth: pd.DataFrame, predicted: pd.DataFrame) -> float:
-    """Norm of the difference over the norm of the truth, on the lines that both have.
+def compute_frf_error(truth: pd.DataFrame, predicted: pd.DataFrame) -> float:
+    """Compute the norm of the difference over the norm of the truth, on the lines that both have.
 
     Parameters
     ----------
@@ -98,30 +98,30 @@ def frf_error(truth: pd.DataFrame, predicted: pd.DataFrame) -> float:
     float
         Nan where they have no line in common.
     """
-    known, said = _by_path(truth), _by_path(predicted)
-    left = norm = 0.0
-    for key, (lines, H) in said.items():
-        if key not in known:
+    true_frfs, predicted_frfs = _group_by_path(truth), _group_by_path(predicted)
+    misfit = norm = 0.0
+    for key, (lines, H) in predicted_frfs.items():
+        if key not in true_frfs:
             continue
-        true_lines, true = known[key]
+        true_lines, true_H = true_frfs[key]
         nearest = np.abs(true_lines[:, None] - lines[None, :]).argmin(axis=0)
         same = np.abs(true_lines[nearest] / lines - 1) < SAME_LINE
-        left += float(np.sum(np.abs(H[same] - true[nearest[same]]) ** 2))
-        norm += float(np.sum(np.abs(true[nearest[same]]) ** 2))
-    return float(np.sqrt(left / norm)) if norm else float("nan")
+        misfit += float(np.sum(np.abs(H[same] - true_H[nearest[same]]) ** 2))
+        norm += float(np.sum(np.abs(true_H[nearest[same]]) ** 2))
+    return float(np.sqrt(misfit / norm)) if norm else float("nan")
 
 
-def _by_path(table: pd.DataFrame) -> dict[Key, tuple[NDArray[np.float64], NDArray[np.complex128]]]:
-    """FRFs by output and input, with positive signs."""
+def _group_by_path(table: pd.DataFrame) -> dict[Key, tuple[NDArray[np.float64], NDArray[np.complex128]]]:
+    """Group FRFs by output and input, with positive signs."""
     result = {}
     for (output, source), rows in table.groupby(["output_dof", "input_dof"], sort=False):
-        (out_node, out_direction, a), (in_node, in_direction, b) = _split(output), _split(source)
+        (out_node, out_direction, a), (in_node, in_direction, b) = _split_label(str(output)), _split_label(str(source))
         H = a * b * (rows["real"].to_numpy() + 1j * rows["imag"].to_numpy())
         result[out_node, out_direction, in_node, in_direction] = rows["frequency_hz"].to_numpy(), H
     return result
 
 
-def _split(label: str) -> tuple[int, str, int]:
-    """Node, direction and sign of a label."""
+def _split_label(label: str) -> tuple[int, str, int]:
+    """Split a label into node, direction and sign."""
     node, direction = label.split(":")
     return int(node), direction.lstrip("+-"), -1 if direction.startswith("-") else 1

@@ -1,7 +1,7 @@
 """Prove the diagnosis on blind cases: make them, seal the answers, diagnose, open, score, and write a page.
 
-``frf-testbench prove`` writes ``results/proof/proof.html`` and ``scores.json``. It goes on where it was stopped;
-cases that a changed package has not seen are diagnosed again.
+``frf-testbench prove`` writes ``proof.html``, ``scores.json`` and ``validation.md`` into ``results/proof``. It goes on
+where it was stopped; cases that a changed package has not seen are diagnosed again.
 """
 
 from __future__ import annotations
@@ -12,13 +12,15 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from frf_testbench.proof.blind import diagnose_all, predict_all, worth_predicting
-from frf_testbench.proof.commands import code_digest
+from frf_testbench.proof.blind_runs import diagnose_all, is_worth_predicting, predict_all
+from frf_testbench.proof.commands import compute_code_digest
 from frf_testbench.proof.page import write_page, write_scores
-from frf_testbench.proof.plan import FULL, SLICE, Folders, plan_cases
-from frf_testbench.proof.scoring import Bar, bars, open_cases
+from frf_testbench.proof.plan import FULL, QUICK, Folders, Order, plan_cases
+from frf_testbench.proof.scoring import Bar, open_cases, score_bars
 from frf_testbench.proof.sealing import BrokenSealError, check_seal, make_cases
+from frf_testbench.proof.validation import write_validation
 
+TITLE = "Blind proof of the diagnosis"
 MOST_PREDICTED = 80  # explained cases: each is updated and predicted twice
 
 
@@ -41,7 +43,7 @@ def run_proof(
     out : Path, optional
         Folder; ``results/proof`` by default, or ``results`` and the name of `cases`.
     quick : bool
-        A slice of a few cases of each group.
+        A few cases of each group.
     counts : mapping of str to int, optional
         Cases of a group where they are not the usual number.
     seed_shift : int
@@ -57,39 +59,42 @@ def run_proof(
     command : list of str, optional
         What is diagnosed with; the public command by default.
     """
+    orders: list[Order] = []
     if cases is not None:
         root = out or Path("results") / cases.resolve().name
-        folders, orders = Folders(root, cases, answers or cases / "truth"), []
+        folders = Folders(root, cases, answers or cases / "truth")
     else:
         folders = Folders.inside(out or Path("results") / "proof")
-        orders = plan_cases({**(SLICE if quick else FULL), **(counts or {})}, shift=seed_shift)
+        orders = plan_cases({**(QUICK if quick else FULL), **(counts or {})}, shift=seed_shift)
     names = [order.name for order in orders] or sorted(path.stem for path in folders.sealed.glob("case_*.json"))
-    engine = {"workers": jobs, "command": command}
     with Progress(TextColumn("{task.description:24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as bar:
 
-        def steps(text: str, total: int) -> Callable[[], None]:
+        def count_steps(text: str, total: int) -> Callable[[], None]:
             task = bar.add_task(text, total=total)
             return lambda: bar.advance(task)
 
         if orders:
-            make_cases(orders, folders, workers=jobs, step=steps("making cases", len(names)))
-        diagnose_all(names, folders, step=steps("diagnosing", len(names)), **engine)
-        explained = [name for name in names if worth_predicting(name, folders)][:points]
-        predict_all(explained, folders, step=steps("predicting points", len(explained)), **engine)
+            make_cases(orders, folders, workers=jobs, step=count_steps("making cases", len(names)))
+        step = count_steps("diagnosing", len(names))
+        diagnose_all(names, folders, workers=jobs, command=command, step=step)
+        explained = [name for name in names if is_worth_predicting(name, folders)][:points]
+        step = count_steps("predicting points", len(explained))
+        predict_all(explained, folders, workers=jobs, command=command, step=step)
     try:
         check_seal(folders, names)
     except BrokenSealError as error:
         sys.exit(f"proof: {error}")
-    opened = open_cases(names, folders)
-    reached, code = bars(opened), code_digest()
-    page = folders.root / "proof.html"
-    write_page(page, opened, reached, title="Blind proof of the diagnosis", code=code)
-    write_scores(page.with_name("scores.json"), opened, reached, code=code)
-    print("\n".join([*map(line, reached), str(page)]))
+    scored_cases = open_cases(names, folders)
+    bars, code = score_bars(scored_cases), compute_code_digest()
+    page, scores = folders.root / "proof.html", folders.root / "scores.json"
+    write_page(page, scored_cases, bars, title=TITLE, code=code)
+    write_scores(scores, scored_cases, bars, title=TITLE, code=code)
+    write_validation([scores], folders.root / "validation.md")
+    print("\n".join([*map(format_line, bars), str(page)]))
 
 
-def line(bar: Bar) -> str:
-    """One line of the table on the terminal."""
+def format_line(bar: Bar) -> str:
+    """Format one line of the table on the terminal."""
     count = f"{bar.rate.hits}/{bar.rate.count}" if bar.rate else ""
     word = {True: "reached", False: "MISSED", None: "-"}[bar.passes]
-    return f"{bar.group:22}{bar.name:66}{bar.wanted:16}{bar.value:9.3g} {count:9}{word}"
+    return f"{bar.group:22}{bar.name:80}{bar.requirement:16}{bar.value:9.3g} {count:9}{word}"

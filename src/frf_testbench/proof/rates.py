@@ -33,7 +33,7 @@ class Rate:
 
     @property
     def value(self) -> float:
-        """Part of the trials that succeeded; nan without trials."""
+        """Fraction of the trials that succeeded; nan without trials."""
         return self.hits / self.count if self.count else math.nan
 
     @property
@@ -52,7 +52,7 @@ class Bin:
     Parameters
     ----------
     claimed, reached : float
-        Mean probability, and the part that is right.
+        Mean probability, and the fraction that is right.
     count : int
         Cases.
     """
@@ -89,6 +89,6 @@ def calibration(probabilities: Sequence[float], right: Sequence[bool], *, n_bins
 
 
 def calibration_error(bins: Sequence[Bin]) -> float:
-    """Mean distance of claimed from reached, weighted by cases (the expected calibration error); nan without cases."""
-    count = sum(one.count for one in bins)
-    return sum(one.count * abs(one.claimed - one.reached) for one in bins) / count if count else math.nan
+    """Compute the expected calibration error: the mean distance of claimed from reached; nan without cases."""
+    count = sum(group.count for group in bins)
+    return sum(group.count * abs(group.claimed - group.reached) for group in bins) / count if count else math.nan

@@ -12,7 +12,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from frf_testbench.proof.plan import Folders, Order
-from frf_testbench.simulator.cases.case import make_case
+from frf_testbench.simulator.cases.case import Case, make_case
 
 SEAL = "seal.json"
 NEXT_SEED = 100_000  # added to a seed for which no specimen is found that shows the effect
@@ -44,8 +44,8 @@ def make_cases(orders: Sequence[Order], folders: Folders, *, workers: int, step:
         step()
     # not forked: the progress bar has a thread
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(make_one, order, folders) for order in missing]):
-            done.result()
+        for future in as_completed([pool.submit(make_sealed_case, order, folders) for order in missing]):
+            future.result()
             step()
     seal(folders, [order.name for order in orders])
 
@@ -55,7 +55,7 @@ def is_made(name: str, folders: Folders) -> bool:
     return (folders.cases / name).is_dir() and (folders.sealed / f"{name}.json").is_file()
 
 
-def make_one(order: Order, folders: Folders) -> None:
+def make_sealed_case(order: Order, folders: Folders) -> None:
     """Make one case: the answer is put away before the case appears.
 
     Parameters
@@ -70,18 +70,20 @@ def make_one(order: Order, folders: Folders) -> None:
     RuntimeError
         If no specimen was found on which the effect can be seen.
     """
-    case = None
-    for i in range(TRIES):
-        try:
-            case = make_case(order.seed + i * NEXT_SEED, order.effect)
-            break
-        except RuntimeError:
-            if i == TRIES - 1:
-                raise
+    case = _draw_case(order)
     unfinished = folders.cases / f".{order.name}"
     shutil.rmtree(unfinished, ignore_errors=True)
     case.write(unfinished, folders.sealed / f"{order.name}.json")
     unfinished.rename(folders.cases / order.name)
+
+
+def _draw_case(order: Order) -> Case:
+    for i in range(TRIES - 1):
+        try:
+            return make_case(order.seed + i * NEXT_SEED, order.effect)
+        except RuntimeError:
+            continue
+    return make_case(order.seed + (TRIES - 1) * NEXT_SEED, order.effect)
 
 
 def seal(folders: Folders, names: Sequence[str]) -> None:
@@ -95,10 +97,10 @@ def seal(folders: Folders, names: Sequence[str]) -> None:
         Cases.
     """
     path = folders.sealed / SEAL
-    digests = _digests(path)
-    fresh = {name: digest(folders.sealed, name) for name in names if name not in digests}
-    if fresh:
-        path.write_text(json.dumps(dict(sorted((digests | fresh).items())), indent=1) + "\n", encoding="utf-8")
+    digests = _read_digests(path)
+    new_digests = {name: compute_digest(folders.sealed, name) for name in names if name not in digests}
+    if new_digests:
+        path.write_text(json.dumps(dict(sorted((digests | new_digests).items())), indent=1) + "\n", encoding="utf-8")
 
 
 def check_seal(folders: Folders, names: Sequence[str]) -> None:
@@ -119,8 +121,8 @@ def check_seal(folders: Folders, names: Sequence[str]) -> None:
     path = folders.sealed / SEAL
     if not path.is_file():
         return
-    digests = _digests(path)
-    broken = [name for name in names if digests.get(name) != digest(folders.sealed, name)]
+    digests = _read_digests(path)
+    broken = [name for name in names if digests.get(name) != compute_digest(folders.sealed, name)]
     if broken:
         raise BrokenSealError(
             f"the answers of {', '.join(broken[:5])} are not those that were sealed in {path}; "
@@ -128,12 +130,13 @@ def check_seal(folders: Folders, names: Sequence[str]) -> None:
         )
 
 
-def _digests(path: Path) -> dict[str, str]:
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+def _read_digests(path: Path) -> dict[str, str]:
+    digests: dict[str, str] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return digests
 
 
-def digest(sealed: Path, name: str) -> str:
-    """SHA-256 of the files of an answer.
+def compute_digest(sealed: Path, name: str) -> str:
+    """Compute the SHA-256 of the files of an answer.
 
     Parameters
     ----------

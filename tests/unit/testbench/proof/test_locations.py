@@ -2,7 +2,7 @@
 
 import pytest
 
-from frf_testbench.proof.places import Layout, compare_places, read_layout
+from frf_testbench.proof.locations import Layout, compare_locations, read_layout
 
 BEAM = Layout(ends={"left": 1, "right": 41})
 FRAME = Layout(springs={"k1": (0, 1), "k2": (1, 2), "k3": (2, 3), "k4": (0, 3)})
@@ -43,7 +43,7 @@ PLATE = Layout(positions={10 * j + i: (0.1 * i, 0.3 * j, 0.0) for j in range(3) 
     ],
 )
 def test_a_place_is_compared(layout, truth, said, expected):
-    assert compare_places(truth, said, layout) == expected
+    assert compare_locations(truth, said, layout) == expected
 
 
 @pytest.mark.parametrize("truth", [{"end": "right", "nodes": [41]}, {"end": "right"}])
@@ -61,7 +61,7 @@ def test_a_place_is_compared(layout, truth, said, expected):
     ],
 )
 def test_an_end_may_be_named_by_its_side_or_its_node(truth, said, expected):
-    assert compare_places(truth, said, BEAM) == expected
+    assert compare_locations(truth, said, BEAM) == expected
 
 
 def test_the_layout_is_read_from_the_model(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 
 from frf_testbench.proof.page import write_page, write_scores
 from frf_testbench.proof.prove import run_proof
-from frf_testbench.proof.scoring import bars
+from frf_testbench.proof.scoring import score_bars
 
 GUESS = """
 import json, sys
@@ -73,10 +73,11 @@ def scored(tmp_path_factory):
 
 def test_scores_say_what_was_counted(scored):
     scores = json.loads((scored / "scores.json").read_text(encoding="utf-8"))
-    said = {case["judgement"]["name"]: case["judgement"]["said"] for case in scores["cases"]}
+    said = {case["judgement"]["name"]: case["judgement"]["stated_label"] for case in scores["cases"]}
     assert said == {"case_1": "added_mass", "case_2": "failed", "case_3": "consistent", "case_4": "added_mass"}
     faults = {case["judgement"]["name"]: case["fault"] for case in scores["cases"]}
     assert faults == {"case_1": "", "case_2": "frf-ipz: <the fit> failed", "case_3": "", "case_4": ""}
+    assert scores["machines"] == {"linear": 2, "null": 1, "unknown": 1}
     found = {(bar["group"], bar["name"]): bar for bar in scores["bars"]}
     first = found["linear", "effect named first, of all"]
     assert (first["rate"]["hits"], first["rate"]["count"], first["passes"]) == (1, 2, False)
@@ -102,14 +103,26 @@ def test_the_page_stands_on_its_own(scored):
     assert "&lt;the fit&gt; failed" in text
     assert "1 of 2: 50.0% (1.3% to 98.7%)" in text
     headings = re.findall("<h2>(.*?)</h2>", text)
-    assert headings[:3] == ["Bars", "What was said for what", "Places"]
+    assert headings[:3] == ["Bars", "What was stated for what", "Locations"]
     assert len(headings) == 12
 
 
+def test_the_documentation_gets_the_bars_with_their_intervals(scored):
+    text = (scored / "validation.md").read_text(encoding="utf-8")
+    code = json.loads((scored / "scores.json").read_text(encoding="utf-8"))["package"]["code"]
+    assert "| 1 | [Blind proof of the diagnosis](#blind-proof-of-the-diagnosis) | 2 linear, 1 null, 1 unknown |" in text
+    assert f"code {code} |" in text
+    assert "| linear | effect named first, of all | 1 of 2 | 50.0 % | 1.3 to 98.7 % | at least 90 % | no |" in text
+    assert "| nulls | false alarms | 0 of 1 | 0.0 % | 0.0 to 97.5 % | at most 2 % | yes |" in text
+    assert "| time | linear case, from FRFs, median |  | 1.5 |  | at most 10 s | yes |" in text
+    assert "| two effects | both | 0 of 0 |  |  | at least 75 % |  |" in text
+
+
 def test_a_page_without_cases_is_drawn(tmp_path):
-    write_page(tmp_path / "proof.html", [], bars([]), title="None & nothing", code="x")
-    write_scores(tmp_path / "scores.json", [], bars([]), code="x")
+    write_page(tmp_path / "proof.html", [], score_bars([]), title="None & nothing", code="x")
+    write_scores(tmp_path / "scores.json", [], score_bars([]), title="None & nothing", code="x")
     page = Page()
     page.feed((tmp_path / "proof.html").read_text(encoding="utf-8"))
     assert page.open == []
+    assert "<h1>None &amp; nothing</h1>" in (tmp_path / "proof.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "scores.json").read_text(encoding="utf-8"))["cases"] == []

@@ -1,6 +1,7 @@
 """What a diagnosis can read holds nothing of the truth, and answers cannot change unseen."""
 
 import json
+import os
 import re
 import sys
 import tomllib
@@ -9,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from frf_testbench.proof.blind import diagnose_all, predict_all, worth_predicting, write_pipeline
-from frf_testbench.proof.commands import code_digest, read_done, run, run_all
-from frf_testbench.proof.plan import FULL, SLICE, Folders, plan_cases, turns
+from frf_testbench.proof.blind_runs import diagnose_all, is_worth_predicting, predict_all, write_pipeline
+from frf_testbench.proof.commands import compute_code_digest, find_public_command, read_outcome, run, run_all
+from frf_testbench.proof.plan import FULL, QUICK, Folders, list_effects, plan_cases
 from frf_testbench.proof.sealing import BrokenSealError, check_seal, make_cases
-from frf_testbench.simulator.effects.catalogue import CONTRACT, NONLINEAR
+from frf_testbench.simulator.effects.catalogue import CATALOGUE, NONLINEAR
 
 COUNTS = {"linear": 1, "null": 1}
 FAKE = """
@@ -52,7 +53,7 @@ def test_names_tell_nothing_and_a_slice_is_part_of_the_whole():
     assert len({order.name for order in everything}) == len(everything) == 480
     assert len({order.seed for order in everything}) == 480
     assert [order.name for order in everything] == sorted(order.name for order in everything)
-    part = plan_cases(SLICE)
+    part = plan_cases(QUICK)
     assert set(part) <= set(everything)
     groups = [order.group for order in everything]
     changes = sum(a != b for a, b in pairwise(groups))
@@ -61,8 +62,8 @@ def test_names_tell_nothing_and_a_slice_is_part_of_the_whole():
 
 
 def test_every_effect_takes_its_turn():
-    assert sorted(turns("linear")) == sorted(set(CONTRACT) - set(NONLINEAR))
-    assert {order.effect for order in plan_cases(FULL) if order.group == "linear"} == set(turns("linear"))
+    assert sorted(list_effects("linear")) == sorted(set(CATALOGUE) - set(NONLINEAR))
+    assert {order.effect for order in plan_cases(FULL) if order.group == "linear"} == set(list_effects("linear"))
     assert len({order.effect for order in plan_cases(FULL) if order.group == "unknown"}) == 15
 
 
@@ -104,7 +105,7 @@ def test_an_answer_that_changes_is_noticed(made):
     check_seal(folders, names)
 
 
-def test_the_diagnosis_is_told_nothing_of_the_answers(made, fake):
+def test_the_diagnosis_told_nothing_of_the_answers(made, fake):
     folders, _ = made
     names = names_in(folders.cases)
     diagnose_all(names, folders, workers=2, step=lambda: None, command=fake)
@@ -118,8 +119,8 @@ def test_the_diagnosis_is_told_nothing_of_the_answers(made, fake):
         assert folders.sealed.name not in told
     diagnose_all(names, folders, workers=2, step=lambda: None, command=fake)
     assert len(log.read_text(encoding="utf-8").splitlines()) == 2  # what this code has diagnosed is not done again
-    assert all(read_done(folders.diagnosed, name).code == code_digest() for name in names)
-    assert all(worth_predicting(name, folders) for name in names if points_of(folders, name))
+    assert all(read_outcome(folders.diagnosed, name).code == compute_code_digest() for name in names)
+    assert all(is_worth_predicting(name, folders) for name in names if points_of(folders, name))
     predict_all(names, folders, workers=1, step=lambda: None, command=fake)
     calls = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()][2:]
     assert [call[0] for call in calls] == ["predict"] * 4
@@ -134,8 +135,8 @@ def test_pipelines_apply_the_finding_or_leave_it_out(made):
     folders, _ = made
     name = names_in(folders.cases)[0]
     handed_in = (folders.cases / name / "pipeline.toml").read_bytes()
-    applied = tomllib.loads(write_pipeline(folders, name, applying=True).read_text(encoding="utf-8"))
-    without = tomllib.loads(write_pipeline(folders, name, applying=False).read_text(encoding="utf-8"))
+    applied = tomllib.loads(write_pipeline(folders, name, applies=True).read_text(encoding="utf-8"))
+    without = tomllib.loads(write_pipeline(folders, name, applies=False).read_text(encoding="utf-8"))
     assert applied["diagnose"] == {"apply": True}
     assert "diagnose" not in without
     for table in (applied, without):
@@ -149,9 +150,9 @@ def test_options_of_a_diagnosis_are_kept_or_left_out_as_a_whole(tmp_path):
     (folders.cases / "case_1").mkdir(parents=True)
     text = '[pipeline]\ntest = "test.toml"\n[diagnose]\ngain_tolerance = 0.01\napply = false\n'
     (folders.cases / "case_1" / "pipeline.toml").write_text(text, encoding="utf-8")
-    applied = tomllib.loads(write_pipeline(folders, "case_1", applying=True).read_text(encoding="utf-8"))
+    applied = tomllib.loads(write_pipeline(folders, "case_1", applies=True).read_text(encoding="utf-8"))
     assert applied["diagnose"] == {"gain_tolerance": 0.01, "apply": True}
-    assert "diagnose" not in write_pipeline(folders, "case_1", applying=False).read_text(encoding="utf-8")
+    assert "diagnose" not in write_pipeline(folders, "case_1", applies=False).read_text(encoding="utf-8")
 
 
 def test_a_chain_of_commands_stops_where_one_fails(tmp_path):
@@ -161,12 +162,12 @@ def test_a_chain_of_commands_stops_where_one_fails(tmp_path):
     steps = []
     run_all({"case_1": jobs["case_1"]}, tmp_path / "logs", workers=1, code="x", step=lambda: steps.append(1))
     assert not (tmp_path / "second").exists()
-    assert read_done(tmp_path / "logs", "case_1").message == "frf-ipz: first"
+    assert read_outcome(tmp_path / "logs", "case_1").message == "frf-ipz: first"
     run_all(jobs, tmp_path / "logs", workers=1, code="x", step=lambda: steps.append(1))
     assert (tmp_path / "second").exists()
-    assert read_done(tmp_path / "logs", "case_2").status == 1
+    assert read_outcome(tmp_path / "logs", "case_2").status == 1
     assert len(steps) == 3
-    assert read_done(tmp_path / "logs", "case_3") is None
+    assert read_outcome(tmp_path / "logs", "case_3") is None
 
 
 def test_a_command_that_fails_or_hangs_is_written_down(tmp_path):
@@ -178,6 +179,25 @@ def test_a_command_that_fails_or_hangs_is_written_down(tmp_path):
     assert busy.status == 0
     assert busy.cpu_s >= 0.3
     assert not list(tmp_path.iterdir())
+
+
+def test_without_process_groups_commands_run_and_stop_too(monkeypatch):
+    """What Windows lacks: processor times of a child, and groups that can be stopped as a whole."""
+    monkeypatch.delattr(os, "wait4")
+    monkeypatch.delattr(os, "killpg")
+    failed = run([sys.executable, "-c", "import sys; sys.exit('frf-ipz: no such file')"], code="x")
+    assert (failed.status, failed.message, failed.cpu_s) == (1, "frf-ipz: no such file", None)
+    assert run([sys.executable, "-c", "import time; time.sleep(60)"], code="x", longest_s=0.2).status == -9
+
+
+def test_the_public_command_is_the_script_or_the_module(monkeypatch, tmp_path):
+    script = tmp_path / "frf-ipz"
+    script.write_text("#!/bin/sh\n", encoding="utf-8")
+    script.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    assert find_public_command() == [str(script)]
+    script.unlink()
+    assert find_public_command() == [str(tmp_path / "python"), "-m", "frf_ipz.cli.main"]
 
 
 def test_a_trial_has_the_same_effects_and_other_seeds():
