@@ -27,16 +27,16 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 import frf_ipz
-from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.compare.compare import judge
-from frf_ipz.diagnosis.compare.learnt_nuisance import bench_of, learn
+from frf_ipz.diagnosis.compare.learnt_nuisance import learn, pose_state_problem
 from frf_ipz.diagnosis.compare.mass_loss import MassLoss
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
-from frf_ipz.diagnosis.search.component_search import fit_nothing
-from frf_ipz.diagnosis.verdict.findings import describe
+from frf_ipz.diagnosis.search.component_search import fit_null_model
+from frf_ipz.diagnosis.verdict.findings import describe_component
 
 SHEET = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 BAND_HZ = (110.0, 840.0)  # of the fifth resonance, at 1155 Hz, no uniform beam follows the healthy layouts
@@ -103,19 +103,23 @@ def build(common: Common, layout: np.ndarray, *, exact: bool = False) -> tuple[f
     """
     length = FREE_LENGTH_M + common.in_clamp_m
     beam_kg = 7850.0 * WIDTH_M * 4.75e-3 * FREE_LENGTH_M
-    places = [(x + common.to_middle_m + common.in_clamp_m) / length * ELEMENTS for x in layout]
+    locations = [(x + common.to_middle_m + common.in_clamp_m) / length * ELEMENTS for x in layout]
     sensor = (SENSOR_M + common.in_clamp_m) / length * ELEMENTS
     text = BEAM.format(length=length, elements=ELEMENTS, modulus=common.modulus_pa, width=WIDTH_M)
-    for place, part in (*((place, common.piece) for place in places), (sensor, common.sensor)):
-        left = min(int(place), ELEMENTS - 1) if exact else round(place)
-        for node, share in ((left, 1 - (place - left)), (left + 1, place - left)) if exact else ((left, 1.0),):
+    for location, part in (*((location, common.piece) for location in locations), (sensor, common.sensor)):
+        left = min(int(location), ELEMENTS - 1) if exact else round(location)
+        for node, share in ((left, 1 - (location - left)), (left + 1, location - left)) if exact else ((left, 1.0),):
             text += f"[[beam.point_mass]]\nnode = {node + 1}\nmass_kg = {max(share, 0) * part * beam_kg}\n"
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "model.toml"
         path.write_text(text, encoding="utf-8")
         model = frf_ipz.read_model(path)
     struck = (STRUCK_M + common.in_clamp_m) / length * ELEMENTS
-    nodes = {"pieces": [1 + round(place) for place in places], "struck": 1 + round(struck), "sensor": 1 + round(sensor)}
+    nodes = {
+        "pieces": [1 + round(location) for location in locations],
+        "struck": 1 + round(struck),
+        "sensor": 1 + round(sensor),
+    }
     return model, nodes
 
 
@@ -152,9 +156,9 @@ def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
     frequency, values = read_frf(path)
     out, struck = (frf_ipz.parse_dof(f"{nodes[name]}:+z") for name in ("sensor", "struck"))
     label = frf_ipz.FrfLabel(out, struck, frf_ipz.FrfQuantity.ACCELERANCE, "accelerometer", "hammer")
-    unknown = np.full((len(frequency), 1), np.nan)
+    nuisance = np.full((len(frequency), 1), np.nan)
     frfs = frf_ipz.FrfSet(
-        frequency_hz=frequency, values=values[:, None], labels=(label,), variance=unknown, coherence=unknown,
+        frequency_hz=frequency, values=values[:, None], labels=(label,), variance=nuisance, coherence=nuisance,
         averages=np.zeros(1, int), unknown_scale="common",
     )  # fmt: skip
     return frf_ipz.State(
@@ -192,7 +196,7 @@ def compare_all(folder: Path, step: int) -> tuple[pd.DataFrame, pd.DataFrame, Co
                     "verdict": found.diagnosis.verdict,
                     "what": first.statement if first else "",
                     "misfit": found.diagnosis.numbers["null_misfit"],
-                    "pull": found.diagnosis.numbers["null_pull"],
+                    "pull": found.diagnosis.numbers["null_nuisance_chi2"],
                 }
             )
             together += [{"state": name, "layout": one + 1, **row} for row in weigh(found, models[one][1]["pieces"])]
@@ -201,24 +205,24 @@ def compare_all(folder: Path, step: int) -> tuple[pd.DataFrame, pd.DataFrame, Co
 
 def weigh(found: frf_ipz.Comparison, pieces: list[int]) -> list[dict]:
     """Weigh the same hypotheses in every layout: a piece that lost mass, a softer clamp, a softer or damped beam."""
-    bench = bench_of(found.expected, split_data(found.expected.observed), found.scatter)
-    null, known, rows = fit_nothing(bench), shipped_effects(), []
-    causes = {
-        f"piece {number} lost mass": Cause(
-            effect=MassLoss(), place=Place(key=(node, "z"), location={"nodes": [node]}), n_places=len(pieces)
+    problem = pose_state_problem(found.expected, split_data(found.expected.observed), found.scatter)
+    null, known, rows = fit_null_model(problem), shipped_effects(), []
+    components = {
+        f"piece {number} lost mass": Component(
+            effect=MassLoss(), location=Location(key=(node, "z"), entries={"nodes": [node]}), n_locations=len(pieces)
         )
         for number, node in enumerate(pieces, start=1)
     }
     for name in ("global_stiffness", "boundary_compliance", "damping_level"):
-        for place in known[name].places(bench.specimen):
-            what = " ".join([name, *map(str, place.key)])
-            causes[what] = Cause(effect=known[name], place=place, n_places=len(pieces))
-    for name, cause in causes.items():
-        hypothesis = bench.suppose((cause,))
-        starts = cause.effect.starts(bench.specimen, cause.place)
-        fits = [bench.fit_beside(hypothesis, start, null) for start in starts[:: max(1, len(starts) // 4)]]
+        for location in known[name].locations(problem.context):
+            what = " ".join([name, *map(str, location.key)])
+            components[what] = Component(effect=known[name], location=location, n_locations=len(pieces))
+    for name, component in components.items():
+        hypothesis = problem.make_hypothesis((component,))
+        starts = component.effect.start_values(problem.context, component.location)
+        fits = [problem.fit_from_base(hypothesis, start, null) for start in starts[:: max(1, len(starts) // 4)]]
         best = max(fits, key=lambda fit: fit.log_evidence)
-        estimate = next(iter(describe(best, 0, 1.0, 0.0, 1.0, places=()).parameters.values()))
+        estimate = next(iter(describe_component(best, 0, 1.0, 0.0, 1.0, location_set=()).parameters.values()))
         rows.append(
             {
                 "hypothesis": name,
@@ -226,7 +230,7 @@ def weigh(found: frf_ipz.Comparison, pieces: list[int]) -> list[dict]:
                 "value": estimate.value,
                 "low": estimate.low,
                 "high": estimate.high,
-                "total_kg": bench.specimen.mass_kg,
+                "total_kg": problem.context.mass_kg,
             }
         )
     return rows
@@ -258,7 +262,7 @@ def draw(table: pd.DataFrame, summed: pd.DataFrame, path: Path) -> None:
     """Draw how far each layout is from what was learned, and what explains the second state."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 4))
     for state, rows in table.groupby("state"):
-        left.plot(rows.layout, rows.pull, "o", label=f"{state} state")
+        left.plot(rows.layout, rows.nuisance_chi2, "o", label=f"{state} state")
     left.set_xlabel("layout")
     left.set_ylabel("squared deviations from what was learned")
     left.set_yscale("log")

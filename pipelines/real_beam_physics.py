@@ -40,13 +40,13 @@ import frf_ipz
 import real_beams
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.evidence.fit import Fit
-from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, set_up
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.observations import Observations
-from frf_ipz.diagnosis.search.component_search import fit_nothing, search
-from frf_ipz.diagnosis.verdict.findings import describe
-from frf_ipz.diagnosis.verdict.goodness import FOUND_NATS, goodness
+from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
+from frf_ipz.diagnosis.verdict.findings import describe_component
+from frf_ipz.diagnosis.verdict.goodness import FIRST_LOG_BAYES_FACTOR, assess_goodness
 
 MOST_CAUSES = 6
 
@@ -87,12 +87,14 @@ def main(folder: Path, out: Path) -> None:
     model = frf_ipz.read_model(folder / "model.toml")
     frfs = replace(frf_ipz.estimate_frfs(test, frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
     frfs = with_drift(frfs.select_lines(frfs.in_band(case.band_hz)), case.drift)
-    kept = [place for place, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
-    fits, bench = causes_of(frfs.select_frfs(kept), model, case)
+    kept = [location for location, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
+    fits, problem = find_components(frfs.select_frfs(kept), model, case)
     for fit in (fits[0], fits[-1]):
-        print(where_it_is(bench, fit).to_string(float_format="{:.2f}".format))
+        print(where_it_is(problem, fit).to_string(float_format="{:.2f}".format))
     out.mkdir(parents=True, exist_ok=True)
-    draw(frfs.select_frfs(kept), bench, {"model": fits[0], "with what was found": fits[-1]}, out / f"{folder.name}.png")
+    draw(
+        frfs.select_frfs(kept), problem, {"model": fits[0], "with what was found": fits[-1]}, out / f"{folder.name}.png"
+    )
     if case.left_out:
         for number, fit in enumerate(fits):  # one cause more each time: what helps the fit need not help here
             full = with_change(model, fit.hypothesis.change(fit.values))
@@ -113,63 +115,64 @@ def with_drift(frfs: frf_ipz.FrfSet, drift: float) -> frf_ipz.FrfSet:
     return replace(frfs, variance=(drift * frfs.frequency_hz[:, None] * slope) ** 2 + noise**2)
 
 
-def causes_of(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit], InferenceProblem]:
+def find_components(frfs: frf_ipz.FrfSet, model: object, case: Case) -> tuple[list[Fit], InferenceProblem]:
     """Add the cause with the largest evidence until the next one brings too little, and print what each leaves."""
     effects = {name: one for name, one in shipped_effects().items() if case.scale == "none" or name != "sensor_gain"}
     source = split_data(Observations(kind="frf", records=(), band_hz=case.band_hz, frfs=frfs))
-    bench = set_up(model, source, case.band_hz, case.tolerances, effects, free_gains=case.scale)
-    fits = add_causes(bench)
+    problem = pose_problem(model, source, case.band_hz, case.tolerances, effects, free_gains=case.scale)
+    fits = add_components(problem)
     for before, fit in zip([fits[0], *fits], fits, strict=False):
-        good = goodness(bench, fit)
+        goodness = assess_goodness(problem, fit)
         said = [
-            describe(fit, number, 1.0, 0.0, max(1.0, good.misfit), places=()).statement
-            for number in range(len(fit.hypothesis.causes))
+            describe_component(fit, number, 1.0, 0.0, max(1.0, goodness.misfit), location_set=()).statement
+            for number in range(len(fit.hypothesis.components))
         ]
         print(
-            f"misfit {np.sqrt(good.misfit):.3g}, worst piece {np.sqrt(good.worst_piece):.3g} times the expected one, "
-            f"pull {good.pull:.0f}, {fit.log_evidence - before.log_evidence:.0f} nats more:",
+            f"misfit {np.sqrt(goodness.misfit):.3g}, worst subband {np.sqrt(goodness.worst_subband):.3g} times the "
+            f"expected one, nuisance chi2 {goodness.nuisance_chi2:.0f}, log Bayes factor "
+            f"{fit.log_evidence - before.log_evidence:.0f}:",
             " ".join(said) or "the model, within its tolerances.",
             flush=True,
         )
-    print("explained" if good.is_good else f"unexplained: what was found {good.complaint}")
-    return fits, bench
+    print("explained" if goodness.is_good else f"unexplained: what was found {goodness.shortfall}")
+    return fits, problem
 
 
-def add_causes(bench: InferenceProblem) -> list[Fit]:
+def add_components(problem: InferenceProblem) -> list[Fit]:
     """Return the fits with nothing, one cause, two causes and so on, the most probable one more each time."""
-    fits = [fit_nothing(bench)]
+    fits = [fit_null_model(problem)]
     for _ in range(MOST_CAUSES):
-        best = search(bench, fits[-1]).best
-        if best.log_evidence - fits[-1].log_evidence < FOUND_NATS:
+        best = search_component(problem, fits[-1]).best
+        if best.log_evidence - fits[-1].log_evidence < FIRST_LOG_BAYES_FACTOR:
             break
         fits.append(best)
-        if goodness(bench, best).is_good:
+        if assess_goodness(problem, best).is_good:
             break
     return fits
 
 
-def where_it_is(bench: object, fit: object) -> pd.DataFrame:
+def where_it_is(problem: object, fit: object) -> pd.DataFrame:
     """Gain of each FRF, and its misfit over noise and drift in pieces of the band: what defends a verdict."""
-    layout, unknowns = bench.specimen.layout, fit.hypothesis.nuisance.unpack(fit.unknown)
-    measured = bench.data.measured
-    response = fit.hypothesis.respond(fit.values, fit.unknown, measured.s)
+    layout, nuisance_values = problem.context.layout, fit.hypothesis.nuisance_prior.unpack(fit.nuisance)
+    measured = problem.data.measured
+    response = fit.hypothesis.respond(fit.values, fit.nuisance, measured.s)
     noise = np.sqrt(np.array([np.diag(one).real for one in measured.covariance]).T)
-    wrong = np.abs(measured.values - bench.data.gains(response) * response.values) / noise
-    edges = np.geomspace(*bench.specimen.band_hz, 6).round()
-    table = pd.DataFrame({"gain": np.exp(layout.gain_signs @ unknowns.gains)}, index=map(str, measured.labels))
+    wrong = np.abs(measured.values - problem.data.gains(response) * response.values) / noise
+    edges = np.geomspace(*problem.context.band_hz, 6).round()
+    table = pd.DataFrame({"gain": np.exp(layout.gain_signs @ nuisance_values.gains)}, index=map(str, measured.labels))
     for low, high in pairwise(edges):
         inside = (measured.frequency_hz >= low) & (measured.frequency_hz < high)
         table[f"{low:g}-{high:g} Hz"] = np.sqrt(np.mean(wrong[inside] ** 2, axis=0))
     return table
 
 
-def draw(frfs: frf_ipz.FrfSet, bench: object, fits: dict, path: Path) -> None:
+def draw(frfs: frf_ipz.FrfSet, problem: object, fits: dict, path: Path) -> None:
     """Draw measured FRFs and models, on the gains that fit best."""
     rows = -(-frfs.n_frfs // 3)
     figure, axes = plt.subplots(rows, 3, figsize=(18, 3.2 * rows), squeeze=False, layout="constrained")
     for name, fit in fits.items():
-        gains = bench.data.gains(fit.hypothesis.respond(fit.values, fit.unknown, bench.data.measured.s))
-        values = gains * fit.hypothesis.respond(fit.values, fit.unknown, frfs.s).values
+        gains = problem.data.gains(fit.hypothesis.respond(fit.values, fit.nuisance, problem.data.measured.s))
+        values = gains * fit.hypothesis.respond(fit.values, fit.nuisance, frfs.s).values
         for axis, column in zip(axes.flat, values.T, strict=False):
             axis.semilogy(frfs.frequency_hz, np.abs(column), lw=0.8, label=name)
     for axis, label, column in zip(axes.flat, frfs.labels, frfs.values.T, strict=False):

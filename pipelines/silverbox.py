@@ -82,7 +82,7 @@ def main(folder: Path) -> None:
     cuts = np.array_split(np.arange(len(force)), PIECES)
     records = tuple(
         ObservedRecord(name=f"piece {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
-             force=force[cut], responses=motion[None, cut], rested=i == 0)
+             force=force[cut], responses=motion[None, cut], starts_at_rest=i == 0)
         for i, cut in enumerate(cuts)
     )  # fmt: skip
     observations = Observations(kind="random", records=records, band_hz=(20.0, 180.0), exclude_hz=(MAINS_HZ,))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.evidence.inference_problem import set_up
+from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -113,7 +113,7 @@ def observed(frfs, band_hz=BAND_HZ):
     return Observations(kind="frf", records=(), band_hz=band_hz, frfs=frfs)
 
 
-def bench_of(model, frfs, names):
+def problem_of(model, frfs, names):
     """Everything a search for some effects works with."""
     effects = {name: effect for name, effect in shipped_effects().items() if name in names}
-    return set_up(model, split_data(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)
+    return pose_problem(model, split_data(observed(frfs)), BAND_HZ, DiagnoseOptions(), effects)

@@ -330,11 +330,11 @@ def synthetic_diagnosis(labels, nodes):
         before=Misfit(training=0.41, held_out=0.43, training_noise=80.0, held_out_noise=82.0),
         updated=Misfit(training=0.2, held_out=0.22, training_noise=40.0, held_out_noise=41.0),
         after=Misfit(training=0.02, held_out=0.02, training_noise=1.0, held_out_noise=1.1),
-        held="records",
+        held_out_kind="records",
         ambiguity=(
-            Ambiguity(effects=("added_mass", "local_stiffness"), separation_nats=4.0, resolve_by="Strike 4:+z."),
+            Ambiguity(effects=("added_mass", "local_stiffness"), log_bayes_factor=4.0, resolve_by="Strike 4:+z."),
         ),
-        gates=(
+        data_checks=(
             DataCheck(name="homogeneity", value=0.9, limit=1.5, statement="The structure behaves linearly."),
             DataCheck(name="reciprocity", value=np.nan, limit=4.0, statement="Reciprocity could not be checked."),
         ),

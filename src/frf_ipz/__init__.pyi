@@ -8,7 +8,7 @@ from .diagnosis.diagnose import diagnose as diagnose
 from .diagnosis.observations import observe as observe
 from .diagnosis.options import DiagnoseOptions as DiagnoseOptions
 from .diagnosis.parameters import diagnosed_basis as diagnosed_basis
-from .diagnosis.position_uncertainty import misplacements as misplacements
+from .diagnosis.position_uncertainty import propagate_position_tolerance as propagate_position_tolerance
 from .dofs import Dof as Dof
 from .dofs import parse_dof as parse_dof
 from .errors import FrfIpzError as FrfIpzError

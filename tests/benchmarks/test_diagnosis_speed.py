@@ -7,11 +7,11 @@ import time
 
 import pytest
 
-from diagnosed import beam, bench_of, labels, measured, observed
+from diagnosed import beam, labels, measured, observed, problem_of
 from frf_ipz import DiagnoseOptions, diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.search.component_search import fit_nothing
-from frf_ipz.diagnosis.search.global_scan import wide_search
+from frf_ipz.diagnosis.search.component_search import fit_null_model
+from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.fe.changes import with_point_masses
 
 DIAGNOSIS_S = 10.0  # of a linear case
@@ -27,10 +27,10 @@ def case(tmp_path_factory):
 
 
 def test_scanning_hypotheses(benchmark, case):
-    bench = bench_of(*case, tuple(shipped_effects()))
-    base = fit_nothing(bench)
+    problem = problem_of(*case, tuple(shipped_effects()))
+    base = fit_null_model(problem)
     start = time.process_time()
-    n_tried = len(benchmark.pedantic(wide_search, args=(bench, base), rounds=3))
+    n_tried = len(benchmark.pedantic(scan_globally, args=(problem, base), rounds=3))
     seconds = (time.process_time() - start) / 3
     print(f"\n{n_tried} hypotheses in {seconds:.2f} s: {SCANNED} in {SCANNED / n_tried * seconds:.2f} s")
     assert n_tried > 0.5 * SCANNED

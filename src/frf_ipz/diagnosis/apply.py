@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.model.basis import make_basis
-from frf_ipz.diagnosis.model.change import NOTHING, Change, with_change
-from frf_ipz.diagnosis.model.layout import lay_out
+from frf_ipz.diagnosis.model.change import NO_CHANGE, Change, with_change
+from frf_ipz.diagnosis.model.layout import make_layout
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, Linearised
+    from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, LinearisedLaw
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.structure import StructuralModel
 
@@ -64,21 +64,21 @@ def corrector(
     callable
         From the values of each finding to the model with what it lacked.
     """
-    base = model if diagnosis.linearised is None else _with_law(model, diagnosis.linearised)
+    base = model if diagnosis.linearised_law is None else _with_law(model, diagnosis.linearised_law)
     known = effects or shipped_effects()
     structural = {
         number: known[one.effect]
         for number, one in enumerate(diagnosis.findings)
-        if one.effect in known and known[one.effect].chain(_place(one)) is None
+        if one.effect in known and known[one.effect].chain(_location_of(one)) is None
     }
     if not structural or diagnosis.curves is None:
         return lambda _: base
-    specimen = _specimen(base, diagnosis.curves)
-    acting = [(effect, _place(diagnosis.findings[number])) for number, effect in structural.items()]
-    builders = dict(zip(structural, build_together(specimen, acting), strict=True))
+    context = _model_context(base, diagnosis.curves)
+    acting = [(effect, _location_of(diagnosis.findings[number])) for number, effect in structural.items()]
+    builders = dict(zip(structural, build_together(context, acting), strict=True))
 
     def correct(values: Sequence[Sequence[float]]) -> StructuralModel:
-        total = NOTHING
+        total = NO_CHANGE
         for number, build in builders.items():
             total = total + build(np.array(values[number]))
         return with_change(base, total)
@@ -86,11 +86,11 @@ def corrector(
     return correct
 
 
-def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
+def _with_law(model: StructuralModel, law: LinearisedLaw) -> StructuralModel:
     """Put the spring and the damper that stand for a force law into a model."""
-    places = [model.full_index(end) for end in reversed(law.ends)]
-    signs = [1.0, -1.0][: len(places)]
-    across = sparse.csr_array((signs, ([0] * len(places), places)), shape=(1, len(model.all_dofs)))
+    rows = [model.full_index(end) for end in reversed(law.ends)]
+    signs = [1.0, -1.0][: len(rows)]
+    across = sparse.csr_array((signs, ([0] * len(rows), rows)), shape=(1, len(model.all_dofs)))
     pair = across.T @ across
     return replace(
         model,
@@ -99,13 +99,13 @@ def _with_law(model: StructuralModel, law: Linearised) -> StructuralModel:
     )
 
 
-def _specimen(model: StructuralModel, curves: Curves) -> ModelContext:
+def _model_context(model: StructuralModel, curves: Curves) -> ModelContext:
     """Gather what effects may know, as it was when they were searched for."""
-    layout = lay_out(curves.labels)
-    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    layout = make_layout(curves.labels)
+    measured_rows = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     highest = float(curves.s.imag.max())
     return ModelContext(
-        basis=make_basis(model, highest, places),
+        basis=make_basis(model, highest, measured_rows),
         layout=layout,
         band_hz=(float(curves.s.imag.min()) / (2 * np.pi), highest / (2 * np.pi)),
         contour=curves.s,
@@ -151,17 +151,17 @@ def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effe
 
 def _chain(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Change:
     """Everything that the findings change in the measuring chain."""
-    total = NOTHING
+    total = NO_CHANGE
     for finding in diagnosis.findings:
-        build = known[finding.effect].chain(_place(finding)) if finding.effect in known else None
+        build = known[finding.effect].chain(_location_of(finding)) if finding.effect in known else None
         if build is not None:
             total = total + build(np.array(finding.values))
     return total
 
 
-def _place(finding: Finding) -> Place:
+def _location_of(finding: Finding) -> Location:
     text = {name: value for name, value in finding.parameters.items() if isinstance(value, str)}
-    return Place(key=finding.key, location=finding.location, text=text)
+    return Location(key=finding.key, entries=finding.location, text=text)
 
 
 def _channels(label: FrfLabel) -> tuple[str, str]:

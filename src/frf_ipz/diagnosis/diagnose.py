@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from frf_ipz.diagnosis.effect_selection import chosen_effects
-from frf_ipz.diagnosis.evidence.inference_problem import set_up, with_errors
+from frf_ipz.diagnosis.effect_selection import select_effects
+from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
@@ -25,27 +25,27 @@ from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.result import Ambiguity, Diagnosis
-from frf_ipz.diagnosis.verdict.data_checks import check, warn
+from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 from frf_ipz.diagnosis.verdict.decision import (
     CONSISTENT,
     EXPLAINED,
     UNEXPLAINED,
     decide,
-    fit_without,
-    gain_over,
-    only_null,
-    without_last,
+    decide_without_search,
+    drop_last_component,
+    fit_without_component,
+    log_bayes_factor,
 )
-from frf_ipz.diagnosis.verdict.findings import describe, finding_of, weigh
-from frf_ipz.diagnosis.verdict.identifiability import best_sensor, detectable_sizes
+from frf_ipz.diagnosis.verdict.findings import describe_component, make_finding, rank_effects
+from frf_ipz.diagnosis.verdict.identifiability import find_best_sensor, find_detectable_sizes
 from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
-from frf_ipz.diagnosis.verdict.mismatch import disagreement, trace
+from frf_ipz.diagnosis.verdict.mismatch import describe_mismatch, localise_mismatch
 from frf_ipz.diagnosis.verdict.out_of_catalogue import (
-    another_kind,
-    complain,
-    is_damping_alone,
-    with_any_damping,
-    without_level,
+    describe_damping,
+    describe_implausibility,
+    drop_damping_effects,
+    free_damping,
+    is_damping_only,
 )
 from frf_ipz.diagnosis.verdict.proof import prove
 from frf_ipz.diagnosis.verdict.unnamed_force import describe_unnamed_force, find_unnamed_force
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.result import DataCheck, Finding
     from frf_ipz.diagnosis.verdict.decision import Decision
-    from frf_ipz.diagnosis.verdict.findings import Weighed
+    from frf_ipz.diagnosis.verdict.findings import RankedEffect
     from frf_ipz.diagnosis.verdict.proof import Proof
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
@@ -119,87 +119,91 @@ def _diagnose(
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.05, "measuring transfer functions")
     source = split_data(observations)
-    kept = _identifiable(chosen_effects(options, folder), scale)
-    at_bench = partial(set_up, model, source, observations.band_hz, effects=kept, free_gains=scale)
-    bench = at_bench(options)
-    gates = check(source, linearity)
+    kept = _identifiable(select_effects(options, folder), scale)
+    pose_with = partial(pose_problem, model, source, observations.band_hz, effects=kept, free_gains=scale)
+    problem = pose_with(options)
+    gates = run_data_checks(source, linearity)
     excess = linearity.score / linearity.limit if linearity and select_laws(options, folder) else 0.0
     certain = excess > CERTAIN
-    bench, found, complaint = _decide(bench, at_bench, options, progress, is_certain=certain)
+    problem, found, shortfall = _decide(problem, pose_with, options, progress, is_certain=certain)
     progress(0.9, "proving on what was not fitted")
-    held_out = with_errors(source.held_out, options, free_gains=scale)
-    found, proof = _proven(bench, held_out, found)
-    linear = _linear(bench, found, proof, gates, held=source.held_out_kind)
-    statement = _statement(found, linear.findings, complaint)
-    linear = replace(linear, statement=statement, remains=complaint, warnings=warn(source, gates))
+    held_out = make_data(source.held_out, options, free_gains=scale)
+    found, proof = _proven(problem, held_out, found)
+    linear = _linear(problem, found, proof, gates, held_out_kind=source.held_out_kind)
+    statement = _statement(found, linear.findings, shortfall)
+    linear = replace(linear, statement=statement, unexplained_part=shortfall, warnings=list_warnings(source, gates))
     if excess <= 1:
         return linear
     laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
     laws = laws_of(model, observations, linearity=linearity)
     if certain or not kept or found.verdict == UNEXPLAINED:
-        bench_of = partial(_set_up_again, model, options, kept, scale)
-        return _nonlinear(linear, bench, bench_of, found, model, observations, laws, laws_of)
+        pose_with_observations = partial(_pose_with_observations, model, options, kept, scale)
+        return _nonlinear(linear, problem, pose_with_observations, found, model, observations, laws, laws_of)
     return _unless_a_law(linear, laws)
 
 
 def _decide(
-    bench: InferenceProblem,
-    at_bench: Callable[[DiagnoseOptions], InferenceProblem],
+    problem: InferenceProblem,
+    pose_with: Callable[[DiagnoseOptions], InferenceProblem],
     options: DiagnoseOptions,
     progress: Progress,
     *,
     is_certain: bool,
 ) -> tuple[InferenceProblem, Decision, str]:
     """Decide what is missing, unless a law is; where damping alone has no explanation, once more with damping free."""
-    is_searched = bool(bench.effects) and not is_certain
-    found = decide(bench, progress) if is_searched else only_null(bench)
-    if is_searched and is_damping_alone(bench, found):
-        freed = without_level(at_bench(with_any_damping(options)))
+    is_searched = bool(problem.effects) and not is_certain
+    found = decide(problem, progress) if is_searched else decide_without_search(problem)
+    if is_searched and is_damping_only(problem, found):
+        freed = drop_damping_effects(pose_with(free_damping(options)))
         again = decide(freed, progress)
-        if again.good.is_good:
-            return freed, replace(again, verdict=UNEXPLAINED), complain(again.final, options)
-    another = find_unnamed_force(bench, found) if found.final.is_nearly_all else None
-    if another is not None:
-        return bench, replace(found, verdict=UNEXPLAINED, another=another), describe_unnamed_force(another)
-    if found.verdict == EXPLAINED and (rather := another_kind(found.final)):
-        return bench, replace(found, verdict=UNEXPLAINED), rather
-    return bench, found, found.good.complaint if found.verdict == UNEXPLAINED else ""
+        if again.goodness.is_good:
+            return freed, replace(again, verdict=UNEXPLAINED), describe_damping(again.final, options)
+    unnamed_force = find_unnamed_force(problem, found) if found.final.explains_nearly_all else None
+    if unnamed_force is not None:
+        return (
+            problem,
+            replace(found, verdict=UNEXPLAINED, unnamed_force=unnamed_force),
+            describe_unnamed_force(unnamed_force),
+        )
+    if found.verdict == EXPLAINED and (rather := describe_implausibility(found.final)):
+        return problem, replace(found, verdict=UNEXPLAINED), rather
+    return problem, found, found.goodness.shortfall if found.verdict == UNEXPLAINED else ""
 
 
-def _proven(bench: InferenceProblem, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
+def _proven(problem: InferenceProblem, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
     """Prove, and leave out what explains a part only and makes worse what was not fitted."""
-    proof = prove(bench, held_out, found.null, found.final)
+    proof = prove(problem, held_out, found.null, found.final)
     while found.verdict == UNEXPLAINED and proof.after.held_out > proof.before.held_out:
         if found.final is found.null:  # the model goes on as it is
             as_it_is = replace(proof.curves, explained=proof.curves.nominal)
             return found, replace(proof, after=proof.before, curves=as_it_is)
-        found = without_last(bench, found)
-        proof = prove(bench, held_out, found.null, found.final)
+        found = drop_last_component(problem, found)
+        proof = prove(problem, held_out, found.null, found.final)
     return found, proof
 
 
 def _linear(
-    bench: InferenceProblem, found: Decision, proof: Proof, gates: tuple[DataCheck, ...], *, held: str
+    problem: InferenceProblem, found: Decision, proof: Proof, gates: tuple[DataCheck, ...], *, held_out_kind: str
 ) -> Diagnosis:
     """Gather what a linear model explains; it is not said yet."""
-    where = disagreement(bench, found.null, proof.curves)
-    weighed = weigh(found.ranking.fits, max(1.0, found.good.misfit))
-    findings = _findings(bench, found, weighed)
+    where = describe_mismatch(problem, found.null, proof.curves)
+    weighed = rank_effects(found.ranking.fits, max(1.0, found.goodness.misfit))
+    findings = _findings(problem, found, weighed)
     return Diagnosis(
         verdict=found.verdict,
         findings=findings,
         alternatives=_alternatives(found, weighed),
         mismatch_hz=where[0],
         mismatch_where=where[1],
-        mismatch_location=_mismatch_location(bench, found, findings),
+        mismatch_location=_mismatch_location(problem, found, findings),
         mismatch=where[2],
         before=proof.before,
         updated=proof.updated,
         after=proof.after,
-        held=held,
-        ambiguity=_ambiguity(bench, found, weighed),
-        gates=gates,
-        detectability=detectable_sizes(bench, found.null, found.null_good.needed_nats),
+        held_out_kind=held_out_kind,
+        ambiguity=_ambiguity(problem, found, weighed),
+        data_checks=gates,
+        detectability=find_detectable_sizes(problem, found.null, found.null_goodness.required_log_bayes_factor),
         curves=proof.curves,
         numbers=_numbers(found),
     )
@@ -229,7 +233,7 @@ def _late(progress: Progress) -> Progress:
     return lambda part, text: progress(0.9 + 0.1 * part, text)
 
 
-def _set_up_again(
+def _pose_with_observations(
     model: StructuralModel,
     options: DiagnoseOptions,
     effects: Mapping[str, Effect],
@@ -237,13 +241,13 @@ def _set_up_again(
     observations: Observations,
 ) -> InferenceProblem:
     """Bring the model and changed recordings together."""
-    return set_up(model, split_data(observations), observations.band_hz, options, effects, free_gains=free_gains)
+    return pose_problem(model, split_data(observations), observations.band_hz, options, effects, free_gains=free_gains)
 
 
 def _nonlinear(
     linear: Diagnosis,
-    bench: InferenceProblem,
-    bench_of: Callable[[Observations], InferenceProblem],
+    problem: InferenceProblem,
+    pose_with_observations: Callable[[Observations], InferenceProblem],
     decision: Decision,
     model: StructuralModel,
     observations: Observations,
@@ -252,15 +256,15 @@ def _nonlinear(
 ) -> Diagnosis:
     """Look for a linear cause beside a law, where that strains the model or none explains by itself."""
     beside = None
-    if bench.effects and laws.verdict == UNEXPLAINED:
-        beside = search_beside_linear(bench, decision, laws, model, observations, laws_of)
-    if bench.effects and beside is None:
-        beside = search_beside_law(bench_of, laws, model, observations, laws_of)
+    if problem.effects and laws.verdict == UNEXPLAINED:
+        beside = search_beside_linear(problem, decision, laws, model, observations, laws_of)
+    if problem.effects and beside is None:
+        beside = search_beside_law(pose_with_observations, laws, model, observations, laws_of)
     if beside is not None:
-        law, cause = beside
+        law, component = beside
         found = _with_law(linear, law)
-        findings = tuple(sorted((*found.findings, cause), key=lambda finding: -finding.log_evidence_gain))
-        return replace(found, findings=findings, statement=f"{found.statement} {cause.statement}")
+        findings = tuple(sorted((*found.findings, component), key=lambda finding: -finding.log_evidence_gain))
+        return replace(found, findings=findings, statement=f"{found.statement} {component.statement}")
     found = _with_law(linear, laws)
     if laws.verdict != UNEXPLAINED or found.findings or not linear.findings:
         return found
@@ -292,18 +296,20 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         mismatch_location=laws.location or (found[0].location if n_findings else {}),
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
-        linearised=linearised,
-        at_work=None if linearised is None else laws.law_in_time,
-        remains="",
+        linearised_law=linearised,
+        law_in_time=None if linearised is None else laws.law_in_time,
+        unexplained_part="",
     )
 
 
-def _mismatch_location(bench: InferenceProblem, found: Decision, findings: tuple[Finding, ...]) -> Mapping[str, object]:
+def _mismatch_location(
+    problem: InferenceProblem, found: Decision, findings: tuple[Finding, ...]
+) -> Mapping[str, object]:
     """Give the place of what was found, or of what remains unexplained."""
-    if found.another is not None:
-        return found.another.hypothesis.causes[-1].place.location
+    if found.unnamed_force is not None:
+        return found.unnamed_force.hypothesis.components[-1].location.entries
     if found.verdict == UNEXPLAINED:
-        return trace(bench, found.null)
+        return localise_mismatch(problem, found.null)
     return findings[0].location if findings else {}
 
 
@@ -312,71 +318,75 @@ def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
     return effects if scale == "none" else {name: one for name, one in effects.items() if name != "sensor_gain"}
 
 
-def _findings(bench: InferenceProblem, found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
-    causes = found.final.hypothesis.causes
-    scale = max(1.0, found.good.misfit)
-    if not causes:
+def _findings(problem: InferenceProblem, found: Decision, weighed: list[RankedEffect]) -> tuple[Finding, ...]:
+    components = found.final.hypothesis.components
+    scale = max(1.0, found.goodness.misfit)
+    if not components:
         return ()
-    if not found.further:
-        only = finding_of(weighed[0], gain_over(found.final, found.null), scale)
+    if not found.further_rankings:
+        only = make_finding(weighed[0], log_bayes_factor(found.final, found.null), scale)
         is_needed = found.verdict == EXPLAINED  # nothing explains without it
         return (replace(only, is_significant=only.is_significant or is_needed),)
-    competing = weigh(found.further[-1].fits, scale)
-    newest = finding_of(competing[0], gain_over(found.final, found.further[-1].base), scale)
+    competing = rank_effects(found.further_rankings[-1].fits, scale)
+    newest = make_finding(competing[0], log_bayes_factor(found.final, found.further_rankings[-1].base), scale)
     older = [
-        describe(
-            found.final, number, newest.probability, gain_over(found.final, fit_without(bench, found.final, number)),
-            scale, places=(dict(causes[number].place.location),),
+        describe_component(
+            found.final,
+            number,
+            newest.probability,
+            log_bayes_factor(found.final, fit_without_component(problem, found.final, number)),
+            scale,
+            location_set=(dict(components[number].location.entries),),
         )
-        for number in range(len(causes) - 1)
-    ]  # fmt: skip
+        for number in range(len(components) - 1)
+    ]
     return tuple(sorted((*older, newest), key=lambda finding: -finding.log_evidence_gain))
 
 
-def _alternatives(found: Decision, weighed: list[Weighed]) -> tuple[Finding, ...]:
-    scale = max(1.0, found.good.misfit)
-    if found.further:
-        weighed, base = weigh(found.further[-1].fits, scale), found.further[-1].base
+def _alternatives(found: Decision, weighed: list[RankedEffect]) -> tuple[Finding, ...]:
+    scale = max(1.0, found.goodness.misfit)
+    if found.further_rankings:
+        weighed, base = rank_effects(found.further_rankings[-1].fits, scale), found.further_rankings[-1].base
     else:
         base = found.null
     rest = weighed if found.final is found.null else weighed[1:]
-    return tuple(finding_of(one, gain_over(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
+    return tuple(make_finding(one, log_bayes_factor(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
 
 
-def _ambiguity(bench: InferenceProblem, found: Decision, weighed: list[Weighed]) -> tuple[Ambiguity, ...]:
+def _ambiguity(problem: InferenceProblem, found: Decision, weighed: list[RankedEffect]) -> tuple[Ambiguity, ...]:
     """Effects that explain the same nearly as well."""
-    if found.final is found.null or len(found.final.hypothesis.causes) > 1:
+    if found.final is found.null or len(found.final.hypothesis.components) > 1:
         return ()
-    near = [one for one in weighed if gain_over(found.final, one.best) < ALIKE_NATS]
+    near = [one for one in weighed if log_bayes_factor(found.final, one.best) < ALIKE_NATS]
     if len(near) < 2:
         return ()
     return (
         Ambiguity(
             effects=tuple(one.name for one in near),
-            separation_nats=gain_over(found.final, near[-1].best),
-            resolve_by=best_sensor(bench, near[0].best, near[1].best),
+            log_bayes_factor=log_bayes_factor(found.final, near[-1].best),
+            resolve_by=find_best_sensor(problem, near[0].best, near[1].best),
         ),
     )
 
 
-def _statement(found: Decision, findings: tuple[Finding, ...], complaint: str) -> str:
+def _statement(found: Decision, findings: tuple[Finding, ...], shortfall: str) -> str:
     said = " ".join(finding.statement for finding in findings)
     if found.verdict == CONSISTENT:
         return "The nominal model explains the measurement within noise and its tolerances: nothing is missing."
     if found.verdict == EXPLAINED:
         return f"{said} With that, the model explains the measurement."
     partly = f" A part of it is explained: {said}" if said else ""
-    return f"Something is missing that nothing in the catalogue explains: {complaint}.{partly}"
+    return f"Something is missing that nothing in the catalogue explains: {shortfall}.{partly}"
 
 
 def _numbers(found: Decision) -> dict[str, float]:
     return {
-        "evidence_gain_nats": gain_over(found.ranking.best, found.null),
+        "log_bayes_factor": log_bayes_factor(found.ranking.best, found.null),
         "hypotheses": float(found.ranking.n_tried),
-        "null_misfit": found.null_good.misfit,
-        "null_pull": found.null_good.pull,
-        "null_worst_piece": found.null_good.worst_piece,
-        "misfit": found.good.misfit,
-        "pull": found.good.pull,
-        "worst_piece": found.good.worst_piece,
+        "null_misfit": found.null_goodness.misfit,
+        "null_nuisance_chi2": found.null_goodness.nuisance_chi2,
+        "null_worst_subband": found.null_goodness.worst_subband,
+        "misfit": found.goodness.misfit,
+        "nuisance_chi2": found.goodness.nuisance_chi2,
+        "worst_subband": found.goodness.worst_subband,
     }

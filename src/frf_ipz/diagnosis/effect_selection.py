@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
 
 
-def chosen_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
+def select_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
     """Find the effects that are to be looked for, without force laws.
 
     Parameters

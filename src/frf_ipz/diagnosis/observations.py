@@ -63,7 +63,7 @@ class ObservedRecord:
         N.
     responses : (n_sensors, n_samples) array
         SI units of the sensors' quantities, as recorded: a sensor of negative sign shows minus the model's motion.
-    rested : bool
+    starts_at_rest : bool
         The structure was at rest at the first sample.
     recording : str
         What it was cut from.
@@ -71,7 +71,7 @@ class ObservedRecord:
         1 for the first blow of its recording: what that has left may still move the structure at the next.
     start_s : float
         Time of its first sample in its recording, s.
-    constant_std : (n_sensors,) array, optional
+    dc_offset_std : (n_sensors,) array, optional
         What constant parts of the responses may be left, one standard deviation, SI; none where it is left out.
     """
 
@@ -82,11 +82,11 @@ class ObservedRecord:
     step_s: float
     force: FloatArray
     responses: FloatArray
-    rested: bool = True
+    starts_at_rest: bool = True
     recording: str = ""
     number: int = 1
     start_s: float = 0.0
-    constant_std: FloatArray | None = None
+    dc_offset_std: FloatArray | None = None
 
     def __post_init__(self) -> None:
         require_shape(f"the force of {self.name}", self.force, (None,))
@@ -105,7 +105,7 @@ class ObservedRecord:
         return self.n_samples * self.step_s
 
     @property
-    def follows(self) -> bool:
+    def has_predecessor(self) -> bool:
         """Another blow came before it in the same recording."""
         return self.number > 1
 
@@ -145,11 +145,11 @@ class Observations:
         return tuple(dict.fromkeys(record.input_dof for record in self.records))
 
     @property
-    def are_from_rest(self) -> bool:
+    def start_at_rest(self) -> bool:
         """There are blows or records, and the structure was at rest at the beginning of each."""
-        return bool(self.records) and all(record.rested for record in self.records)
+        return bool(self.records) and all(record.starts_at_rest for record in self.records)
 
-    def looks_at(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
+    def mask_band(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
         """Say which frequencies are in the band, and not in or next to a stretch that is left out.
 
         Parameters
@@ -169,7 +169,7 @@ class Observations:
             kept &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
         return np.asarray(kept)
 
-    def at(self, input_dof: Dof) -> tuple[ObservedRecord, ...]:
+    def records_at(self, input_dof: Dof) -> tuple[ObservedRecord, ...]:
         """Give the blows at one DOF, the strongest first.
 
         Parameters
@@ -186,7 +186,9 @@ class Observations:
         return tuple(sorted(mine, key=lambda record: -record.level))
 
 
-def spectra(records: Sequence[ObservedRecord], s: ComplexArray) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
+def transform_records(
+    records: Sequence[ObservedRecord], s: ComplexArray
+) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
     """Transform force and responses of blows at any complex frequency, ``sum x(t) exp(-s t) dt``.
 
     For a structure at rest before the blow the ratio of the two is exactly its transfer function at s, but for what is
@@ -273,7 +275,7 @@ def _record(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
         step_s=record.step_s,
         force=record.force,
         responses=record.responses[rows],
-        rested=record.starts_at_rest,
+        starts_at_rest=record.starts_at_rest,
         recording=record.recording,
         number=record.number,
         start_s=record.start_s,

@@ -58,9 +58,9 @@ def diagnosed_basis(
         If nothing was found that has a place in the structure.
     """
     moving, corrected = [], corrector(nominal, diagnosis, effects)
-    for place, finding in enumerate(diagnosis.findings):
+    for number, finding in enumerate(diagnosis.findings):
         for index, name in enumerate(_names(finding)):
-            low, high = (corrected(_values(diagnosis, place, index, factor)) for factor in (1 - STEP, 1 + STEP))
+            low, high = (corrected(_values(diagnosis, number, index, factor)) for factor in (1 - STEP, 1 + STEP))
             slope = _reduced(low, high, reduced) / (2 * STEP)
             if np.abs(slope).max() > 0:
                 moving.append((f"{finding.effect} {name}", slope))
@@ -86,10 +86,10 @@ def _names(finding: Finding) -> list[str]:
     return named if len(named) == len(finding.values) else [str(number + 1) for number in range(len(finding.values))]
 
 
-def _values(diagnosis: Diagnosis, place: int, index: int, factor: float) -> list[list[float]]:
+def _values(diagnosis: Diagnosis, number: int, index: int, factor: float) -> list[list[float]]:
     """Values of all findings, one of them times a factor."""
     values = [list(finding.values) for finding in diagnosis.findings]
-    values[place][index] *= factor
+    values[number][index] *= factor
     return values
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.model.layout import extents, shift_rows
-from frf_ipz.diagnosis.model.nuisance import UNIFORM
+from frf_ipz.diagnosis.model.layout import make_shift_rows, measure_extents
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 from frf_ipz.updating.position_uncertainty import PositionUncertainty
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel, StructuralModel
 
 
-def misplacements(
+def propagate_position_tolerance(
     model: StructuralModel, reduced: ReducedModel, labels: Sequence[FrfLabel], tolerance_m_per_m: float
 ) -> tuple[PositionUncertainty, ...]:
     """Turn a tolerance of places into rows of the reduced model.
@@ -39,21 +39,23 @@ def misplacements(
     tuple of PositionUncertainty
         Of each sensor and each blow along each axis; none for lumped models, whose masses have no places.
     """
-    spans = extents(model)
+    spans = measure_extents(model)
     ends = dict.fromkeys(end for label in labels for end in ((label.output_dof, True), (label.input_dof, False)))
     return tuple(
         PositionUncertainty(
-            dof=dof, is_output=is_output, row=tolerance_m_per_m * UNIFORM * spans[axis] * _inside(model, reduced, row)
+            dof=dof,
+            is_output=is_output,
+            row=tolerance_m_per_m * UNIFORM_STD * spans[axis] * _inside(model, reduced, row),
         )
         for dof, is_output in ends
-        for axis, row in shift_rows(model, dof).items()
+        for axis, row in make_shift_rows(model, dof).items()
     )
 
 
 def _inside(model: StructuralModel, reduced: ReducedModel, row: FloatArray) -> FloatArray:
     """Weights of all DOFs, as a row of the reduced model; DOFs that are held do not move."""
     found = np.zeros(len(reduced.dofs))
-    for place in np.flatnonzero(row).tolist():
-        if not model.fixed[place]:
-            found += row[place] * reduced.row(model.all_dofs[place])
+    for row_index in np.flatnonzero(row).tolist():
+        if not model.fixed[row_index]:
+            found += row[row_index] * reduced.row(model.all_dofs[row_index])
     return found

@@ -72,12 +72,12 @@ class Finding:
     values: tuple[float, ...] = ()
 
 
-def doubt_of_place(places: Sequence[Mapping[str, object]]) -> str:
+def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
     """Say between which places a test does not decide.
 
     Parameters
     ----------
-    places : sequence of mapping
+    locations : sequence of mapping
         Locations as in `diagnosis.json`, the most probable first.
 
     Returns
@@ -85,26 +85,28 @@ def doubt_of_place(places: Sequence[Mapping[str, object]]) -> str:
     str
         A sentence with a space before it; empty for a single place.
     """
-    if len(places) < 2:
+    if len(locations) < 2:
         return ""
     kinds: dict[str, list[tuple[object, ...]]] = {}
-    for place in places:
-        told = [item for item in place.items() if any(other.get(item[0]) != item[1] for other in places)]
-        for kind, value in told[:1]:
+    for location in locations:
+        distinct = [
+            item for item in location.items() if any(alternative.get(item[0]) != item[1] for alternative in locations)
+        ]
+        for kind, value in distinct[:1]:
             kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list | tuple) else (value,))
-    words = " or ".join(f"{kind} {_in_words(kind, found)}" for kind, found in kinds.items())
+    words = " or ".join(f"{kind} {_in_words(kind, parts)}" for kind, parts in kinds.items())
     return f" The test tells its place no closer than {words}."
 
 
-def _in_words(kind: str, found: list[tuple[object, ...]]) -> str:
+def _in_words(kind: str, parts: list[tuple[object, ...]]) -> str:
     """Single numbers as runs, stretches of elements from their first to their last, others as they are."""
-    numbers = sorted(number for (number, *more) in found if isinstance(number, int) and not more)
-    if len(numbers) == len(found):
+    numbers = sorted(number for (number, *more) in parts if isinstance(number, int) and not more)
+    if len(numbers) == len(parts):
         breaks = [i for i in range(len(numbers)) if i == 0 or numbers[i] > numbers[i - 1] + 1]
         runs = [numbers[a:b] for a, b in zip(breaks, [*breaks[1:], None], strict=True)]
         return ", ".join(f"{run[0]}" if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs)
     joined = " to " if kind == "elements" else " and "
-    return ", ".join(joined.join(str(part) for part in dict.fromkeys(place)) for place in found)
+    return ", ".join(joined.join(str(part) for part in dict.fromkeys(location)) for location in parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,14 +162,14 @@ class Ambiguity:
     ----------
     effects : tuple of str
         Names, the most probable first.
-    separation_nats : float
+    log_bayes_factor : float
         How much more probable the first is than the last.
     resolve_by : str
         The blow or sensor that would tell them apart.
     """
 
     effects: tuple[str, ...]
-    separation_nats: float
+    log_bayes_factor: float
     resolve_by: str
 
     @property
@@ -203,7 +205,7 @@ class Curves:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Linearised:
+class LinearisedLaw:
     """A force law as a spring and a damper, about the amplitudes of the test.
 
     Parameters
@@ -222,13 +224,15 @@ class Linearised:
     stiffness: float
     damping: float
     motion_rms_m: FloatArray
-    stiffness_each: FloatArray
-    damping_each: FloatArray
+    stiffness_by_record: FloatArray
+    damping_by_record: FloatArray
 
     @property
     def statement(self) -> str:
         """For which motions a linear model may stand for the law."""
-        low, high = (f"{self.stiffness_each[end]:.3g} N/m and {self.damping_each[end]:.3g} N s/m" for end in (0, -1))
+        low, high = (
+            f"{self.stiffness_by_record[end]:.3g} N/m and {self.damping_by_record[end]:.3g} N s/m" for end in (0, -1)
+        )
         return (
             f"At the level of this test, a spring of {self.stiffness:.3g} N/m and a damper of {self.damping:.3g} N s/m "
             f"stand for it in a linear model; with the level they go from {low} (weakest blow, "
@@ -293,17 +297,17 @@ class Diagnosis:
         tolerances explain.
     before, updated, after : Misfit
         Of the model as it is, with what its tolerances allow, and with the findings.
-    held : str
+    held_out_kind : str
         What was not shown to the fit: ``records`` or ``lines``.
     ambiguity : tuple of Ambiguity
         What cannot be told apart.
-    gates : tuple of DataCheck
+    data_checks : tuple of DataCheck
         Checks of the measurement alone.
     detectability : mapping of str to mapping
         Smallest detectable size of each effect, by parameter, where it shows best.
     statement : str
         The verdict in a few sentences.
-    remains : str
+    unexplained_part : str
         What nothing explains, in words without a full stop; empty where nothing remains, and beside a force law.
     curves : Curves, optional
         FRFs to draw.
@@ -311,9 +315,9 @@ class Diagnosis:
         What the verdict rests on: evidence, misfits, pulls, hypotheses tried.
     warnings : tuple of str
         What the user has to know.
-    linearised : Linearised, optional
+    linearised_law : Linearised, optional
         The force law among the findings, for linear models.
-    at_work : LawInTime, optional
+    law_in_time : LawInTime, optional
         The same in time, to be drawn.
     """
 
@@ -326,18 +330,18 @@ class Diagnosis:
     before: Misfit
     updated: Misfit
     after: Misfit
-    held: str
+    held_out_kind: str
     mismatch_location: Mapping[str, object] = field(default_factory=dict)
     ambiguity: tuple[Ambiguity, ...] = ()
-    gates: tuple[DataCheck, ...] = ()
+    data_checks: tuple[DataCheck, ...] = ()
     detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     statement: str = ""
-    remains: str = ""
+    unexplained_part: str = ""
     curves: Curves | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    linearised: Linearised | None = None
-    at_work: LawInTime | None = None
+    linearised_law: LinearisedLaw | None = None
+    law_in_time: LawInTime | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.
@@ -361,17 +365,17 @@ class Diagnosis:
                 "before": _misfit(self.before),
                 "updated_without_findings": _misfit(self.updated),
                 "after": _misfit(self.after),
-                "held_out_is": self.held,
+                "held_out_is": self.held_out_kind,
             },
             "ambiguity": [
                 {
                     "effects": list(one.effects),
-                    "separation_nats": _plain(one.separation_nats),
+                    "log_bayes_factor": _plain(one.log_bayes_factor),
                     "resolve_by": one.resolve_by,
                 }
                 for one in self.ambiguity
             ],
-            "gates": [
+            "data_checks": [
                 {
                     "name": gate.name,
                     "value": _plain(gate.value),
@@ -379,12 +383,12 @@ class Diagnosis:
                     "passed": gate.passed,
                     "statement": gate.statement,
                 }
-                for gate in self.gates
+                for gate in self.data_checks
             ],
             "detectability": {name: _all_plain(sizes) for name, sizes in self.detectability.items()},
             "numbers": _all_plain(self.numbers),
             "warnings": list(self.warnings),
-            **({} if self.linearised is None else {"linear_model": _linear(self.linearised)}),
+            **({} if self.linearised_law is None else {"linear_model": _linear(self.linearised_law)}),
         }
 
 
@@ -401,14 +405,14 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _linear(law: Linearised) -> dict[str, Any]:
+def _linear(law: LinearisedLaw) -> dict[str, Any]:
     return {
         "between": [dof.name for dof in law.ends],
         "stiffness_N_m": _plain(law.stiffness),
         "damping_Ns_m": _plain(law.damping),
         "motion_rms_m": [_plain(value) for value in law.motion_rms_m],
-        "stiffness_at_N_m": [_plain(value) for value in law.stiffness_each],
-        "damping_at_Ns_m": [_plain(value) for value in law.damping_each],
+        "stiffness_at_N_m": [_plain(value) for value in law.stiffness_by_record],
+        "damping_at_Ns_m": [_plain(value) for value in law.damping_by_record],
     }
 
 

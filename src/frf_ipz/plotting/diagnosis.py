@@ -98,7 +98,7 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     for rank, (name, values) in enumerate(
         (
             ("fitted", [misfit.training for misfit in steps.values()]),
-            (f"held out ({diagnosis.held})", [misfit.held_out for misfit in steps.values()]),
+            (f"held out ({diagnosis.held_out_kind})", [misfit.held_out for misfit in steps.values()]),
         )
     ):
         hatch = "//" if rank else ""

@@ -125,9 +125,9 @@ def _change(updated: UpdatedModel) -> Axes:
 
 
 def _law(diagnosis: Diagnosis) -> Axes:
-    if diagnosis.at_work is None:
+    if diagnosis.law_in_time is None:
         raise InputError("the diagnosis of this run has found no force law, so there is no such picture")
-    return plot_law(diagnosis.at_work)
+    return plot_law(diagnosis.law_in_time)
 
 
 def _levels(levels: LevelDependence) -> Axes:

@@ -35,7 +35,7 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     statements = [typeset(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
-    additions = [f"What is not explained: {typeset(diagnosis.remains)}."] if diagnosis.remains else []
+    additions = [f"What is not explained: {typeset(diagnosis.unexplained_part)}."] if diagnosis.unexplained_part else []
     additions += [f"A part of it is explained: {' '.join(statements)}"] if statements else []
     return SENTENCES.get(diagnosis.verdict, ""), " ".join([*additions, *mismatch_sentence(diagnosis)])
 

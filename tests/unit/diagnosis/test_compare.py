@@ -7,8 +7,8 @@ import pytest
 
 import frf_ipz
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.compare.corrected_model import LEAST_SQUARE, as_fitted
-from frf_ipz.diagnosis.compare.learnt_nuisance import bench_of, learn, nominal_after
+from frf_ipz.diagnosis.compare.corrected_model import LEAST_SQUARE, correct_model
+from frf_ipz.diagnosis.compare.learnt_nuisance import learn, pose_state_problem, predict_unchanged_model
 from frf_ipz.diagnosis.compare.mass_loss import MassLoss
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.errors import InputError
@@ -105,7 +105,7 @@ def test_the_corrected_model_has_the_measured_frfs(nominal, real):
     one = state(nominal, real, 1, noise=1e-6)
     source = split_data(one.observed)
     options = replace(FEW, model=replace(FEW.model, gain_tolerance=1e-5, position_tolerance_m_per_m=1e-6))
-    corrected = nominal_after(one, learn([one], options), options, source)
+    corrected = predict_unchanged_model(one, learn([one], options), options, source)
     s = 2j * np.pi * np.linspace(*BAND_HZ, 300)
     wanted, got, plain = (model_frfs(model, labels(), s) for model in (real, corrected, nominal))
     assert np.linalg.norm(got - wanted) < 0.02 * np.linalg.norm(plain - wanted)
@@ -114,10 +114,10 @@ def test_the_corrected_model_has_the_measured_frfs(nominal, real):
 def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
     """Modes below the band are pulled wherever lines above them want."""
     one = state(nominal, real, 1)
-    bench = bench_of(one, split_data(one.observed), FEW.model)
-    unknown = np.zeros(bench.nuisance.size)
-    unknown[bench.nuisance.frequency_places[0]] = -1.1 / bench.nuisance.kappa_std[0, 0]
-    found = solve_modes(as_fitted(bench.suppose(()), unknown)).natural_frequency_hz
+    problem = pose_state_problem(one, split_data(one.observed), FEW.model)
+    nuisance = np.zeros(problem.nuisance_prior.size)
+    nuisance[problem.nuisance_prior.frequency_indices[0]] = -1.1 / problem.nuisance_prior.kappa_std[0, 0]
+    found = solve_modes(correct_model(problem.make_hypothesis(()), nuisance)).natural_frequency_hz
     stated = solve_modes(nominal).natural_frequency_hz
     assert found[0] == pytest.approx(np.sqrt(LEAST_SQUARE) * stated[0], rel=1e-6)
     np.testing.assert_allclose(found[1:4], stated[1:4], rtol=1e-6)
@@ -125,13 +125,13 @@ def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
 
 def test_a_node_cannot_lose_more_than_it_has(nominal):
     one = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
-    specimen = bench_of(one, split_data(one.observed), FEW.model).specimen
+    context = pose_state_problem(one, split_data(one.observed), FEW.model).context
     effect = MassLoss()
-    (place,) = [place for place in effect.places(specimen) if place.location == {"nodes": [14]}]
-    (mass,) = effect.parameters(specimen, place)
-    assert HUNG_KG < mass.high < HUNG_KG + specimen.mass_kg / 16  # and what an element has
-    change = effect.build(specimen, place)(np.array([mass.high]))
-    left = (specimen.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
+    (location,) = [location for location in effect.locations(context) if location.entries == {"nodes": [14]}]
+    (mass,) = effect.parameters(context, location)
+    assert HUNG_KG < mass.high < HUNG_KG + context.mass_kg / 16  # and what an element has
+    change = effect.build(context, location)(np.array([mass.high]))
+    left = (context.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
     assert np.linalg.eigvalsh(left).min() > 0
 
 

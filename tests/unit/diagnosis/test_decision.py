@@ -13,13 +13,15 @@ ALONE = -577.0  # nats
 
 
 def a_fit(log_evidence, name="local_stiffness"):
-    cause = SimpleNamespace(effect=SimpleNamespace(name=name))
-    return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence)
+    component = SimpleNamespace(effect=SimpleNamespace(name=name))
+    return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence)
 
 
 def goodness_of(score, underrated=1.0):
-    needed = underrated * LIMITS["hammer"].found_nats
-    return SimpleNamespace(is_good=score <= 1, score=score, times_underrated=underrated, needed_nats=needed)
+    needed = underrated * LIMITS["hammer"].first_log_bayes_factor
+    return SimpleNamespace(
+        is_good=score <= 1, score=score, error_underestimation=underrated, required_log_bayes_factor=needed
+    )
 
 
 def found(score):
@@ -29,25 +31,25 @@ def found(score):
         null=a_fit(-1e6, ""),
         final=first,
         ranking=Ranking(base=first, fits=(first,), n_tried=1),
-        further=(),
-        good=goodness_of(score),
-        null_good=goodness_of(9.0),
+        further_rankings=(),
+        goodness=goodness_of(score),
+        null_goodness=goodness_of(9.0),
     )
 
 
 @pytest.mark.parametrize(
-    ("left", "gain", "n_places", "verdict"),
+    ("left", "gain", "n_locations", "verdict"),
     [(1.1, 2.0, 1, None), (1.1, 3.1, 1, "explained"), (1.1, 2.0, 4, "explained"), (0.8, 7.0, 1, None)],
 )
 def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_wherever_it_is(
-    monkeypatch, left, gain, n_places, verdict
+    monkeypatch, left, gain, n_locations, verdict
 ):
     """Where nothing is left to explain, more is asked for."""
-    assert np.exp(LIMITS["hammer"].second_nats) == pytest.approx(20, rel=0.01)
-    monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
+    assert np.exp(LIMITS["hammer"].second_log_bayes_factor) == pytest.approx(20, rel=0.01)
+    monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
     one = found(left)
-    second = Ranking(base=one.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_places)), n_tried=9)
-    both = decision._beside(SimpleNamespace(kind="hammer"), one, second)
+    second = Ranking(base=one.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_locations)), n_tried=9)
+    both = decision._accept_further(SimpleNamespace(kind="hammer"), one, second)
     assert (both and both.verdict) == verdict
 
 
@@ -63,18 +65,21 @@ def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_
 def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain, verdict):
     """The nominal model leaves a little too much, and a cause a little less: odds of twenty to one."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + gain, "attached_resonator")
-    best.is_nearly_all = True
-    monkeypatch.setattr(decision, "fit_nothing", lambda _: null)
+    best.explains_nearly_all = True
+    monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
     monkeypatch.setattr(
         decision,
-        "goodness",
+        "assess_goodness",
         lambda _, fit: SimpleNamespace(
-            is_good=fit is best, score=1.01 if fit is null else 0.7, needed_nats=30.0, times_underrated=1.0
+            is_good=fit is best,
+            score=1.01 if fit is null else 0.7,
+            required_log_bayes_factor=30.0,
+            error_underestimation=1.0,
         ),
     )
-    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
-    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
-    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
+    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
+    monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
     decided = decision.decide(SimpleNamespace(kind=kind), lambda *_: None)
     assert decided.verdict == verdict
     assert decided.final is (best if verdict == "explained" else null)
@@ -84,26 +89,26 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
 def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(monkeypatch, left, verdict):
     """A resonance that the nominal model lacks is one piece of one FRF; errors of the data stay beside any cause."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + 33.0, "attached_resonator")
-    best.is_nearly_all = True
-    monkeypatch.setattr(decision, "fit_nothing", lambda _: null)
-    monkeypatch.setattr(decision, "goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else left))
-    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
-    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: ranking)
+    best.explains_nearly_all = True
+    monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
+    monkeypatch.setattr(decision, "assess_goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else left))
+    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
-    monkeypatch.setattr(decision, "search_beside", lambda *_: Ranking(base=best, fits=(), n_tried=1))
+    monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
     assert decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None).verdict == verdict
 
 
-@pytest.mark.parametrize(("strain", "causes"), [(0.7, 1), (0.8, 2)])
-def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch, strain, causes):
+@pytest.mark.parametrize(("score", "n_components"), [(0.7, 1), (0.8, 2)])
+def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch, score, n_components):
     """A joint may stand for a resonator and a damper, if what cannot be known is bent for it."""
-    one = found(strain)
+    one = found(score)
     pair = a_fit(ALONE + 28.0)
-    pair.hypothesis.causes *= 2
-    monkeypatch.setattr(decision, "goodness", lambda *_: goodness_of(0.5))
+    pair.hypothesis.components *= 2
+    monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
     nothing, tied = (Ranking(base=one.final, fits=fits, n_tried=9) for fits in ((), (a_fit(ALONE - 1.0),)))
     settled = Ranking(base=one.final, fits=(pair,), n_tried=9)
-    monkeypatch.setattr(decision, "settle_ties", lambda _, ranking: settled if ranking is tied else ranking)
-    monkeypatch.setattr(decision, "search_beside", lambda *_: nothing)
-    monkeypatch.setattr(decision, "search_second", lambda *_: tied)
-    assert len(decision._enough(SimpleNamespace(kind="hammer"), one).final.hypothesis.causes) == causes
+    monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: settled if ranking is tied else ranking)
+    monkeypatch.setattr(decision, "search_small_component", lambda *_: nothing)
+    monkeypatch.setattr(decision, "search_pair", lambda *_: tied)
+    assert len(decision._accept_first(SimpleNamespace(kind="hammer"), one).final.hypothesis.components) == n_components

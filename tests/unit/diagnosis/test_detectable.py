@@ -22,9 +22,9 @@ def test_what_scatter_explains_is_no_evidence_however_much_it_changes(monkeypatc
         slopes=lambda _, changes: white[:, None] if changes.ndim == 3 else changes,
     )
     hypothesis = SimpleNamespace(respond=lambda *_: answer)
-    bench = SimpleNamespace(data=data, nuisance=SimpleNamespace(size=3), specimen=SimpleNamespace(layout=None))
+    problem = SimpleNamespace(data=data, nuisance_prior=SimpleNamespace(size=3), context=SimpleNamespace(layout=None))
     null = SimpleNamespace(hypothesis=hypothesis, values=None)
-    found = detectable._evidence(bench, null)(hypothesis, None)
+    found = detectable._make_evidence(problem, null)(hypothesis, None)
     left = np.linalg.lstsq(np.vstack([columns, np.eye(3)]), np.concatenate([white, np.zeros(3)]), rcond=1e-15)
     expected = 0.5 * float(np.sum((white - columns @ left[0]) ** 2) + np.sum(left[0] ** 2))
     assert found == pytest.approx(expected, rel=1e-6)

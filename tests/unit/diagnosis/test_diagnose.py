@@ -10,8 +10,8 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
-from frf_ipz.diagnosis.evidence.inference_problem import set_up
+from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Finding
@@ -57,7 +57,7 @@ def test_a_mass_is_found_at_its_node_with_its_size(with_mass):
     assert size.value == pytest.approx(MASS_KG, rel=SEEN)
     assert size.low < MASS_KG < size.high
     assert finding.log_evidence_gain > 100
-    assert {"nodes": [12]} in [dict(place) for place in finding.location_set]
+    assert {"nodes": [12]} in [dict(location) for location in finding.location_set]
 
 
 def test_the_finding_improves_what_was_not_fitted(with_mass):
@@ -105,8 +105,8 @@ def test_what_no_effect_explains_is_unexplained(nominal):
 
 @pytest.mark.parametrize("updating_helps", [True, False])
 def test_a_part_that_makes_worse_what_was_not_fitted_is_left_out(nominal, monkeypatch, updating_helps):
-    def with_worse_parts(bench, held_out, null, final):
-        proof = prove(bench, held_out, null, final)
+    def with_worse_parts(problem, held_out, null, final):
+        proof = prove(problem, held_out, null, final)
         worse = replace(proof.after, held_out=2 * proof.before.held_out)
         return proof if final is null and updating_helps else replace(proof, after=worse)
 
@@ -164,13 +164,15 @@ def test_gains_that_nobody_knows_are_not_diagnosed(nominal):
 def test_noise_is_not_taken_for_a_gain(nominal):
     names = labels(("17:+z", "14:+z", "11:+z", "9:-z", "7:+z", "4:+z"), ("6:+z", "15:+z"))
     source = split_data(observed(measured(nominal, names, noise=MUCH_NOISE)))
-    bench = set_up(nominal, source, BAND_HZ, FEW, shipped_effects())
-    effect = bench.effects["sensor_gain"]
-    places = effect.places(bench.specimen)
-    force = Cause(effect=effect, place=places[[place.key for place in places].index(("force", 1))], n_places=1)
-    fit = bench.fit((force,), np.array([1.01]))
+    problem = pose_problem(nominal, source, BAND_HZ, FEW, shipped_effects())
+    effect = problem.effects["sensor_gain"]
+    locations = effect.locations(problem.context)
+    force = Component(
+        effect=effect, location=locations[[location.key for location in locations].index(("force", 1))], n_locations=1
+    )
+    fit = problem.fit((force,), np.array([1.01]))
     assert fit.values[0] == pytest.approx(1.0, abs=GAIN)
-    assert fit.log_evidence < bench.fit((), np.zeros(0)).log_evidence
+    assert fit.log_evidence < problem.fit((), np.zeros(0)).log_evidence
 
 
 def test_an_effect_that_is_not_known_is_refused(nominal):
@@ -203,19 +205,19 @@ def test_a_users_own_effect_is_found(nominal, tmp_path):
 OWN = """
 import numpy as np
 from scipy import sparse
-from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 class Cord(Effect):
     name = "cord"
-    def places(self, specimen):
-        return [Place(key=(14,), location={"nodes": [14]})]
-    def parameters(self, specimen, place):
+    def locations(self, context):
+        return [Location(key=(14,), entries={"nodes": [14]})]
+    def parameters(self, context, location):
         return (Parameter(name="pull_N_m", low=10.0, high=1e6),)
-    def build(self, specimen, place):
-        dof = next(dof for dof in specimen.moving_dofs if dof.node == 14)
-        unit = sparse.csr_array(sparse.diags_array(specimen.unit(dof)))
+    def build(self, context, location):
+        dof = next(dof for dof in context.moving_dofs if dof.node == 14)
+        unit = sparse.csr_array(sparse.diags_array(context.unit(dof)))
         return lambda values: Change(stiffness=values[0] * unit)
-    def statement(self, specimen, place, values):
+    def statement(self, context, location, values):
         return "A cord."
 """

@@ -7,14 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import beam, labels, lumped
-from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-from frf_ipz.diagnosis.evidence.hypothesis import Cause, suppose
+from frf_ipz.diagnosis.evidence.hypothesis import Component, make_hypothesis
 from frf_ipz.diagnosis.model.basis import make_basis
 from frf_ipz.diagnosis.model.change import with_change
-from frf_ipz.diagnosis.model.layout import lay_out
-from frf_ipz.diagnosis.model.nuisance import make_nuisance
+from frf_ipz.diagnosis.model.layout import make_layout
+from frf_ipz.diagnosis.model.nuisance import make_nuisance_prior
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof, parse_dof
@@ -35,12 +35,12 @@ STEP = 1e-6  # standard deviations, of a finite difference
 DIFFERENCE = 0.03  # relative: that damping follows frequency is left out of the derivatives, and the ratio is 0.01
 
 
-def specimen_of(model, names):
-    layout = lay_out(names)
-    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+def context_of(model, names):
+    layout = make_layout(names)
+    locations = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     options = DiagnoseOptions()
     return ModelContext(
-        basis=make_basis(model, 2 * np.pi * BAND_HZ[1], places),
+        basis=make_basis(model, 2 * np.pi * BAND_HZ[1], locations),
         layout=layout,
         band_hz=BAND_HZ,
         contour=S,
@@ -50,13 +50,13 @@ def specimen_of(model, names):
 
 def changed_frfs(model, name, key, values, names=None):
     """FRFs with an effect as the diagnosis evaluates them."""
-    specimen = specimen_of(model, names or labels())
+    context = context_of(model, names or labels())
     effect = shipped_effects()[name]
-    places = [place for place in effect.places(specimen) if place.key == key]
-    place = places[0] if places else Place(key=key)
-    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
-    hypothesis = suppose(specimen, nuisance, (Cause(effect=effect, place=place, n_places=1),))
-    return hypothesis.respond(np.array(values, float), np.zeros(nuisance.size), S).values
+    locations = [location for location in effect.locations(context) if location.key == key]
+    location = locations[0] if locations else Location(key=key)
+    nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
+    hypothesis = make_hypothesis(context, nuisance_prior, (Component(effect=effect, location=location, n_locations=1),))
+    return hypothesis.respond(np.array(values, float), np.zeros(nuisance_prior.size), S).values
 
 
 def assert_same(found, expected, tolerance):
@@ -221,20 +221,20 @@ def test_structural_damping(tmp_path, key, modulus, ratio):
 def test_a_damping_matrix_is_that_of_the_fe_stage_and_its_modal_part_scatters(tmp_path, stated):
     frame = lumped(tmp_path, **stated)
     names = labels(("3:+x",), ("2:+x",))
-    specimen = specimen_of(frame, names)
-    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
-    nothing = suppose(specimen, nuisance, ())
-    none = np.zeros(nuisance.size)
+    context = context_of(frame, names)
+    nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
+    nothing = make_hypothesis(context, nuisance_prior, ())
+    none = np.zeros(nuisance_prior.size)
     assert_same(nothing.respond(np.zeros(0), none, S).values, model_frfs(frame, names, S), REDUCED)
     modes = nothing.modes(np.zeros(0), none)
     assert (modes.viscous is not None) == ("dashpot_Ns_m" in stated)
-    jacobian = nuisance_jacobian(nothing.respond(np.zeros(0), none, S), nuisance, specimen.layout)
-    for place in nuisance.damping_places[:3]:
-        step = np.where(np.arange(nuisance.size) == place, STEP, 0.0)
+    jacobian = nuisance_jacobian(nothing.respond(np.zeros(0), none, S), nuisance_prior, context.layout)
+    for location in nuisance_prior.damping_indices[:3]:
+        step = np.where(np.arange(nuisance_prior.size) == location, STEP, 0.0)
         up, down = (nothing.respond(np.zeros(0), sign * step, S).values for sign in (1, -1))
         slope = (up - down) / (2 * STEP)
         assert np.linalg.norm(slope) > 0
-        assert np.linalg.norm(jacobian[:, :, place] - slope) < DIFFERENCE * np.linalg.norm(slope)
+        assert np.linalg.norm(jacobian[:, :, location] - slope) < DIFFERENCE * np.linalg.norm(slope)
 
 
 def test_another_level_of_damping_replaces_a_damping_matrix(tmp_path):
@@ -243,29 +243,31 @@ def test_another_level_of_damping_replaces_a_damping_matrix(tmp_path):
     undamped = replace(frame, damping_all=0 * frame.damping_all, modal_damping=np.array([0.03]))
     found = changed_frfs(frame, "damping_level", (), [0.03], names)
     assert_same(found, model_frfs(undamped, names, S), REDUCED)
-    specimen = specimen_of(frame, names)
+    context = context_of(frame, names)
     effect = shipped_effects()["damping_level"]
-    (place,) = effect.places(specimen)
-    corrected = with_change(frame, effect.build(specimen, place)(np.array([0.03])))
+    (location,) = effect.locations(context)
+    corrected = with_change(frame, effect.build(context, location)(np.array([0.03])))
     assert_same(model_frfs(corrected, names, S), model_frfs(undamped, names, S), EXACT)
-    (parameter,) = effect.parameters(specimen, place)
+    (parameter,) = effect.parameters(context, location)
     assert_allclose(parameter.neutral, np.median(solve_modes(frame).damping_ratio), rtol=1e-3)
 
 
 def test_another_level_of_damping_goes_before_half_a_loss_factor_for_each_mode(tmp_path):
-    specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
+    context = context_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
     effect = shipped_effects()["structural_damping"]
-    priors = {place.key: effect.log_prior(specimen, place, np.array([0.01])) for place in effect.places(specimen)}
+    priors = {
+        location.key: effect.log_prior(context, location, np.array([0.01])) for location in effect.locations(context)
+    }
     assert priors["of modes",] < priors[()] == priors["causal",] == priors["causal, mode by mode",] == 0
     assert priors["of modes",] > -5.0  # nats: it stays among what is reported
 
 
 @pytest.mark.parametrize("key", [(), ("causal",), ("causal, mode by mode",), ("of modes",)])
 def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, key):
-    specimen = specimen_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
-    builder = shipped_effects()["structural_damping"].build(specimen, Place(key=key))
-    corrected = with_change(specimen.model, builder(np.array([0.04])))
-    assert_allclose(corrected.modal_damping, specimen.model.modal_damping + 0.02, rtol=EXACT)
+    context = context_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
+    builder = shipped_effects()["structural_damping"].build(context, Location(key=key))
+    corrected = with_change(context.model, builder(np.array([0.04])))
+    assert_allclose(corrected.modal_damping, context.model.modal_damping + 0.02, rtol=EXACT)
 
 
 @pytest.mark.parametrize(
@@ -304,8 +306,8 @@ def test_a_misplaced_sensor_shows_the_other_node(tmp_path):
 )
 def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
     model = beam(tmp_path)
-    specimen = specimen_of(model, labels())
-    change = shipped_effects()[name].build(specimen, Place(key=key))(np.array(values))
+    context = context_of(model, labels())
+    change = shipped_effects()[name].build(context, Location(key=key))(np.array(values))
     s = 1j * S.imag
     found = model_frfs(with_change(model, change), labels(), S)
     assert_same(found, changed_frfs(model, name, key, values), LOSSES)
@@ -314,10 +316,10 @@ def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
 
 def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_path):
     model = beam(tmp_path)
-    specimen = specimen_of(model, labels())
+    context = context_of(model, labels())
     effects = shipped_effects()
     resonator_, joint = (
-        effects[name].build(specimen, Place(key=key))(np.array(values))
+        effects[name].build(context, Location(key=key))(np.array(values))
         for name, key, values in (
             ("attached_resonator", (12, "z"), [0.02, 120.0, 0.05]),
             ("viscoelastic_joint", ("node", 16, "z"), [2e3, 2e-3]),
@@ -333,13 +335,13 @@ def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_pa
 
 def test_derivatives_by_what_cannot_be_known(tmp_path):
     model = beam(tmp_path, right="pinned")
-    specimen = specimen_of(model, labels(("9:+z",)))
-    nuisance = make_nuisance(specimen.basis, specimen.layout, DiagnoseOptions())
-    hypothesis = suppose(specimen, nuisance, ())
-    start = 0.3 * np.random.default_rng(1).standard_normal(nuisance.size)
+    context = context_of(model, labels(("9:+z",)))
+    nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
+    hypothesis = make_hypothesis(context, nuisance_prior, ())
+    start = 0.3 * np.random.default_rng(1).standard_normal(nuisance_prior.size)
     here = hypothesis.respond(np.zeros(0), start, S)
-    found = nuisance_jacobian(here, nuisance, specimen.layout)
-    for index in range(0, nuisance.size, 3):
+    found = nuisance_jacobian(here, nuisance_prior, context.layout)
+    for index in range(0, nuisance_prior.size, 3):
         moved = start.copy()
         moved[index] += STEP
         difference = (hypothesis.respond(np.zeros(0), moved, S).values - here.values) / STEP

@@ -5,14 +5,14 @@ import pytest
 from diagnosed import beam, labels, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.result import doubt_of_place
+from frf_ipz.diagnosis.result import describe_location_set
 from frf_ipz.fe.changes import with_point_masses
 
 ADDED_KG = 2e-3
 
 
 @pytest.mark.parametrize(
-    ("places", "said"),
+    ("locations", "said"),
     [
         ([{"nodes": [7]}], ""),
         ([{"nodes": [7]}, {"nodes": [5]}, {"nodes": [6]}, {"nodes": [12]}], "nodes 5 to 7, 12"),
@@ -22,8 +22,8 @@ ADDED_KG = 2e-3
         ([{"end": "right"}, {"nodes": [3]}, {"nodes": [2]}], "end right or nodes 2 to 3"),
     ],
 )
-def test_places_that_a_test_does_not_tell_apart_are_said(places, said):
-    assert doubt_of_place(places) == (f" The test tells its place no closer than {said}." if said else "")
+def test_places_that_a_test_does_not_tell_apart_are_said(locations, said):
+    assert describe_location_set(locations) == (f" The test tells its place no closer than {said}." if said else "")
 
 
 def test_a_finding_says_how_closely_its_place_is_known(tmp_path):
@@ -32,6 +32,6 @@ def test_a_finding_says_how_closely_its_place_is_known(tmp_path):
     frfs = measured(with_point_masses(nominal, {6: ADDED_KG}), labels(outputs=("13:+z",), inputs=("13:+z",)))
     found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
     (finding,) = found.findings
-    assert {6, 20} <= {place["nodes"][0] for place in finding.location_set}
-    assert finding.statement.endswith(doubt_of_place(finding.location_set))
+    assert {6, 20} <= {location["nodes"][0] for location in finding.location_set}
+    assert finding.statement.endswith(describe_location_set(finding.location_set))
     assert "no closer than nodes" in found.statement

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosed import beam, measured, observed
 from frf_ipz.diagnosis.measured.data_split import split_data
-from frf_ipz.diagnosis.verdict.data_checks import check, warn
+from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 
 
 @pytest.fixture(scope="module")
@@ -16,19 +16,19 @@ def source(tmp_path_factory):
 
 
 def test_nothing_is_said_of_a_good_measurement(source):
-    assert warn(source, check(source, None)) == ()
+    assert list_warnings(source, run_data_checks(source, None)) == ()
 
 
 def test_frfs_that_are_too_faint_to_tell_anything_are_named(source):
     training = replace(source.training, values=source.training.values * np.array([1.0, 1e-3]))
-    (said,) = warn(replace(source, training=training), check(source, None))
+    (said,) = list_warnings(replace(source, training=training), run_data_checks(source, None))
     assert said.startswith(f"FRF {training.labels[1]} stays below 1 % of the largest of the same blow")
 
 
 def test_a_gate_that_failed_is_said(source):
-    gates = check(source, None)
+    gates = run_data_checks(source, None)
     failed = replace(gates[-1], value=2 * gates[-1].limit, statement="It drowns in noise.")
-    assert warn(source, (*gates[:-1], failed)) == ("It drowns in noise.",)
+    assert list_warnings(source, (*gates[:-1], failed)) == ("It drowns in noise.",)
 
 
 @pytest.mark.parametrize(("dropped", "is_late"), [(0, False), (76, True)])
@@ -40,6 +40,6 @@ def test_records_that_begin_within_the_ringing_of_a_blow_are_named(strike, dropp
         force[70:80] += 1e-3 * record.level * (-1.0) ** np.arange(10)
         records.append(replace(record, force=force[dropped:], responses=record.responses[:, dropped:]))
     source = split_data(replace(strike(), records=tuple(records)))
-    said = [text for text in warn(source, check(source, None)) if "ringing" in text]
+    said = [text for text in list_warnings(source, run_data_checks(source, None)) if "ringing" in text]
     assert len(said) == is_late
     assert all(text.startswith("blow 100 N, ") for text in said)

@@ -10,12 +10,12 @@ from scipy import linalg
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.evidence import hypothesis as hypotheses
-from frf_ipz.diagnosis.evidence.inference_problem import set_up
+from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import component_search as search
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
-from frf_ipz.diagnosis.search.global_scan import causes_of
+from frf_ipz.diagnosis.search.global_scan import list_components
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.numerics.pencils import generalised_eigh
 
@@ -25,69 +25,75 @@ DIGITS = 1e-12
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def problem(tmp_path_factory):
     nominal = beam(tmp_path_factory.mktemp("beam"))
     effects = {"added_mass": shipped_effects()["added_mass"]}
     source = split_data(observed(measured(with_point_masses(nominal, {12: MASS_KG}))))
-    return set_up(nominal, source, BAND_HZ, DiagnoseOptions(), effects)
+    return pose_problem(nominal, source, BAND_HZ, DiagnoseOptions(), effects)
 
 
-def mass_at(bench, node):
-    causes = causes_of(bench.effects["added_mass"], bench.specimen)
-    return next(cause for cause in causes if cause.place.location == {"nodes": [node]})
+def mass_at(problem, node):
+    components = list_components(problem.effects["added_mass"], problem.context)
+    return next(component for component in components if component.location.entries == {"nodes": [node]})
 
 
-def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(bench):
-    right = bench.fit((mass_at(bench, 12),), START)
-    wrong = (mass_at(bench, 16),)
-    to_the_end = bench.fit(wrong, START)
-    given_up = bench.fit(wrong, START, bar=climb.bar_of([right]))
-    assert to_the_end.cost > 4 * climb.bar_of([right])
+def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(problem):
+    right = problem.fit((mass_at(problem, 12),), START)
+    wrong = (mass_at(problem, 16),)
+    to_the_end = problem.fit(wrong, START)
+    given_up = problem.fit(wrong, START, cost_limit=climb.find_cost_limit([right]))
+    assert to_the_end.cost > 4 * climb.find_cost_limit([right])
     assert given_up.cost > to_the_end.cost
-    assert not given_up.converged
+    assert not given_up.has_converged
 
 
-def test_a_bar_does_not_stop_a_fit_on_its_way_below_it(bench):
-    right = bench.fit((mass_at(bench, 12),), START)
-    again = bench.fit((mass_at(bench, 12),), START, bar=climb.bar_of([right]))
+def test_a_bar_does_not_stop_a_fit_on_its_way_below_it(problem):
+    right = problem.fit((mass_at(problem, 12),), START)
+    again = problem.fit((mass_at(problem, 12),), START, cost_limit=climb.find_cost_limit([right]))
     assert again.cost == right.cost
 
 
-def a_fit(cost, *, is_nearly_all, converged=True):
+def a_fit(cost, *, explains_nearly_all, has_converged=True):
     return SimpleNamespace(
-        cost=cost, log_evidence=-cost, is_nearly_all=is_nearly_all, is_hopeless=False, converged=converged
+        cost=cost,
+        log_evidence=-cost,
+        explains_nearly_all=explains_nearly_all,
+        is_far_off=False,
+        has_converged=has_converged,
     )
 
 
 def test_the_bar_is_near_the_best_if_that_explains_nearly_all():
-    worse = a_fit(9000.0, is_nearly_all=False)
-    assert climb.bar_of([]) == np.inf
-    assert climb.bar_of([worse]) == np.inf
-    assert climb.bar_of([worse, a_fit(100.0, is_nearly_all=True)]) == pytest.approx(500.0)
+    worse = a_fit(9000.0, explains_nearly_all=False)
+    assert climb.find_cost_limit([]) == np.inf
+    assert climb.find_cost_limit([worse]) == np.inf
+    assert climb.find_cost_limit([worse, a_fit(100.0, explains_nearly_all=True)]) == pytest.approx(500.0)
 
 
 def test_only_a_fit_below_the_bar_goes_on():
     gone_on = []
-    bench = SimpleNamespace(go_on=lambda fit: gone_on.append(fit) or fit)
-    best = a_fit(100.0, is_nearly_all=True, converged=False)
-    near, far = (a_fit(cost, is_nearly_all=False, converged=False) for cost in (300.0, 9000.0))
-    search.ranked(bench, [best, far])
-    search.ranked(bench, [best, near])
+    problem = SimpleNamespace(fit_to_convergence=lambda fit: gone_on.append(fit) or fit)
+    best = a_fit(100.0, explains_nearly_all=True, has_converged=False)
+    near, far = (a_fit(cost, explains_nearly_all=False, has_converged=False) for cost in (300.0, 9000.0))
+    search.rank_fits(problem, [best, far])
+    search.rank_fits(problem, [best, near])
     assert gone_on == [best, best, near]
 
 
-def test_the_modes_of_the_same_values_are_solved_for_once(bench, monkeypatch):
+def test_the_modes_of_the_same_values_are_solved_for_once(problem, monkeypatch):
     solved = []
     modify = hypotheses.modify
-    monkeypatch.setattr(hypotheses, "modify", lambda *args: solved.append(args) or modify(*args))
-    hypothesis = bench.suppose((mass_at(bench, 12),))
-    nothing = np.zeros(hypothesis.nuisance.size)
+    monkeypatch.setattr(hypotheses, "modify_structure", lambda *args: solved.append(args) or modify(*args))
+    hypothesis = problem.make_hypothesis((mass_at(problem, 12),))
+    nothing = np.zeros(hypothesis.nuisance_prior.size)
     scattered = nothing.copy()
-    scattered[hypothesis.nuisance.frequency_places[-1]] = 1.0
+    scattered[hypothesis.nuisance_prior.frequency_indices[-1]] = 1.0
     first, second = hypothesis.modes(START, nothing), hypothesis.modes(START, scattered)
     assert len(solved) == 1
     assert not np.allclose(first.squares, second.squares, rtol=DIGITS)
-    assert_allclose(bench.suppose(hypothesis.causes).modes(START, scattered).squares, second.squares, rtol=DIGITS)
+    assert_allclose(
+        problem.make_hypothesis(hypothesis.components).modes(START, scattered).squares, second.squares, rtol=DIGITS
+    )
     for factor in range(1, hypotheses.REMEMBERED + 1):
         hypothesis.modes((1 + factor) * START, nothing)
     before = len(solved)

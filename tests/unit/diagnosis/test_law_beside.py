@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosed import beam, bench_of, measured, observed
+from diagnosed import beam, measured, observed, problem_of
 from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
 from frf_ipz.diagnosis.model.change import Change, with_change
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
-from frf_ipz.diagnosis.search.component_search import search
+from frf_ipz.diagnosis.search.component_search import search_component
 from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
-from frf_ipz.diagnosis.verdict.decision import only_null
+from frf_ipz.diagnosis.verdict.decision import decide_without_search
 from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.changes import with_point_masses
@@ -49,22 +49,22 @@ class Laws:
         return self.law
 
 
-def beside(model, frfs, names, laws, *, alone=0.0, linear=only_null):
+def beside(model, frfs, names, laws, *, alone=0.0, linear=decide_without_search):
     """Search; without a linear cause a law strains the model by `alone`."""
-    bench = bench_of(model, frfs, names)
-    return search_beside_linear(bench, linear(bench), a_law("unexplained", alone), model, observed(frfs), laws)
+    problem = problem_of(model, frfs, names)
+    return search_beside_linear(problem, linear(problem), a_law("unexplained", alone), model, observed(frfs), laws)
 
 
 def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     laws = Laws("explained")
     found = beside(nominal, frfs, ("added_mass",), laws)
-    (given, _), (law, cause) = laws.given[0], found
-    place = nominal.full_index(Dof(12, "z"))
-    added = given.mass_all.toarray()[place, place] - nominal.mass_all.toarray()[place, place]
+    (given, _), (law, component) = laws.given[0], found
+    location = nominal.full_index(Dof(12, "z"))
+    added = given.mass_all.toarray()[location, location] - nominal.mass_all.toarray()[location, location]
     assert added == pytest.approx(MASS_KG, rel=SEEN)
     assert law.verdict == "explained"
-    assert (cause.effect, dict(cause.location)) == ("added_mass", {"nodes": [12]})
+    assert (component.effect, dict(component.location)) == ("added_mass", {"nodes": [12]})
 
 
 def test_without_a_law_nothing_is_named(nominal):
@@ -103,10 +103,10 @@ def test_blows_that_agree_beside_a_linear_cause_are_no_law(nominal):
 def test_a_cause_that_leaves_half_is_named_where_beside_it_a_law_explains_and_strains_nothing(
     nominal, alone, verdict, with_it, said
 ):
-    def halved(bench):
-        nothing = only_null(bench)
-        ranking = search(bench, nothing.null)
-        null = replace(nothing.null, misfit=2 * ranking.best.cost, pull=0.0)
+    def halved(problem):
+        nothing = decide_without_search(problem)
+        ranking = search_component(problem, nothing.null)
+        null = replace(nothing.null, misfit=2 * ranking.best.cost, nuisance_chi2=0.0)
         return replace(nothing, null=null, ranking=ranking)
 
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
@@ -116,10 +116,10 @@ def test_a_cause_that_leaves_half_is_named_where_beside_it_a_law_explains_and_st
 
 
 def test_a_cause_that_leaves_half_is_not_looked_at_beside_a_law_that_strains_nothing(nominal):
-    def halved(bench):
-        nothing = only_null(bench)
-        best = search(bench, nothing.null).best
-        return replace(nothing, null=replace(nothing.null, misfit=2 * best.cost, pull=0.0))
+    def halved(problem):
+        nothing = decide_without_search(problem)
+        best = search_component(problem, nothing.null).best
+        return replace(nothing, null=replace(nothing.null, misfit=2 * best.cost, nuisance_chi2=0.0))
 
     laws = Laws("explained", 1.0)
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
@@ -135,11 +135,11 @@ def test_a_cause_is_looked_for_beside_the_law_where_the_other_way_led_to_nothing
     monkeypatch, verdict, linear_first, asked
 ):
     seen, nothing = [], SimpleNamespace(findings=(), statement="")
-    cause = SimpleNamespace(log_evidence_gain=1.0, statement="")
+    component = SimpleNamespace(log_evidence_gain=1.0, statement="")
 
     def first(*_):
         seen.append("linear")
-        return (nothing, cause) if linear_first else None
+        return (nothing, component) if linear_first else None
 
     replaced = {
         "search_beside_linear": first,
@@ -149,27 +149,27 @@ def test_a_cause_is_looked_for_beside_the_law_where_the_other_way_led_to_nothing
     }
     for name, stub in replaced.items():
         monkeypatch.setattr(diagnose, name, stub)
-    bench = SimpleNamespace(effects={"added_mass": None})
-    diagnose._nonlinear(nothing, bench, None, None, None, None, SimpleNamespace(verdict=verdict), None)
+    problem = SimpleNamespace(effects={"added_mass": None})
+    diagnose._nonlinear(nothing, problem, None, None, None, None, SimpleNamespace(verdict=verdict), None)
     assert seen == asked
 
 
 def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):
     """The misfit falls to a half only, but the pull of the tolerances from ten times as much to none."""
 
-    def strained(bench):
-        nothing = only_null(bench)
+    def strained(problem):
+        nothing = decide_without_search(problem)
         size = float(nothing.null.n_values)
-        return replace(nothing, null=replace(nothing.null, misfit=2 * size, pull=10 * size))
+        return replace(nothing, null=replace(nothing.null, misfit=2 * size, nuisance_chi2=10 * size))
 
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     assert beside(nominal, frfs, ("added_mass",), Laws("explained"), linear=strained) is not None
 
 
 def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):
-    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
-    place = next(one for one in ATTACHED.places(bench.specimen) if one.location == {"nodes": [12]})
-    true = with_change(nominal, ATTACHED.build(bench.specimen, place)(np.array([0.01, 250.0, 0.02])))
+    problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
+    location = next(one for one in ATTACHED.locations(problem.context) if one.entries == {"nodes": [12]})
+    true = with_change(nominal, ATTACHED.build(problem.context, location)(np.array([0.01, 250.0, 0.02])))
     frfs = measured(true)
     laws = Laws("explained")
     assert beside(nominal, frfs, ("attached_resonator",), laws) is None

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from frf_ipz import read_model, solve_modes
 from frf_ipz.diagnosis.model.basis import make_basis
-from frf_ipz.diagnosis.model.layout import lay_out
-from frf_ipz.diagnosis.model.nuisance import UNIFORM, make_nuisance
+from frf_ipz.diagnosis.model.layout import make_layout
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD, make_nuisance_prior
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity
@@ -39,21 +39,21 @@ def model_of(folder, *, thickness_m=0.01, formulation="euler-bernoulli"):
     return read_model(path)
 
 
-def nuisance_of(model, top_hz):
+def nuisance_prior_of(model, top_hz):
     label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(12, "z"), quantity=FrfQuantity.ACCELERANCE)
-    places = [model.full_index(label.output_dof), model.full_index(label.input_dof)]
-    basis = make_basis(model, 2 * np.pi * top_hz, places)
-    return make_nuisance(basis, lay_out([label]), DiagnoseOptions())
+    locations = [model.full_index(label.output_dof), model.full_index(label.input_dof)]
+    basis = make_basis(model, 2 * np.pi * top_hz, locations)
+    return make_nuisance_prior(basis, make_layout([label]), DiagnoseOptions())
 
 
 def test_nobody_states_the_damping_of_modes_beyond_the_band(tmp_path):
     model, top_hz = model_of(tmp_path), 1500.0
-    nuisance = nuisance_of(model, top_hz)
-    frequency_hz = solve_modes(model, n_modes=nuisance.n_modes).natural_frequency_hz
-    inside, tolerance = frequency_hz <= top_hz, UNIFORM * DiagnoseOptions().damping_tolerance
-    assert_allclose(nuisance.damping_std[2:][inside[2:]], tolerance)
-    assert (nuisance.damping_std[~inside] > 1.5 * tolerance).all()
-    assert (nuisance.damping_std <= 0.5).all()
+    nuisance_prior = nuisance_prior_of(model, top_hz)
+    frequency_hz = solve_modes(model, n_modes=nuisance_prior.n_modes).natural_frequency_hz
+    inside, tolerance = frequency_hz <= top_hz, UNIFORM_STD * DiagnoseOptions().damping_tolerance
+    assert_allclose(nuisance_prior.damping_std[2:][inside[2:]], tolerance)
+    assert (nuisance_prior.damping_std[~inside] > 1.5 * tolerance).all()
+    assert (nuisance_prior.damping_std <= 0.5).all()
 
 
 @pytest.mark.parametrize(("thickness_m", "brings"), [(0.08, True), (0.01, False)])
@@ -64,6 +64,6 @@ def test_modes_that_shear_brings_into_the_band_scatter(tmp_path, thickness_m, br
     below = int(np.count_nonzero(solve_modes(sheared, n_modes=20).natural_frequency_hz <= top_hz))
     twice = int(np.count_nonzero(solve_modes(model, n_modes=20).natural_frequency_hz <= 2 * top_hz))
     assert (below > twice) == brings, "the case is not what it should be"
-    n_modes = nuisance_of(model, top_hz).n_modes
+    n_modes = nuisance_prior_of(model, top_hz).n_modes
     assert n_modes >= below
     assert brings or n_modes == twice

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from diagnosed import beam, bench_of, labels, measured
+from diagnosed import beam, labels, measured, problem_of
 from frf_ipz.diagnosis.catalogue.effects import coupling_spring
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.search import ambiguity_set as elsewhere
-from frf_ipz.diagnosis.search.component_search import Ranking, fit_nothing
-from frf_ipz.diagnosis.search.global_scan import wide_search
+from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model
+from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.diagnosis.verdict import decision
 from frf_ipz.dofs import Dof
@@ -24,66 +24,66 @@ ROUGHLY, EXACTLY = 0.05, 0.01  # relative: amplitudes of the first look are a fa
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def problem(tmp_path_factory):
     nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
     motion = np.zeros(len(nominal.all_dofs))
     motion[[nominal.full_indices[Dof(node, "z")] for node in ENDS]] = 1.0, -1.0
     added = STIFFNESS_N_M * np.outer(motion, motion)
     true = replace(nominal, stiffness_all=sparse.csr_array(nominal.stiffness_all + added))
-    return bench_of(nominal, measured(true, labels(outputs=("25:+z", "10:-z"))), ("coupling_spring",))
+    return problem_of(nominal, measured(true, labels(outputs=("25:+z", "10:-z"))), ("coupling_spring",))
 
 
-def nodes_of(cause):
-    return tuple(cause.place.location["nodes"])
+def nodes_of(component):
+    return tuple(component.location.entries["nodes"])
 
 
-def test_a_wide_search_finds_values_closer_than_its_amplitudes_are_apart(bench):
-    best = wide_search(bench, fit_nothing(bench))[0]
-    assert nodes_of(best.cause) == ENDS
+def test_a_wide_search_finds_values_closer_than_its_amplitudes_are_apart(problem):
+    best = scan_globally(problem, fit_null_model(problem))[0]
+    assert nodes_of(best.component) == ENDS
     assert best.values[0] == pytest.approx(STIFFNESS_N_M, rel=ROUGHLY)
 
 
-def test_a_wide_search_looks_between_the_places_of_a_thinned_row(bench, monkeypatch):
+def test_a_wide_search_looks_between_the_places_of_a_thinned_row(problem, monkeypatch):
     monkeypatch.setattr(coupling_spring, "MOST_IN_A_ROW", 12)
-    places = bench.effects["coupling_spring"].places(bench.specimen)
-    assert ENDS not in [tuple(place.location["nodes"]) for place in places]
-    best = wide_search(bench, fit_nothing(bench))[0]
-    assert nodes_of(best.cause) == ENDS
+    locations = problem.effects["coupling_spring"].locations(problem.context)
+    assert ENDS not in [tuple(location.entries["nodes"]) for location in locations]
+    best = scan_globally(problem, fit_null_model(problem))[0]
+    assert nodes_of(best.component) == ENDS
 
 
-def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(bench, monkeypatch):
-    null = fit_nothing(bench)
-    start = next(start for start in wide_search(bench, null) if nodes_of(start.cause) == WRONG)
-    wrong = bench.fit((start.cause,), start.values)
-    assert wrong.is_nearly_all
-    monkeypatch.setattr(decision, "search", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
-    monkeypatch.setattr(decision, "search_second", lambda *_: Ranking(base=wrong, fits=(), n_tried=0))
-    found = decision.decide(bench, silent)
+def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(problem, monkeypatch):
+    null = fit_null_model(problem)
+    start = next(start for start in scan_globally(problem, null) if nodes_of(start.component) == WRONG)
+    wrong = problem.fit((start.component,), start.values)
+    assert wrong.explains_nearly_all
+    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
+    monkeypatch.setattr(decision, "search_pair", lambda *_: Ranking(base=wrong, fits=(), n_tried=0))
+    found = decision.decide(problem, silent)
     assert found.verdict == "explained"
-    (cause,) = found.final.hypothesis.causes
-    assert nodes_of(cause) == ENDS
+    (component,) = found.final.hypothesis.components
+    assert nodes_of(component) == ENDS
     assert found.final.values[0] == pytest.approx(STIFFNESS_N_M, rel=EXACTLY)
 
 
 TRUE, ASTRAY, RESONATOR = 13, 14, np.array([0.02, 150.0, 0.02])  # nodes; kg, Hz, 1
 
 
-def at_node(bench, node):
-    effect = bench.effects["attached_resonator"]
-    place = next(place for place in effect.places(bench.specimen) if place.location == {"nodes": [node]})
-    return Cause(effect=effect, place=place, n_places=1)
+def at_node(problem, node):
+    effect = problem.effects["attached_resonator"]
+    location = next(location for location in effect.locations(problem.context) if location.entries == {"nodes": [node]})
+    return Component(effect=effect, location=location, n_locations=1)
 
 
 def test_another_place_is_fitted_from_the_best_values_where_a_wide_search_finds_none(tmp_path_factory, monkeypatch):
     nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
-    one = bench_of(nominal, measured(nominal), ("attached_resonator",))
-    cause = at_node(one, TRUE)
-    true = with_change(nominal, cause.effect.build(one.specimen, cause.place)(RESONATOR))
-    bench = bench_of(nominal, measured(true), ("attached_resonator",))
-    wrong = bench.fit((at_node(bench, ASTRAY),), RESONATOR)
-    lost = Start(cause=at_node(bench, TRUE), values=np.array([1e-4, 900.0, 0.5]), cost=0.0)
-    monkeypatch.setattr(elsewhere, "wide_search", lambda *_: [lost])
-    monkeypatch.setattr(elsewhere, "climb_all", lambda *_: None)
-    found = elsewhere.look_elsewhere(bench, Ranking(base=fit_nothing(bench), fits=(wrong,), n_tried=0))
-    assert found.best.hypothesis.causes[-1].place.location == {"nodes": [TRUE]}
+    one = problem_of(nominal, measured(nominal), ("attached_resonator",))
+    component = at_node(one, TRUE)
+    true = with_change(nominal, component.effect.build(one.context, component.location)(RESONATOR))
+    problem = problem_of(nominal, measured(true), ("attached_resonator",))
+    wrong = problem.fit((at_node(problem, ASTRAY),), RESONATOR)
+    lost = Start(component=at_node(problem, TRUE), values=np.array([1e-4, 900.0, 0.5]), cost=0.0)
+    monkeypatch.setattr(elsewhere, "scan_globally", lambda *_: [lost])
+    monkeypatch.setattr(elsewhere, "search_neighbourhoods", lambda *_: None)
+    found = elsewhere.fit_distant_locations(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=0))
+    assert found.best.hypothesis.components[-1].location.entries == {"nodes": [TRUE]}
     assert found.best.values[:2] == pytest.approx(RESONATOR[:2], rel=EXACTLY)

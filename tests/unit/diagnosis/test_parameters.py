@@ -46,8 +46,8 @@ def test_the_parameter_is_the_mass_relative_to_what_was_found(case):
     assert basis.is_from_diagnosis
     assert basis.names == ("added_mass mass_kg",)
     assert not basis.stiffness.any()
-    place = reduced.row(nominal.all_dofs[nominal.full_index(labels()[0].output_dof)])
-    assert place.shape == (len(reduced.dofs),)
+    location = reduced.row(nominal.all_dofs[nominal.full_index(labels()[0].output_dof)])
+    assert location.shape == (len(reduced.dofs),)
     row = reduced.expansion[[dof.name for dof in reduced.expanded_dofs].index("12:z")]
     np.testing.assert_allclose(basis.mass[0], OFF * MASS_KG * np.outer(row, row), rtol=NEAR, atol=1e-12)
 

@@ -7,32 +7,32 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosed import beam, bench_of, labels, measured, observed
+from diagnosed import beam, labels, measured, observed, problem_of
 from frf_ipz.diagnosis import diagnose as diagnosing
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
-from frf_ipz.diagnosis.catalogue.effect import Place
+from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pair_search as pairs
 from frf_ipz.diagnosis.search.component_search import (
-    CLOSE_EACH,
-    CLOSE_FITTED,
+    N_SCORED,
+    SCORED_PER_EFFECT,
     Ranking,
     _most_promising,
-    fit_nothing,
-    search,
-    search_beside,
+    fit_null_model,
+    search_component,
+    search_small_component,
 )
-from frf_ipz.diagnosis.search.pair_search import search_second
+from frf_ipz.diagnosis.search.pair_search import search_pair
 from frf_ipz.diagnosis.search.robust_refinement import Start
-from frf_ipz.diagnosis.search.score_test import close_search
+from frf_ipz.diagnosis.search.score_test import run_score_test
 from frf_ipz.diagnosis.verdict.decision import decide
-from frf_ipz.diagnosis.verdict.goodness import LIMITS, goodness
-from frf_ipz.diagnosis.verdict.out_of_catalogue import another_kind
+from frf_ipz.diagnosis.verdict.goodness import LIMITS, assess_goodness
+from frf_ipz.diagnosis.verdict.out_of_catalogue import describe_implausibility
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
@@ -62,23 +62,23 @@ def thick(tmp_path_factory):
 
 def test_a_delay_beside_a_soft_element_is_promised(nominal):
     """Static shapes of the element are in its fit: what a delay changes is not hidden behind what they change."""
-    soft = bench_of(nominal, measured(nominal), ("local_stiffness",))
+    soft = problem_of(nominal, measured(nominal), ("local_stiffness",))
     effect = soft.effects["local_stiffness"]
-    place = next(place for place in effect.places(soft.specimen) if place.location == {"elements": [3, 3]})
-    true = with_change(nominal, effect.build(soft.specimen, place)(np.array([0.3])))
+    location = next(location for location in effect.locations(soft.context) if location.entries == {"elements": [3, 3]})
+    true = with_change(nominal, effect.build(soft.context, location)(np.array([0.3])))
     frfs = measured(true, factors=lambda hz: np.stack([np.exp(-2j * np.pi * hz * LATE_S), np.ones_like(hz)], 1))
-    bench = bench_of(nominal, frfs, ("local_stiffness", "time_delay"))
-    base = bench.fit((Cause(effect=effect, place=place, n_places=16),), np.array([0.3]))
-    promised = close_search(bench, base)[0]
-    assert promised.cause.effect.name == "time_delay"
+    problem = problem_of(nominal, frfs, ("local_stiffness", "time_delay"))
+    base = problem.fit((Component(effect=effect, location=location, n_locations=16),), np.array([0.3]))
+    promised = run_score_test(problem, base)[0]
+    assert promised.component.effect.name == "time_delay"
     assert promised.values[0] == pytest.approx(LATE_S, rel=SEEN)
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_what_changes_stiffness_changes_that_of_an_exchanged_model(thick, order):
-    bench = bench_of(thick, measured(thick), ("shear_rotary_inertia", "global_stiffness"))
-    acting = [(effect, effect.places(bench.specimen)[0]) for effect in bench.effects.values()][::order]
-    built = dict(zip([effect.name for effect, _ in acting], build_together(bench.specimen, acting), strict=True))
+    problem = problem_of(thick, measured(thick), ("shear_rotary_inertia", "global_stiffness"))
+    acting = [(effect, effect.locations(problem.context)[0]) for effect in problem.effects.values()][::order]
+    built = dict(zip([effect.name for effect, _ in acting], build_together(problem.context, acting), strict=True))
     change = built["global_stiffness"](np.array([SOFTER])).stiffness.toarray()
     exchanged = with_formulation(thick, "timoshenko").stiffness_all.toarray()
     assert_allclose(change, (SOFTER - 1) * exchanged, rtol=0, atol=ROUNDING * exchanged.max())
@@ -113,22 +113,29 @@ def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
     def late(frequency_hz):
         return np.exp(-2j * np.pi * frequency_hz[:, None] * np.array([0.0, 3e-5]))
 
-    bench = bench_of(nominal, measured(nominal, factors=late), ("time_delay", "added_mass", "local_damper"))
-    null = fit_nothing(bench)
+    problem = problem_of(nominal, measured(nominal, factors=late), ("time_delay", "added_mass", "local_damper"))
+    null = fit_null_model(problem)
     assert null.misfit > 20 * null.n_values
-    best = search(bench, null).best
-    assert best.hypothesis.causes[-1].key == ("time_delay", "acc_2")
+    best = search_component(problem, null).best
+    assert best.hypothesis.components[-1].key == ("time_delay", "acc_2")
     assert best.values[0] == pytest.approx(3e-5, rel=SEEN)
 
 
 def test_a_small_cause_beside_one_that_explains_nearly_all_is_named(nominal, monkeypatch):
     true = with_springs(with_point_masses(nominal, {12: 0.02}), {Dof(8, "z"): WEAK_N_M})
-    bench = bench_of(nominal, measured(true), ("added_mass", "grounded_spring", "sensor_gain"))
-    assert [cause.effect.name for cause in decide(bench, silent).final.hypothesis.causes] == ["added_mass"]
-    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], beside_nats=LIMITS["hammer"].beside_nats))
-    found = decide(bench, silent)
-    assert [cause.effect.name for cause in found.final.hypothesis.causes] == ["added_mass", "grounded_spring"]
-    assert found.further[0].base.hypothesis.causes[0].place.location == {"nodes": [12]}
+    problem = problem_of(nominal, measured(true), ("added_mass", "grounded_spring", "sensor_gain"))
+    assert [component.effect.name for component in decide(problem, silent).final.hypothesis.components] == [
+        "added_mass"
+    ]
+    monkeypatch.setitem(
+        LIMITS, "frf", replace(LIMITS["frf"], beside_log_bayes_factor=LIMITS["hammer"].beside_log_bayes_factor)
+    )
+    found = decide(problem, silent)
+    assert [component.effect.name for component in found.final.hypothesis.components] == [
+        "added_mass",
+        "grounded_spring",
+    ]
+    assert found.further_rankings[0].base.hypothesis.components[0].location.entries == {"nodes": [12]}
 
 
 @pytest.mark.parametrize(("part", "verdict"), [(0.95, "consistent"), (0.8, "explained")])
@@ -136,37 +143,37 @@ def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is
     nominal, monkeypatch, part, verdict
 ):
     """Errors that are underrated make something out of nothing: the piece is 1.13 times the expected misfit."""
-    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: 1.5 * LITTLE_KG})), ("added_mass",))
-    null = fit_nothing(bench)
-    gain = search(bench, null).best.log_evidence - null.log_evidence
-    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], found_nats=part * gain))
-    assert 1 / 0.95 < goodness(bench, null).worst_piece < 1 / 0.8
-    assert decide(bench, silent).verdict == verdict
+    problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 1.5 * LITTLE_KG})), ("added_mass",))
+    null = fit_null_model(problem)
+    gain = search_component(problem, null).best.log_evidence - null.log_evidence
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], first_log_bayes_factor=part * gain))
+    assert 1 / 0.95 < assess_goodness(problem, null).worst_subband < 1 / 0.8
+    assert decide(problem, silent).verdict == verdict
 
 
 def test_the_smallest_size_that_is_told_has_the_evidence_that_is_asked(nominal, monkeypatch):
     frfs = measured(nominal)
-    bench = bench_of(nominal, frfs, ("added_mass",))
-    needed = goodness(bench, fit_nothing(bench)).needed_nats
-    assert needed > LIMITS["frf"].found_nats
-    monkeypatch.setattr(diagnosing, "detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
+    problem = problem_of(nominal, frfs, ("added_mass",))
+    needed = assess_goodness(problem, fit_null_model(problem)).required_log_bayes_factor
+    assert needed > LIMITS["frf"].first_log_bayes_factor
+    monkeypatch.setattr(diagnosing, "find_detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
     found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
     assert found.detectability["added_mass"]["nats"] == pytest.approx(needed)
 
 
 def test_places_are_stepped_only_where_a_cause_explains_something(nominal):
     names = ("added_mass", "grounded_spring")
-    nothing = bench_of(nominal, measured(nominal), names)
-    assert len(search(nothing, fit_nothing(nothing)).fits) <= len(names) * CLOSE_EACH
-    heavier = bench_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
-    found = {fit.hypothesis.causes[0].key for fit in search(heavier, fit_nothing(heavier)).fits}
+    nothing = problem_of(nominal, measured(nominal), names)
+    assert len(search_component(nothing, fit_null_model(nothing)).fits) <= len(names) * SCORED_PER_EFFECT
+    heavier = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
+    found = {fit.hypothesis.components[0].key for fit in search_component(heavier, fit_null_model(heavier)).fits}
     assert {("added_mass", node, "z") for node in (11, 12, 13)} <= found
 
 
 def test_nothing_is_added_to_a_cause_that_explains_all(nominal):
-    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("added_mass", "grounded_spring"))
-    one = search(bench, fit_nothing(bench)).best
-    beside = search_beside(bench, one, LIMITS["hammer"].beside_nats)
+    problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("added_mass", "grounded_spring"))
+    one = search_component(problem, fit_null_model(problem)).best
+    beside = search_small_component(problem, one, LIMITS["hammer"].beside_log_bayes_factor)
     assert beside.fits == ()
     assert beside.n_tried > 5
 
@@ -183,23 +190,23 @@ def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
 
 
 def test_a_stretch_of_usual_length_is_preferred_to_a_short_one_that_looks_the_same(nominal):
-    bench = bench_of(nominal, measured(nominal), ("local_stiffness",))
-    effect = bench.effects["local_stiffness"]
-    places = {place.key[1:]: place for place in effect.places(bench.specimen)}
-    likely = {length: effect.log_prior(bench.specimen, places[1, length], np.array([0.9])) for length in (1, 2, 4)}
+    problem = problem_of(nominal, measured(nominal), ("local_stiffness",))
+    effect = problem.effects["local_stiffness"]
+    locations = {location.key[1:]: location for location in effect.locations(problem.context)}
+    likely = {length: effect.log_prior(problem.context, locations[1, length], np.array([0.9])) for length in (1, 2, 4)}
     assert likely[1] > likely[2] > likely[4]  # 4 % of 16 elements are less than one
-    smaller = effect.log_prior(bench.specimen, places[1, 1], np.array([0.95]))
+    smaller = effect.log_prior(problem.context, locations[1, 1], np.array([0.95]))
     assert smaller == pytest.approx(likely[1] + np.log(2))
 
 
-def with_causes(bench, *named):
-    causes = []
+def with_components(problem, *named):
+    components = []
     for name, node in named:
-        effect = bench.effects[name]
-        place = next(one for one in effect.places(bench.specimen) if one.location.get("nodes") == [node])
-        causes.append(Cause(effect=effect, place=place, n_places=1))
-    hypothesis = bench.suppose(tuple(causes))
-    return SimpleNamespace(hypothesis=hypothesis, values=hypothesis.physical((hypothesis.low + hypothesis.high) / 2))
+        effect = problem.effects[name]
+        location = next(one for one in effect.locations(problem.context) if one.entries.get("nodes") == [node])
+        components.append(Component(effect=effect, location=location, n_locations=1))
+    hypothesis = problem.make_hypothesis(tuple(components))
+    return SimpleNamespace(hypothesis=hypothesis, values=hypothesis.to_physical((hypothesis.low + hypothesis.high) / 2))
 
 
 @pytest.mark.parametrize(
@@ -214,28 +221,33 @@ def with_causes(bench, *named):
 )
 def test_two_with_dynamics_of_their_own_alike_or_at_one_place_are_one_of_another_kind(nominal, named, expected):
     names = ("attached_resonator", "local_damper", "added_mass", "viscoelastic_joint")
-    assert bool(another_kind(with_causes(bench_of(nominal, measured(nominal), names), *named))) is expected
+    assert (
+        bool(describe_implausibility(with_components(problem_of(nominal, measured(nominal), names), *named)))
+        is expected
+    )
 
 
 @pytest.mark.parametrize(("ratio", "said"), [(0.05, ""), (0.3, "damping ratio of 30 %")])
 def test_a_resonator_that_hardly_swings_is_something_else(nominal, ratio, said):
     names = ("attached_resonator", "added_mass")
-    fit = with_causes(bench_of(nominal, measured(nominal), names), ("added_mass", 3), ("attached_resonator", 9))
+    fit = with_components(problem_of(nominal, measured(nominal), names), ("added_mass", 3), ("attached_resonator", 9))
     fit.values[-1] = ratio
-    assert (said in another_kind(fit)) is True
-    assert bool(another_kind(fit)) is bool(said)
+    assert (said in describe_implausibility(fit)) is True
+    assert bool(describe_implausibility(fit)) is bool(said)
 
 
 def test_two_resonators_at_one_node_are_not_named(nominal):
-    first, second = (Cause(effect=ATTACHED, place=Place(key=(17, "z"), location={"nodes": [17]}), n_places=1),) * 2
-    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
-    both = bench.suppose((first, second))
-    values, unknown = np.array([0.02, 40.0, 0.03, 0.02, 250.0, 0.03]), np.zeros(bench.nuisance.size)
+    first, second = (
+        Component(effect=ATTACHED, location=Location(key=(17, "z"), entries={"nodes": [17]}), n_locations=1),
+    ) * 2
+    problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
+    both = problem.make_hypothesis((first, second))
+    values, nuisance = np.array([0.02, 40.0, 0.03, 0.02, 250.0, 0.03]), np.zeros(problem.nuisance_prior.size)
 
     def chain(frequency_hz):
         s = 2j * np.pi * frequency_hz
-        alone = bench.suppose(()).respond(np.zeros(0), unknown, s).values
-        return both.respond(values, unknown, s).values / alone
+        alone = problem.make_hypothesis(()).respond(np.zeros(0), nuisance, s).values
+        return both.respond(values, nuisance, s).values / alone
 
     found = diagnose(nominal, observed(measured(nominal, factors=chain)), DiagnoseOptions(effects=(ATTACHED.name,)))
     assert found.verdict == "unexplained"
@@ -256,12 +268,12 @@ def test_all_sensors_may_be_late_together(nominal):
 
 def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp_path):
     model = beam(tmp_path, left="pinned", right="pinned")
-    bench = bench_of(model, measured(model, labels(outputs=("12:+z", "9:-z"))), ("viscoelastic_joint",))
-    effect, values = bench.effects["viscoelastic_joint"], np.array([100.0, 1e-3])
-    places = {place.key[:2]: place for place in effect.places(bench.specimen)}
-    beside = effect.neighbours(bench.specimen, places["node", 16])
-    assert {place.key[:2] for place in beside} >= {("node", 15), ("end", "left"), ("end", "right")}
-    prior = {key: effect.log_prior(bench.specimen, place, values) for key, place in places.items()}
+    problem = problem_of(model, measured(model, labels(outputs=("12:+z", "9:-z"))), ("viscoelastic_joint",))
+    effect, values = problem.effects["viscoelastic_joint"], np.array([100.0, 1e-3])
+    locations = {location.key[:2]: location for location in effect.locations(problem.context)}
+    beside = effect.neighbours(problem.context, locations["node", 16])
+    assert {location.key[:2] for location in beside} >= {("node", 15), ("end", "left"), ("end", "right")}
+    prior = {key: effect.log_prior(problem.context, location, values) for key, location in locations.items()}
     assert prior["end", "right"] == pytest.approx(np.log(15 / 2))  # 15 nodes that move, two ends
     assert prior["node", 16] == 0.0
 
@@ -284,80 +296,93 @@ def test_a_level_that_alone_explains_is_significant_though_not_far_beyond_its_to
 
 @pytest.mark.parametrize("ratio", [0.002, 0.03])
 def test_a_level_far_from_the_stated_one_is_found_where_only_damping_is_wrong(nominal, ratio):
-    bench = bench_of(nominal, measured(replace(nominal, modal_damping=np.full(4, ratio))), ("damping_level",))
-    null = fit_nothing(bench)
+    problem = problem_of(nominal, measured(replace(nominal, modal_damping=np.full(4, ratio))), ("damping_level",))
+    null = fit_null_model(problem)
     assert null.is_nearly_right
-    assert search(bench, null).best.values[0] == pytest.approx(ratio, rel=SEEN)
+    assert search_component(problem, null).best.values[0] == pytest.approx(ratio, rel=SEEN)
 
 
 def test_a_small_gain_is_not_taken_for_a_wrong_sign(nominal):
     frfs = measured(nominal, factors=lambda _: np.array([[SMALL_GAIN, 1.0]]))
-    bench = bench_of(nominal, frfs, ("sensor_gain",))
-    starts = close_search(bench, fit_nothing(bench))
+    problem = problem_of(nominal, frfs, ("sensor_gain",))
+    starts = run_score_test(problem, fit_null_model(problem))
     best = min(starts, key=lambda start: start.cost)
-    assert best.cause.place.key == ("acc_1", 1)
+    assert best.component.location.key == ("acc_1", 1)
     assert SMALL_GAIN < best.values[0] < 1  # tolerances take their part
-    assert all(start.cost > 0 for start in starts if start.cause.place.key[1] == -1)
+    assert all(start.cost > 0 for start in starts if start.component.location.key[1] == -1)
 
 
 @pytest.mark.slow
 def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(nominal):
     """A resonator stands for a mass and a spring as long as nothing stands beside it."""
     true = with_springs(with_point_masses(nominal, {12: 0.005}), {Dof(8, "z"): 3 * WEAK_N_M})
-    bench = bench_of(nominal, measured(true), ("added_mass", "grounded_spring", "attached_resonator"))
-    first = search(bench, fit_nothing(bench))
-    assert first.best.hypothesis.causes[0].effect.name == "attached_resonator"
-    found = search_second(bench, first, lambda _: True)
-    assert [cause.effect.name for cause in found.best.hypothesis.causes] == ["added_mass", "grounded_spring"]
+    problem = problem_of(nominal, measured(true), ("added_mass", "grounded_spring", "attached_resonator"))
+    first = search_component(problem, fit_null_model(problem))
+    assert first.best.hypothesis.components[0].effect.name == "attached_resonator"
+    found = search_pair(problem, first, lambda _: True)
+    assert [component.effect.name for component in found.best.hypothesis.components] == [
+        "added_mass",
+        "grounded_spring",
+    ]
 
 
 def test_a_resonator_of_much_damping_is_less_likely_than_a_damper_that_explains_as_much(nominal):
     values = [np.array([0.01, 100.0, ratio]) for ratio in (0.005, 0.05, 0.15, 0.4)]
-    bench = bench_of(nominal, measured(nominal), ("attached_resonator",))
-    place = ATTACHED.places(bench.specimen)[0]
-    little, usual, much, most = (ATTACHED.log_prior(bench.specimen, place, one) for one in values)
+    problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
+    location = ATTACHED.locations(problem.context)[0]
+    little, usual, much, most = (ATTACHED.log_prior(problem.context, location, one) for one in values)
     assert little == usual == 0
     assert -3 < much < -1  # nats: still easily named
     assert most < -6
 
 
-@pytest.mark.parametrize(("is_good", "count"), [(True, pairs.OTHERS), (False, pairs.ALL_OTHERS)])
+@pytest.mark.parametrize(("is_good", "count"), [(True, pairs.N_OTHERS), (False, pairs.N_OTHERS_INCOMPLETE)])
 def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
     tried = []
-    monkeypatch.setattr(pairs, "search", lambda _, base: Ranking(base=base, fits=(), n_tried=0))
+    monkeypatch.setattr(pairs, "search_component", lambda _, base: Ranking(base=base, fits=(), n_tried=0))
     monkeypatch.setattr(
-        pairs, "search_beside", lambda _, base, __: tried.append(base) or Ranking(base=base, fits=(), n_tried=0)
+        pairs,
+        "search_small_component",
+        lambda _, base, __: tried.append(base) or Ranking(base=base, fits=(), n_tried=0),
     )
-    monkeypatch.setattr(pairs, "_settled", lambda _, ranking: ranking)
+    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking: ranking)
     fits = [one_of(f"effect_{number}", -number) for number in range(10)]
-    search_second(None, Ranking(base=fits[-1], fits=tuple(fits), n_tried=0), lambda _: is_good)
+    search_pair(None, Ranking(base=fits[-1], fits=tuple(fits), n_tried=0), lambda _: is_good)
     assert tried == fits[1 : 1 + count]
 
 
 def test_the_best_place_of_each_effect_is_fitted_before_others_of_better_ones():
     """A linear step promises a small part of what some effects explain."""
-    promised = [(number, place, 100.0 - 12 * number - place / 10) for number in range(6) for place in (0, 10, 20)]
-    starts = [Start(cause=a_cause(number, place), values=np.ones(1), cost=-nats) for number, place, nats in promised]
-    chosen = [(one.cause.effect.name, one.cause.place.key[0]) for one in _most_promising(starts, 45.0)]
+    promised = [
+        (number, location, 100.0 - 12 * number - location / 10) for number in range(6) for location in (0, 10, 20)
+    ]
+    starts = [
+        Start(component=a_component(number, location), values=np.ones(1), cost=-nats)
+        for number, location, nats in promised
+    ]
+    chosen = [(one.component.effect.name, one.component.location.key[0]) for one in _most_promising(starts, 45.0)]
     assert chosen[:5] == [(number, 0) for number in range(5)]  # the sixth promises less
-    assert len(chosen) == CLOSE_FITTED - 1
+    assert len(chosen) == N_SCORED - 1
     assert (4, 10) not in chosen
 
 
-def a_cause(name, place):
-    return SimpleNamespace(effect=SimpleNamespace(name=name), place=SimpleNamespace(key=(place, "z")))
+def a_component(name, location):
+    return SimpleNamespace(effect=SimpleNamespace(name=name), location=SimpleNamespace(key=(location, "z")))
 
 
 def one_of(name, log_evidence):
-    cause = SimpleNamespace(effect=SimpleNamespace(name=name))
+    component = SimpleNamespace(effect=SimpleNamespace(name=name))
     near = {"is_nearly_right": True, "is_nearly_all": True, "is_hopeless": False, "mean_misfit": 1.0}
-    return SimpleNamespace(hypothesis=SimpleNamespace(causes=(cause,)), log_evidence=log_evidence, **near)
+    return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence, **near)
 
 
 def test_the_first_of_two_causes_is_placed_anew_beside_the_second(nominal):
     true = with_springs(with_point_masses(nominal, {12: 0.002}), {Dof(8, "z"): 3e3})
-    bench, mass = bench_of(nominal, measured(true), ("grounded_spring",)), shipped_effects()["added_mass"]
-    beside = next(place for place in mass.places(bench.specimen) if place.location == {"nodes": [13]})
-    wrong = bench.fit((Cause(effect=mass, place=beside, n_places=16),), np.array([0.002]))
-    found = search_second(bench, Ranking(base=fit_nothing(bench), fits=(wrong,), n_tried=1), lambda _: True)
-    assert {cause.key[:2] for cause in found.best.hypothesis.causes} == {("added_mass", 12), ("grounded_spring", 8)}
+    problem, mass = problem_of(nominal, measured(true), ("grounded_spring",)), shipped_effects()["added_mass"]
+    beside = next(location for location in mass.locations(problem.context) if location.entries == {"nodes": [13]})
+    wrong = problem.fit((Component(effect=mass, location=beside, n_locations=16),), np.array([0.002]))
+    found = search_pair(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=1), lambda _: True)
+    assert {component.key[:2] for component in found.best.hypothesis.components} == {
+        ("added_mass", 12),
+        ("grounded_spring", 8),
+    }

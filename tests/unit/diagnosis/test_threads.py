@@ -19,7 +19,7 @@ def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
         seen.extend(threads())
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(stage, "divide", look)
+    monkeypatch.setattr(stage, "split_data", look)
     nothing = Observations(kind="frf", records=(), band_hz=(1.0, 2.0))
     with threadpool_limits(limits=2, user_api="blas"):
         before = threads()

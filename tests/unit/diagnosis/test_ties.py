@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from diagnosed import beam, bench_of, measured
-from frf_ipz.diagnosis.evidence.inference_problem import with_errors
+from diagnosed import beam, measured, problem_of
+from frf_ipz.diagnosis.evidence.inference_problem import make_data
 from frf_ipz.diagnosis.measured.transfer_functions import select_points
 from frf_ipz.diagnosis.search import ambiguity_set as ties
-from frf_ipz.diagnosis.search.ambiguity_set import settle_ties
-from frf_ipz.diagnosis.search.component_search import fit_nothing, search
+from frf_ipz.diagnosis.search.ambiguity_set import rescore_ambiguity_set
+from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
 from frf_ipz.fe.changes import with_point_masses
 
 LITTLE_KG, THICKER = 2e-4, 1.0015  # the thickness takes frequencies 0.15 % off, more than a part of 0.1 %
@@ -24,28 +24,28 @@ def nominal(tmp_path_factory):
 
 
 def test_a_place_that_needs_more_of_the_tolerances_falls_behind_where_the_model_is_better(nominal):
-    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
-    found = search(bench, fit_nothing(bench))
-    settled = settle_ties(bench, found)
-    assert settled.best.hypothesis.causes[0].place.location == {"nodes": [12]}
+    problem = problem_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
+    found = search_component(problem, fit_null_model(problem))
+    settled = rescore_ambiguity_set(problem, found)
+    assert settled.best.hypothesis.components[0].location.entries == {"nodes": [12]}
     assert settled.best.log_evidence == pytest.approx(found.best.log_evidence)
     assert ahead(found) < 5  # nats
     assert ahead(settled) > 2 * ahead(found)
 
 
 def test_a_model_that_is_ten_times_better_than_stated_tells_still_more(nominal, monkeypatch):
-    bench = bench_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
-    found = search(bench, fit_nothing(bench))
-    finely = settle_ties(bench, found)
+    problem = problem_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
+    found = search_component(problem, fit_null_model(problem))
+    finely = rescore_ambiguity_set(problem, found)
     monkeypatch.setattr(ties, "PARTS", (0.3,))
-    assert ahead(finely) > ahead(settle_ties(bench, found)) + 1  # nats
+    assert ahead(finely) > ahead(rescore_ambiguity_set(problem, found)) + 1  # nats
 
 
 def test_places_stay_alike_where_the_model_needs_its_tolerances(nominal, tmp_path):
     true = with_point_masses(beam(tmp_path, thickness_m=0.005 * THICKER), {12: 2 * LITTLE_KG})
-    bench = bench_of(nominal, measured(true), ("added_mass",))
-    found = search(bench, fit_nothing(bench))
-    assert ahead(settle_ties(bench, found)) == pytest.approx(ahead(found), abs=0.5)
+    problem = problem_of(nominal, measured(true), ("added_mass",))
+    found = search_component(problem, fit_null_model(problem))
+    assert ahead(rescore_ambiguity_set(problem, found)) == pytest.approx(ahead(found), abs=0.5)
 
 
 @pytest.mark.parametrize(("error", "expected"), [(0.0, 0.1), (3e-4, 0.3), (1e-3, 1.0)])
@@ -58,11 +58,11 @@ def test_errors_of_frfs_that_no_parameter_stands_for_are_as_large_as_the_best_ex
     def wavy(frequency_hz):
         return 1 + error * np.sin(9 * np.log(frequency_hz))[:, None]
 
-    bench = bench_of(nominal, measured(true, factors=wavy, noise=QUIET), ("added_mass",))
-    best = search(bench, fit_nothing(bench)).best
-    likely = ties._likely_errors(bench, best)
-    floors = {1.0: bench.data} | {
-        floor: with_errors(bench.data.measured, bench.specimen.options, floor=floor) for floor in ties.FLOORS
+    problem = problem_of(nominal, measured(true, factors=wavy, noise=QUIET), ("added_mass",))
+    best = search_component(problem, fit_null_model(problem)).best
+    likely = ties._find_likeliest_errors(problem, best)
+    floors = {1.0: problem.data} | {
+        floor: make_data(problem.data.measured, problem.context.options, floor=floor) for floor in ties.FLOORS
     }
     (floor,) = (
         floor
@@ -75,13 +75,13 @@ def test_errors_of_frfs_that_no_parameter_stands_for_are_as_large_as_the_best_ex
 @pytest.mark.parametrize("shared", [0.0, 0.02])
 def test_the_log_density_of_whitening_is_that_of_a_normal_distribution(nominal, shared):
     """Blows at one place share the noise of their force."""
-    bench = bench_of(nominal, measured(nominal), ())
-    few = select_points(bench.data.measured, np.arange(0, len(bench.data.measured.s), 40))
-    few = replace(few, common=(np.full((len(few.s), 1), shared),))
+    problem = problem_of(nominal, measured(nominal), ())
+    few = select_points(problem.data.measured, np.arange(0, len(problem.data.measured.s), 40))
+    few = replace(few, shared_errors=(np.full((len(few.s), 1), shared),))
     errors = few.size * 1e-3 * np.exp(1j * np.arange(few.values.size)).reshape(few.values.shape)
     nats, exact = [], []
     for floor in (1.0, 0.3):
-        white = with_errors(few, bench.specimen.options, floor=floor).whitening
+        white = make_data(few, problem.context.options, floor=floor).whitening
         roots = [np.linalg.inv(factor) for factor in white.factors]
         force = (few.values_above_noise * few.shared_errors[0]).T.ravel()
         covariance = linalg.block_diag(*(root @ root.conj().T for root in roots)) + np.outer(force, force.conj())

@@ -7,10 +7,10 @@ import pytest
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.evidence.inference_problem import set_up
+from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.search.component_search import fit_nothing
+from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.fe.changes import with_point_masses
 
 FEW = DiagnoseOptions(effects=("added_mass", "local_stiffness"))
@@ -31,24 +31,24 @@ def of_unknown_scale(machine, kind="per_channel"):
 def fit_of(nominal, kind):
     """The fit of the model without a mass to FRFs with one."""
     seen = of_unknown_scale(with_point_masses(nominal, {12: MASS_KG}), kind)
-    bench = set_up(nominal, split_data(seen), BAND_HZ, FEW, {}, free_gains=kind)
-    return bench, fit_nothing(bench)
+    problem = pose_problem(nominal, split_data(seen), BAND_HZ, FEW, {}, free_gains=kind)
+    return problem, fit_null_model(problem)
 
 
 @pytest.mark.parametrize("kind", ["per_channel", "common"])
 def test_no_gain_hides_what_is_missing(nominal, kind):
-    bench, fit = fit_of(nominal, kind)
-    assert fit.misfit > 10 * 2 * bench.data.measured.values.size
+    problem, fit = fit_of(nominal, kind)
+    assert fit.misfit > 10 * 2 * problem.data.measured.values.size
 
 
 @pytest.mark.parametrize("kind", ["per_channel", "common"])
 def test_slopes_are_those_of_the_misfit_with_the_best_gains(nominal, kind):
-    bench, _ = fit_of(nominal, kind)
-    data, nothing = bench.data, bench.suppose(())
-    step, start = 1e-4, np.zeros(bench.nuisance.size)
+    problem, _ = fit_of(nominal, kind)
+    data, nothing = problem.data, problem.make_hypothesis(())
+    step, start = 1e-4, np.zeros(problem.nuisance_prior.size)
     moved = start.copy()
     moved[0] = step
-    here, there = (nothing.respond(np.zeros(0), unknown, data.measured.s) for unknown in (start, moved))
+    here, there = (nothing.respond(np.zeros(0), nuisance, data.measured.s) for nuisance in (start, moved))
     exact = replace(data, measured=replace(data.measured, values=here.values))  # where the misfit vanishes
     change = ((there.values - here.values) / step)[:, :, None]
     slope = exact.slopes(here, change)[:, 0]

@@ -19,7 +19,7 @@ STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
 @pytest.fixture(scope="module")
 def folder():
     synthetic = synthetic_folder(diagnosed=True)
-    synthetic.results["diagnose"] = replace(synthetic.results["diagnose"], at_work=synthetic_law())
+    synthetic.results["diagnose"] = replace(synthetic.results["diagnose"], law_in_time=synthetic_law())
     return synthetic
 
 
@@ -66,7 +66,7 @@ def test_a_run_without_a_law_has_no_picture_of_one():
 
 
 def test_the_force_of_a_law_is_drawn_where_no_record_was_simulated(folder):
-    force_alone = replace(folder.results["diagnose"], at_work=replace(synthetic_law(), record=""))
+    force_alone = replace(folder.results["diagnose"], law_in_time=replace(synthetic_law(), record=""))
     figure = draw("law", Folder(results={"diagnose": force_alone}, manifest={}, stale=()))
     assert figure.axes[0].get_ylabel() == "Force of the law, N"
 

@@ -49,7 +49,7 @@ def test_what_nothing_explains_is_unknown(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained")
     assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
     assert verdict_of(diagnosis)[1].startswith("A part of it is explained: A mass")
-    addition = verdict_of(replace(diagnosis, remains="damping is 2 % (+- 1 %)"))[1]
+    addition = verdict_of(replace(diagnosis, unexplained_part="damping is 2 % (+- 1 %)"))[1]
     assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it is explained: A mass")
     assert card_texts(diagnosis)[0] == "unknown"
     assert card_texts(replace(diagnosis, findings=()))[0] == "unknown"
@@ -96,7 +96,7 @@ def test_the_map_holds_misfits_before_and_after(run):
 def test_models_that_hold_no_force_law_are_not_said_to_hold_it(run):
     linear = block(run, Picture, "mismatch")
     assert "as it is and with findings" in linear.alt
-    law = block(replace(run, diagnosis=replace(run.diagnosis, linearised="a spring")), Picture, "mismatch")
+    law = block(replace(run, diagnosis=replace(run.diagnosis, linearised_law="a spring")), Picture, "mismatch")
     assert len(linear.traces) == 2
     assert len(law.traces) == 1
     assert "the force law explains" in law.note
@@ -139,7 +139,7 @@ def test_what_cannot_be_distinguished_is_printed_on_the_command_line(run):
 
 
 def test_three_indistinguishable_effects_are_a_list():
-    alike = Ambiguity(effects=("axial_load", "added_mass", "time_delay"), separation_nats=1.0, resolve_by="")
+    alike = Ambiguity(effects=("axial_load", "added_mass", "time_delay"), log_bayes_factor=1.0, resolve_by="")
     assert alike.statement == "These data cannot tell apart: axial load, added mass and time delay."
 
 

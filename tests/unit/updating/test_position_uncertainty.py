@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.position_uncertainty import misplacements
+from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.updating.position_uncertainty import PositionUncertainty, with_position_uncertainty
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.update import update_model
@@ -63,7 +63,7 @@ def _newton(model, output, force, zero):
 
 def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are():
     case = make_update_case(SEEDS[0])
-    off = misplacements(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
+    off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
     ends = {(label.output_dof, True) for label in case.fit.labels} | {(x.input_dof, False) for x in case.fit.labels}
     assert {(one.dof, one.is_output) for one in off} == ends
     problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
@@ -77,7 +77,7 @@ def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are()
 def test_a_misplaced_sensor_is_not_taken_for_another_stiffness():
     """A zero that lies elsewhere because of its sensor changes the model less where that is allowed for."""
     case = make_update_case(SEEDS[0])
-    off = misplacements(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
+    off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
     changes = [
         np.abs(np.diagonal(found.model.stiffness) / np.diagonal(case.reduced_model.stiffness) - 1).max()
         for found in (update_model(case.reduced_model, case.fit, case.pairs, misplacements=some) for some in ((), off))

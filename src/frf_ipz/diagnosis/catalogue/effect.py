@@ -5,15 +5,15 @@ has and within which bounds, and what it changes for given numbers; everything e
 report) follows from that. A class in a user's own file does the same::
 
     # my_effects.py, named in pipeline.toml: [diagnose] extra_effects = ["my_effects.py:Sloshing"]
-    from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Signature, at_nodes
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter, Signature, list_node_locations
     from frf_ipz.diagnosis.model.change import Attachment, Change
 
     class Sloshing(Effect):
         name = "sloshing"
         imitators = ("attached_resonator", "added_mass")
 
-        def places(self, specimen):
-            return at_nodes(specimen)
+        def locations(self, context):
+            return list_node_locations(context)
         ...
 """
 
@@ -73,21 +73,21 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class Location:
     """Somewhere an effect could sit.
 
     Parameters
     ----------
     key : tuple
         What tells it from others of the same effect.
-    location : mapping
-        As in `diagnosis.json`.
+    entries : mapping
+        What `diagnosis.json` says of it: nodes, elements, springs, channels, an end, groups.
     text : mapping of str to str
         Parameters that are text: the kind of a filter.
     """
 
     key: tuple[object, ...]
-    location: Mapping[str, object] = field(default_factory=dict)
+    entries: Mapping[str, object] = field(default_factory=dict)
     text: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -128,58 +128,58 @@ class Effect(ABC):
     """Something with dynamics of its own hangs at a place: two of that kind at one place imitate much."""
 
     @abstractmethod
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Say where the effect could sit: nowhere if it does not apply to this kind of model."""
 
     @abstractmethod
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Say which numbers it has there."""
 
     @abstractmethod
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Give what changes the model or the measuring chain, for values of the parameters."""
 
-    def chain(self, place: Place) -> Builder | None:
+    def chain(self, location: Location) -> Builder | None:
         """Give what changes the measuring chain, if that is all that changes: it needs no structure."""
-        del place
+        del location
         return None
 
     @abstractmethod
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say to the user what it is and where, in one sentence."""
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
+    def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Give the effect as one dynamic stiffness, if it is one; else it is searched by `starts`."""
-        del specimen, place
+        del context, location
         return None
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Give values to start from, (n_starts, n_parameters): a grid over the bounds unless it knows better."""
-        return grid(self.parameters(specimen, place), 8)
+        return grid(self.parameters(context, location), 8)
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Say how likely values at a place are beside what is stated by bounds and the number of places, nats."""
-        del specimen, place, values
+        del context, location, values
         return 0.0
 
-    def doubt(self, values: FloatArray) -> str:
+    def implausibility(self, values: FloatArray) -> str:
         """Say why values that explain a measurement are rather those of something else; empty where they are not."""
         del values
         return ""
 
-    def reported(self, place: Place, name: str, value: float) -> float:
+    def report_value(self, location: Location, name: str, value: float) -> float:
         """Turn a value that was searched into the one that is reported: a sign, for one."""
-        del place, name
+        del location, name
         return value
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Places beside one, to look at when it is nearly right."""
-        del specimen, place
+        del context, location
         return ()
 
-    def around(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def surroundings(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Places further around one, with the same parameters; the best few are looked at if none beside is better."""
-        del specimen, place
+        del context, location
         return ()
 
 
@@ -207,12 +207,12 @@ def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
     return np.array(list(product(*axes))).reshape(count ** len(axes), len(axes))
 
 
-def at_nodes(specimen: ModelContext) -> list[Place]:
+def list_node_locations(context: ModelContext) -> list[Location]:
     """Every node that can move in a direction of the test.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
 
     Returns
@@ -220,26 +220,26 @@ def at_nodes(specimen: ModelContext) -> list[Place]:
     list of Place
         Keys are node and direction.
     """
-    return [Place(key=(dof.node, dof.direction), location={"nodes": [dof.node]}) for dof in specimen.moving_dofs]
+    return [Location(key=(dof.node, dof.direction), entries={"nodes": [dof.node]}) for dof in context.moving_dofs]
 
 
-def beside_node(specimen: ModelContext, place: Place) -> list[Place]:
+def list_neighbouring_nodes(context: ModelContext, location: Location) -> list[Location]:
     """Nodes next to one.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
-    place : Place
-        A place of `at_nodes`.
+    location : Place
+        A place of `list_node_locations`.
 
     Returns
     -------
     list of Place
         The nearest ones.
     """
-    node, direction = place.key
+    node, direction = location.key
     return [
-        Place(key=(other, direction), location={"nodes": [other]})
-        for other in specimen.nodes_near(int(str(node)), str(direction))
+        Location(key=(other, direction), entries={"nodes": [other]})
+        for other in context.nodes_near(int(str(node)), str(direction))
     ]

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Place
+    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.model.change import Change
 
 
-def build_together(specimen: ModelContext, effects: Sequence[tuple[Effect, Place]]) -> tuple[Builder, ...]:
+def build_together(context: ModelContext, effects: Sequence[tuple[Effect, Location]]) -> tuple[Builder, ...]:
     """Prepare effects that act together: where one exchanges the model, the others change the new one.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
     effects : sequence of (Effect, Place)
         What acts, and where.
@@ -29,28 +29,28 @@ def build_together(specimen: ModelContext, effects: Sequence[tuple[Effect, Place
     tuple of Builder
         In the same order.
     """
-    builders = [effect.build(specimen, place) for effect, place in effects]
+    builders = [effect.build(context, location) for effect, location in effects]
     if len(effects) < 2:
         return tuple(builders)
-    for number, ((effect, place), build) in enumerate(zip(effects, builders, strict=True)):
-        model = typical_change(specimen, effect, place, build).model
+    for number, ((effect, location), build) in enumerate(zip(effects, builders, strict=True)):
+        model = typical_change(context, effect, location, build).model
         if model is not None:
-            exchanged = replace(specimen, basis=replace(specimen.basis, model=model))
+            exchanged = replace(context, basis=replace(context.basis, model=model))
             others = build_together(exchanged, [*effects[:number], *effects[number + 1 :]])
             return (*others[:number], build, *others[number:])
     return tuple(builders)
 
 
-def typical_change(specimen: ModelContext, effect: Effect, place: Place, build: Builder) -> Change:
+def typical_change(context: ModelContext, effect: Effect, location: Location, build: Builder) -> Change:
     """Give what an effect changes at typical values of its parameters.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
     effect : Effect
         What acts.
-    place : Place
+    location : Place
         Where.
     build : Builder
         Of the effect there.
@@ -60,4 +60,4 @@ def typical_change(specimen: ModelContext, effect: Effect, place: Place, build: 
     Change
         Only its places matter.
     """
-    return build(np.array([parameter.typical for parameter in effect.parameters(specimen, place)]))
+    return build(np.array([parameter.typical for parameter in effect.parameters(context, location)]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.model.layout import Layout, extents
+from frf_ipz.diagnosis.model.layout import Layout, measure_extents
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
@@ -84,11 +84,11 @@ class ModelContext:
 
     def stiffness_against(self, motion: FloatArray) -> float:
         """Stiffness of the structure against a motion by the elastic modes near the band, N/m."""
-        shapes = motion @ self.basis.loaded
+        shapes = motion @ self.basis.loaded_shapes
         squares = self.basis.modes.eigenvalues[: len(shapes)]
         elastic = squares > 0
         compliance = float(np.sum(shapes[elastic] ** 2 / squares[elastic]))
-        largest = float(np.max(np.sum(self.basis.loaded[:, elastic] ** 2 / squares[elastic], axis=1)))
+        largest = float(np.max(np.sum(self.basis.loaded_shapes[:, elastic] ** 2 / squares[elastic], axis=1)))
         return 1.0 / max(compliance, 1e-6 * largest)
 
     def nodes_near(self, node: int, direction: str, furthest: int = 2) -> list[int]:
@@ -105,9 +105,9 @@ class ModelContext:
         """Say where a node is: its number, and its place on structures that have places."""
         if self.model.kind == "lumped" or node not in self.positions:
             return f"node {node}"
-        span = extents(self.model)
-        place = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
-        return f"node {node} ({place})"
+        span = measure_extents(self.model)
+        location = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
+        return f"node {node} ({location})"
 
     def _distance(self, node: int, here: FloatArray) -> float:
         return float(np.linalg.norm(self.positions[node] - here))

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.compare import mass_loss
-from frf_ipz.diagnosis.compare.learnt_nuisance import error_of_change, learn, nominal_after
+from frf_ipz.diagnosis.compare.learnt_nuisance import estimate_change_error, learn, predict_unchanged_model
 from frf_ipz.diagnosis.compare.states import CompareOptions, State
-from frf_ipz.diagnosis.compare.unexplained_change import trusted
+from frf_ipz.diagnosis.compare.unexplained_change import discount_unexplained
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.verdict.decision import CONSISTENT
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.compare.learnt_nuisance import Learned
+    from frf_ipz.diagnosis.compare.learnt_nuisance import LearntNuisance
     from frf_ipz.diagnosis.result import Finding
     from frf_ipz.progress import Progress
 
@@ -103,12 +103,12 @@ def compare(
     return judge(learn(states, chosen), after, chosen, progress=progress)
 
 
-def judge(learned: Learned, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
+def judge(learned: LearntNuisance, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
     """Judge a state by what the states before taught: for many states after the same ones.
 
     Parameters
     ----------
-    learned : Learned
+    learned : LearntNuisance
         From `learn`.
     after : State
         The machine to be judged.
@@ -122,11 +122,11 @@ def judge(learned: Learned, after: State, options: CompareOptions, *, progress: 
     Comparison
         What changed.
     """
-    observed = trusted(after.observed, learned.gains, learned.missed)
+    observed = discount_unexplained(after.observed, learned.gains, learned.missed)
     source = split_data(observed)
     nominal = replace(after, observed=observed)
-    expected = nominal_after(nominal, learned, options, source)
-    error = error_of_change(replace(nominal, model=expected), source, learned, options)
+    expected = predict_unchanged_model(nominal, learned, options, source)
+    error = estimate_change_error(replace(nominal, model=expected), source, learned, options)
     scatter = replace(
         learned.scatter,
         stiffness_tolerance=float(np.hypot(learned.scatter.stiffness_tolerance, error)),

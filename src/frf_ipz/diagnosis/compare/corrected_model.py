@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 LEAST_SQUARE = 0.01  # of the model's: a mode below the band is pulled wherever lines above it want, but stays stable
 
 
-def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
+def correct_model(hypothesis: Hypothesis, nuisance: FloatArray) -> StructuralModel:
     """Put what was fitted within tolerances into a model.
 
     Parameters
     ----------
     hypothesis : Hypothesis
         Nothing is missing: no causes.
-    unknown : (n_nuisance,) array
+    nuisance : (n_nuisance,) array
         What was fitted, in standard deviations. Scatter of stiffness, mass and damping is used; places and gains
         belong to the test, and cords to the way it was hung.
 
@@ -40,11 +40,11 @@ def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     StructuralModel
         With the fitted modes; one below the band whose stiffness would be negative gets little of it.
     """
-    values = unknown.copy()
-    sizes = hypothesis.nuisance.sizes
+    values = nuisance.copy()
+    sizes = hypothesis.nuisance_prior.sizes
     values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # cords
     modes = hypothesis.modes(np.zeros(0), values)
-    model, m = hypothesis.specimen.model, hypothesis.nuisance.n_modes
+    model, m = hypothesis.context.model, hypothesis.nuisance_prior.n_modes
     plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)
     momentum = multiply(model.mass_all, hypothesis.basis.vectors @ plain)
     momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
@@ -54,13 +54,13 @@ def as_fitted(hypothesis: Hypothesis, unknown: FloatArray) -> StructuralModel:
     stiffness = back.T @ np.diag(squares) @ back - np.diag(modes.omega[:m] ** 2)
     return replace(
         model,
-        mass_all=_with(model.mass_all, momentum, mass),
-        stiffness_all=_with(model.stiffness_all, momentum, stiffness),
-        modal_damping=_damping(model, modes, hypothesis.nuisance.n_rigid, m),
+        mass_all=_add_block(model.mass_all, momentum, mass),
+        stiffness_all=_add_block(model.stiffness_all, momentum, stiffness),
+        modal_damping=_damping(model, modes, hypothesis.nuisance_prior.n_rigid, m),
     )
 
 
-def _with(matrix: Matrix, momentum: FloatArray, block: FloatArray) -> Matrix:
+def _add_block(matrix: Matrix, momentum: FloatArray, block: FloatArray) -> Matrix:
     added = momentum @ ((block + block.T) / 2) @ momentum.T
     return sparse.csr_array(matrix + sparse.csr_array((added + added.T) / 2))
 

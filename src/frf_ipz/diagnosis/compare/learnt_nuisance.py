@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.diagnosis.compare.corrected_model import as_fitted
+from frf_ipz.diagnosis.compare.corrected_model import correct_model
 from frf_ipz.diagnosis.compare.states import State
-from frf_ipz.diagnosis.compare.unexplained_change import Missed, missed_by, trusted
-from frf_ipz.diagnosis.evidence.inference_problem import set_up, with_errors
-from frf_ipz.diagnosis.evidence.map_fit import polish
+from frf_ipz.diagnosis.compare.unexplained_change import UnexplainedPart, discount_unexplained, find_unexplained_part
+from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
+from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.measured.data_split import DataSplit, split_data
-from frf_ipz.diagnosis.search.component_search import fit_nothing
-from frf_ipz.diagnosis.verdict.goodness import goodness
+from frf_ipz.diagnosis.search.component_search import fit_null_model
+from frf_ipz.diagnosis.verdict.goodness import assess_goodness
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ MOST_START = 1.5  # standard deviations of a damping ratio
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Learned:
+class LearntNuisance:
     """What the states before teach.
 
     Parameters
@@ -54,17 +54,17 @@ class Learned:
         Of the channels, as factors.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed.
-    missed : Missed, optional
+    missed : UnexplainedPart, optional
         What the model cannot follow whatever is corrected; None where it follows all within `options.scatter`.
     """
 
     correction: FloatArray
     gains: Mapping[str, float]
     scatter: DiagnoseOptions
-    missed: Missed | None
+    missed: UnexplainedPart | None
 
 
-def learn(before: Sequence[State], options: CompareOptions) -> Learned:
+def learn(before: Sequence[State], options: CompareOptions) -> LearntNuisance:
     """Fit the states before, and see how far apart they are.
 
     Parameters
@@ -76,8 +76,8 @@ def learn(before: Sequence[State], options: CompareOptions) -> Learned:
 
     Returns
     -------
-    Learned
-        For `nominal_after`.
+    LearntNuisance
+        For `predict_unchanged_model`.
 
     Raises
     ------
@@ -88,40 +88,42 @@ def learn(before: Sequence[State], options: CompareOptions) -> Learned:
         raise InputError("there is no state before to compare with; give at least one")
     sources = [split_data(state.observed) for state in before]
     fits, errors = _fits(list(zip(before, sources, strict=True)), options)
-    if len({fit.hypothesis.specimen.layout.channels for fit in fits}) > 1:
+    if len({fit.hypothesis.context.layout.channels for fit in fits}) > 1:
         raise InputError("the states to compare were measured with different channels; give FRFs of the same labels")
-    if len({len(fit.unknown) for fit in fits}) > 1:
+    if len({len(fit.nuisance) for fit in fits}) > 1:
         raise InputError("the models of the states have different numbers of modes in the band; narrow the band")
-    corrections = np.array([fit.unknown * signs_of(fit) for fit in fits])
-    gains = np.array([fit.hypothesis.nuisance.unpack(fit.unknown).gains for fit in fits])
-    by_channel = dict(zip(fits[0].hypothesis.specimen.layout.channels, np.exp(np.median(gains, 0)), strict=True))
-    learned = Learned(
+    corrections = np.array([fit.nuisance * mode_signs(fit) for fit in fits])
+    gains = np.array([fit.hypothesis.nuisance_prior.unpack(fit.nuisance).gains for fit in fits])
+    by_channel = dict(zip(fits[0].hypothesis.context.layout.channels, np.exp(np.median(gains, 0)), strict=True))
+    learned = LearntNuisance(
         correction=np.median(corrections, 0),
         gains=by_channel,
         scatter=_scatter(fits, options.scatter),
-        missed=None if errors == options.scatter else missed_by([state.observed.frfs for state in before], fits),
+        missed=None
+        if errors == options.scatter
+        else find_unexplained_part([state.observed.frfs for state in before], fits),
     )
-    return _widened(before, sources, learned, options)
+    return _widen_tolerance(before, sources, learned, options)
 
 
 def _fits(before: Sequence[tuple[State, DataSplit]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
     """Fit the models, as closely as nearly all of them can follow what was measured."""
     errors = options.scatter
     while True:
-        benches = [bench_of(state, source, options.model, errors) for state, source in before]
-        fits = [fit_from_peaks(bench, source) for bench, (_, source) in zip(benches, before, strict=True)]
-        good = [goodness(bench, fit).is_good for bench, fit in zip(benches, fits, strict=True)]
-        if np.mean(good) >= ENOUGH_STATES or errors.stiffness_tolerance > MOST_ERROR:
+        problems = [pose_state_problem(state, source, options.model, errors) for state, source in before]
+        fits = [fit_from_peaks(problem, source) for problem, (_, source) in zip(problems, before, strict=True)]
+        are_good = [assess_goodness(problem, fit).is_good for problem, fit in zip(problems, fits, strict=True)]
+        if np.mean(are_good) >= ENOUGH_STATES or errors.stiffness_tolerance > MOST_ERROR:
             return fits, errors
         errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
 
 
-def fit_from_peaks(bench: InferenceProblem, source: DataSplit) -> Fit:
+def fit_from_peaks(problem: InferenceProblem, source: DataSplit) -> Fit:
     """Fit the model from the frequencies and damping that peaks of the measurement show: a model may be far off.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         To fit the model.
     source : DataSplit
         What was measured.
@@ -131,24 +133,24 @@ def fit_from_peaks(bench: InferenceProblem, source: DataSplit) -> Fit:
     Fit
         The better one of the fits from there and from the model as it is.
     """
-    nothing, nuisance, peaks = bench.suppose(()), bench.nuisance, source.survey.resonances
-    modes = nothing.modes(np.zeros(0), np.zeros(nuisance.size))
-    start = np.zeros(nuisance.size)
-    for mode in range(nuisance.n_rigid, nuisance.n_modes):
+    nothing, nuisance_prior, peaks = problem.make_hypothesis(()), problem.nuisance_prior, source.survey.resonances
+    modes = nothing.modes(np.zeros(0), np.zeros(nuisance_prior.size))
+    start = np.zeros(nuisance_prior.size)
+    for mode in range(nuisance_prior.n_rigid, nuisance_prior.n_modes):
         apart = np.abs(np.log(peaks.omega_rad_s / modes.omega[mode]))
-        reach = NEAR_A_PEAK * nuisance.kappa_std[mode, mode] / 2
+        reach = NEAR_A_PEAK * nuisance_prior.kappa_std[mode, mode] / 2
         if apart.size and apart.min() < reach:
             found = int(np.argmin(apart))
             off = (peaks.omega_rad_s[found] / modes.omega[mode]) ** 2 - 1
-            start[nuisance.frequency_places[mode]] = off / nuisance.kappa_std[mode, mode]
+            start[nuisance_prior.frequency_indices[mode]] = off / nuisance_prior.kappa_std[mode, mode]
             ratio = peaks.decay_1_s[found] / peaks.omega_rad_s[found] / max(modes.stated_ratio[mode], 1e-9) - 1
-            damping = nuisance.damping_std[mode]
-            start[nuisance.damping_places[mode]] = np.clip(ratio / damping, -MOST_START, MOST_START)
-    fits = [polish(nothing, bench.data, np.zeros(0), unknown=start, iterations=30), fit_nothing(bench)]
+            damping = nuisance_prior.damping_std[mode]
+            start[nuisance_prior.damping_indices[mode]] = np.clip(ratio / damping, -MOST_START, MOST_START)
+    fits = [fit_map(nothing, problem.data, np.zeros(0), nuisance=start, iterations=30), fit_null_model(problem)]
     return min(fits, key=lambda fit: fit.cost)
 
 
-def bench_of(
+def pose_state_problem(
     state: State, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
 ) -> InferenceProblem:
     """Bring a state's model and measurement together, with no effects to look for.
@@ -171,20 +173,22 @@ def bench_of(
     """
     frfs = state.observed.frfs
     scale = "none" if frfs is None else frfs.unknown_scale
-    bench = set_up(state.model, source, state.observed.band_hz, options, {}, free_gains=scale)
+    problem = pose_problem(state.model, source, state.observed.band_hz, options, {}, free_gains=scale)
     if errors is None:
-        return bench
-    return replace(bench, data=with_errors(source.training, errors, free_gains=scale))
+        return problem
+    return replace(problem, data=make_data(source.training, errors, free_gains=scale))
 
 
-def nominal_after(state: State, learned: Learned, options: CompareOptions, source: DataSplit) -> StructuralModel:
+def predict_unchanged_model(
+    state: State, learned: LearntNuisance, options: CompareOptions, source: DataSplit
+) -> StructuralModel:
     """Give the model that a state would show if nothing had changed.
 
     Parameters
     ----------
     state : State
         With a model of the same modes as the states before.
-    learned : Learned
+    learned : LearntNuisance
         From them.
     options : CompareOptions
         As for `learn`.
@@ -196,16 +200,20 @@ def nominal_after(state: State, learned: Learned, options: CompareOptions, sourc
     StructuralModel
         Its model, corrected.
     """
-    bench = bench_of(state, source, options.model)
-    nothing = bench.suppose(())
-    at_rest = np.zeros(bench.nuisance.size)
+    problem = pose_state_problem(state, source, options.model)
+    nothing = problem.make_hypothesis(())
+    at_rest = np.zeros(problem.nuisance_prior.size)
     if len(at_rest) != len(learned.correction):
         raise InputError("the state after has other channels or another number of modes in the band than those before")
-    signs = _signs(nothing.modes(np.zeros(0), at_rest), bench.nuisance.n_modes, nothing.nuisance.pairs, len(at_rest))
-    return as_fitted(nothing, learned.correction * signs)
+    signs = _signs(
+        nothing.modes(np.zeros(0), at_rest), problem.nuisance_prior.n_modes, nothing.nuisance_prior.pairs, len(at_rest)
+    )
+    return correct_model(nothing, learned.correction * signs)
 
 
-def error_of_change(corrected: State, source: DataSplit, learned: Learned, options: CompareOptions) -> float:
+def estimate_change_error(
+    corrected: State, source: DataSplit, learned: LearntNuisance, options: CompareOptions
+) -> float:
     """Estimate how wrong the model's answer to a change may be: its corrections are those of the states before.
 
     Parameters
@@ -214,7 +222,7 @@ def error_of_change(corrected: State, source: DataSplit, learned: Learned, optio
         The state after, with its corrected model.
     source : DataSplit
         What was measured in it.
-    learned : Learned
+    learned : LearntNuisance
         From the states before.
     options : CompareOptions
         As for `learn`.
@@ -224,30 +232,32 @@ def error_of_change(corrected: State, source: DataSplit, learned: Learned, optio
     float
         Largest relative change of a frequency in the band, times what the model may be wrong by.
     """
-    fit = fit_from_peaks(bench_of(corrected, source, options.model, learned.scatter), source)
-    change = _shift(fit.hypothesis, fit.unknown)
+    fit = fit_from_peaks(pose_state_problem(corrected, source, options.model, learned.scatter), source)
+    change = _frequency_change(fit.hypothesis, fit.nuisance)
     return options.model.stiffness_tolerance * float(np.abs(change).max(initial=0.0))
 
 
-def _shift(hypothesis: Hypothesis, unknown: FloatArray) -> FloatArray:
+def _frequency_change(hypothesis: Hypothesis, nuisance: FloatArray) -> FloatArray:
     """Relative change of the elastic frequencies in the band by what was fitted."""
-    nuisance = hypothesis.nuisance
-    modes = hypothesis.modes(np.zeros(0), unknown)
-    squares, omega = (values[nuisance.n_rigid : nuisance.n_modes] for values in (modes.squares, modes.omega))
+    nuisance_prior = hypothesis.nuisance_prior
+    modes = hypothesis.modes(np.zeros(0), nuisance)
+    squares, omega = (
+        values[nuisance_prior.n_rigid : nuisance_prior.n_modes] for values in (modes.squares, modes.omega)
+    )
     inside = _in_band(hypothesis)
     return np.asarray(np.sqrt(np.abs(squares[inside])) / omega[inside] - 1)
 
 
 def _in_band(hypothesis: Hypothesis) -> BoolArray:
     """Tell which elastic modes lie in the band: nothing is known of others."""
-    nuisance = hypothesis.nuisance
-    modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance.size))
-    frequency = modes.omega[nuisance.n_rigid : nuisance.n_modes] / (2 * np.pi)
-    low, high = hypothesis.specimen.band_hz
+    nuisance_prior = hypothesis.nuisance_prior
+    modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance_prior.size))
+    frequency = modes.omega[nuisance_prior.n_rigid : nuisance_prior.n_modes] / (2 * np.pi)
+    low, high = hypothesis.context.band_hz
     return np.asarray((frequency > low) & (frequency < high))
 
 
-def signs_of(fit: Fit) -> FloatArray:
+def mode_signs(fit: Fit) -> FloatArray:
     """Signs of what acts between two modes, which have none of their own: those of the shapes at the first sensor.
 
     Parameters
@@ -260,9 +270,9 @@ def signs_of(fit: Fit) -> FloatArray:
     (n_nuisance,) array
         1 or -1.
     """
-    nuisance = fit.hypothesis.nuisance
-    modes = fit.hypothesis.modes(fit.values, np.zeros(nuisance.size))
-    return _signs(modes, nuisance.n_modes, nuisance.pairs, nuisance.size)
+    nuisance_prior = fit.hypothesis.nuisance_prior
+    modes = fit.hypothesis.modes(fit.values, np.zeros(nuisance_prior.size))
+    return _signs(modes, nuisance_prior.n_modes, nuisance_prior.pairs, nuisance_prior.size)
 
 
 def _signs(modes: Modes, n_modes: int, pairs: tuple[IntArray, IntArray], size: int) -> FloatArray:
@@ -277,22 +287,22 @@ def _scatter(fits: Sequence[Fit], least: DiagnoseOptions) -> DiagnoseOptions:
     n = len(fits)
     if n < ENOUGH_REPEATS:
         return least
-    frequency = np.array([_shift(fit.hypothesis, fit.unknown) for fit in fits])
-    unknowns = [fit.hypothesis.nuisance.unpack(fit.unknown) for fit in fits]
-    elastic = slice(fits[0].hypothesis.nuisance.n_rigid, None)
+    frequency = np.array([_frequency_change(fit.hypothesis, fit.nuisance) for fit in fits])
+    nuisance_values = [fit.hypothesis.nuisance_prior.unpack(fit.nuisance) for fit in fits]
+    elastic = slice(fits[0].hypothesis.nuisance_prior.n_rigid, None)
     inside = _in_band(fits[0].hypothesis)
-    damping = np.array([np.log1p(unknown.damping)[elastic][inside] for unknown in unknowns])
-    gains = np.array([unknown.gains for unknown in unknowns])
+    damping = np.array([np.log1p(nuisance.damping)[elastic][inside] for nuisance in nuisance_values])
+    gains = np.array([nuisance.gains for nuisance in nuisance_values])
     wider = HALF_WIDTH * np.sqrt(1 + 1 / n)  # the mean that they are compared with is not exact either
     return replace(
         least,
-        frequency_tolerance=max(least.frequency_tolerance, wider * _rms(frequency)),
-        damping_tolerance=max(least.damping_tolerance, wider * _rms(damping)),
-        gain_tolerance=max(least.gain_tolerance, wider * _rms(gains)),
+        frequency_tolerance=max(least.frequency_tolerance, wider * _std_over_states(frequency)),
+        damping_tolerance=max(least.damping_tolerance, wider * _std_over_states(damping)),
+        gain_tolerance=max(least.gain_tolerance, wider * _std_over_states(gains)),
     )
 
 
-def _rms(values: FloatArray) -> float:
+def _std_over_states(values: FloatArray) -> float:
     """Give the standard deviation over states, of all columns together; by the median, for a state may be a bad one."""
     n, columns = values.shape
     if not columns:
@@ -303,27 +313,27 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(apart, 0)) ** 2)))
 
 
-def _widened(
-    before: Sequence[State], sources: Sequence[DataSplit], learned: Learned, options: CompareOptions
-) -> Learned:
+def _widen_tolerance(
+    before: Sequence[State], sources: Sequence[DataSplit], learned: LearntNuisance, options: CompareOptions
+) -> LearntNuisance:
     """Widen the tolerance of the model until nothing has changed in the states before, by the rules for those after."""
     nominals = [
         State(
-            model=nominal_after(state, learned, options, source),
-            observed=trusted(state.observed, learned.gains, learned.missed),
+            model=predict_unchanged_model(state, learned, options, source),
+            observed=discount_unexplained(state.observed, learned.gains, learned.missed),
         )
         for state, source in zip(before, sources, strict=True)
     ]
     sources = [split_data(state.observed) for state in nominals]
     scatter = learned.scatter
     while scatter.stiffness_tolerance < MOST_TOLERANCE:
-        good = [_is_explained(state, source, scatter) for state, source in zip(nominals, sources, strict=True)]
-        if np.mean(good) >= ENOUGH_STATES:
+        are_explained = [_is_explained(state, source, scatter) for state, source in zip(nominals, sources, strict=True)]
+        if np.mean(are_explained) >= ENOUGH_STATES:
             break
         scatter = replace(scatter, stiffness_tolerance=GROWTH * scatter.stiffness_tolerance)
     return replace(learned, scatter=scatter)
 
 
 def _is_explained(state: State, source: DataSplit, scatter: DiagnoseOptions) -> bool:
-    bench = bench_of(state, source, scatter)
-    return goodness(bench, fit_from_peaks(bench, source)).is_good
+    problem = pose_state_problem(state, source, scatter)
+    return assess_goodness(problem, fit_from_peaks(problem, source)).is_good

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.model.layout import lay_out
+from frf_ipz.diagnosis.model.layout import make_layout
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations
     from frf_ipz.frf import FrfSet
 
-ALIKE = 3.0  # points of a contour that share what a model cannot follow
+SHARING_POINTS = 3.0  # points of a contour that share what a model cannot follow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Missed:
+class UnexplainedPart:
     """What a model cannot follow.
 
     Parameters
@@ -36,7 +36,7 @@ class Missed:
     part: FloatArray
 
 
-def missed_by(measured: Sequence[FrfSet | None], fits: Sequence[Fit]) -> Missed | None:
+def find_unexplained_part(measured: Sequence[FrfSet | None], fits: Sequence[Fit]) -> UnexplainedPart | None:
     """Compare fits line by line with what they were fitted to.
 
     Parameters
@@ -48,26 +48,28 @@ def missed_by(measured: Sequence[FrfSet | None], fits: Sequence[Fit]) -> Missed 
 
     Returns
     -------
-    Missed or None
+    UnexplainedPart or None
         None where there are no FRFs on lines.
     """
     frfs = [one for one in measured if one is not None]
     if len(frfs) < len(fits):
         return None
-    frequency = frfs[0].frequency_hz[frfs[0].in_band(fits[0].hypothesis.specimen.band_hz)]
+    frequency = frfs[0].frequency_hz[frfs[0].in_band(fits[0].hypothesis.context.band_hz)]
     s = np.asarray(2j * np.pi * frequency, np.complex128)
     found = []
     for one, fit in zip(frfs, fits, strict=True):
         values = np.stack([np.interp(frequency, one.frequency_hz, column) for column in one.values.T], axis=1)
-        model = fit.hypothesis.respond(fit.values, fit.unknown, s).values
+        model = fit.hypothesis.respond(fit.values, fit.nuisance, s).values
         size = np.maximum(np.abs(values), np.finfo(float).tiny)
         across, own = np.sum((model.conj() * values).real / size**2, 0), np.sum(np.abs(model) ** 2 / size**2, 0)
         scale = np.ones(one.n_frfs) if one.unknown_scale == "none" else across / own
         found.append(np.abs(values - scale * model) / size)
-    return Missed(frequency_hz=frequency, part=np.median(found, axis=0))
+    return UnexplainedPart(frequency_hz=frequency, part=np.median(found, axis=0))
 
 
-def trusted(observed: Observations, gains: Mapping[str, float], missed: Missed | None) -> Observations:
+def discount_unexplained(
+    observed: Observations, gains: Mapping[str, float], missed: UnexplainedPart | None
+) -> Observations:
     """Take the gains that channels had before out of what was observed, and trust it where the model can follow it.
 
     Parameters
@@ -76,7 +78,7 @@ def trusted(observed: Observations, gains: Mapping[str, float], missed: Missed |
         Of a state.
     gains : mapping of str to float
         Factors by channel.
-    missed : Missed, optional
+    missed : UnexplainedPart, optional
         By the states before.
 
     Returns
@@ -90,7 +92,7 @@ def trusted(observed: Observations, gains: Mapping[str, float], missed: Missed |
         return plain
     part = np.stack([np.interp(frfs.frequency_hz, missed.frequency_hz, column) for column in missed.part.T], axis=1)
     known = np.where(np.isfinite(frfs.variance), frfs.variance, 0.0)
-    variance = known + ALIKE * (part * np.abs(frfs.values)) ** 2
+    variance = known + SHARING_POINTS * (part * np.abs(frfs.values)) ** 2
     return replace(plain, kind="frf", records=(), frfs=replace(frfs, variance=variance))
 
 
@@ -106,7 +108,7 @@ def _without_gains(observed: Observations, gains: Mapping[str, float]) -> Observ
     frfs = observed.frfs
     if frfs is None:
         return replace(observed, records=records)
-    layout = lay_out(frfs.labels)
+    layout = make_layout(frfs.labels)
     factors = np.exp(-layout.gain_signs @ np.log([gains.get(channel, 1.0) for channel in layout.channels]))
     scaled = replace(frfs, values=frfs.values * factors, variance=frfs.variance * factors**2)
     return replace(observed, records=records, frfs=scaled)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 FAR_OFF = 300.0  # mean squared misfit
 NEARLY_RIGHT = 20.0  # the same: small effects are looked for on top of such a fit
-VERY_NEARLY = 2.0  # the same: nothing large can be missing
-SMALL_PULL = 600.0  # and this little is explained by what cannot be known
+NEARLY_ALL = 2.0  # the same: nothing large can be missing
+SMALL_NUISANCE_CHI2 = 600.0  # and this little is explained by what cannot be known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,39 +30,39 @@ class Fit:
         Causes at their places.
     values : (n_parameters,) array
         Physical values of the parameters.
-    unknown : (n_nuisance,) array
+    nuisance : (n_nuisance,) array
         What cannot be known, in standard deviations.
     misfit : float
         Sum of squares of the whitened misfit.
-    pull : float
-        Sum of squares of the pulls of `unknown`.
+    nuisance_chi2 : float
+        Sum of squares of the pulls of `nuisance`.
     log_evidence : float
         nats, up to a constant that all hypotheses share.
     covariance : (n_parameters, n_parameters) array
         Of the parameters as searched (logarithms, parts of ranges).
-    converged : bool
+    has_converged : bool
         The last step was small.
-    freedom : float
-        How many of what cannot be known the data determine: what `pull` is expected to be at most.
+    n_determined : float
+        How many of what cannot be known the data determine: what `nuisance_chi2` is expected to be at most.
     n_values : int
         Real numbers that it was fitted to.
     """
 
     hypothesis: Hypothesis
     values: FloatArray
-    unknown: FloatArray
+    nuisance: FloatArray
     misfit: float
-    pull: float
+    nuisance_chi2: float
     log_evidence: float
     covariance: FloatArray
-    converged: bool
-    freedom: float
+    has_converged: bool
+    n_determined: float
     n_values: int
 
     @property
     def cost(self) -> float:
         """Minus the logarithm of likelihood times prior, up to a constant."""
-        return 0.5 * (self.misfit + self.pull)
+        return 0.5 * (self.misfit + self.nuisance_chi2)
 
     @property
     def mean_misfit(self) -> float:
@@ -70,7 +70,7 @@ class Fit:
         return self.misfit / self.n_values
 
     @property
-    def is_hopeless(self) -> bool:
+    def is_far_off(self) -> bool:
         """So far off that its causes are wrong or some are missing: no time is spent on its places."""
         return self.mean_misfit > FAR_OFF
 
@@ -80,9 +80,9 @@ class Fit:
         return self.mean_misfit < NEARLY_RIGHT
 
     @property
-    def is_nearly_all(self) -> bool:
+    def explains_nearly_all(self) -> bool:
         """Nothing large can be missing beside it."""
-        return self.mean_misfit <= VERY_NEARLY and self.pull <= SMALL_PULL
+        return self.mean_misfit <= NEARLY_ALL and self.nuisance_chi2 <= SMALL_NUISANCE_CHI2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

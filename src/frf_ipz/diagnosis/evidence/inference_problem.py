@@ -12,14 +12,14 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.evidence.fit import Data, Fit
-from frf_ipz.diagnosis.evidence.hypothesis import Cause, Hypothesis, suppose
-from frf_ipz.diagnosis.evidence.map_fit import polish, same_modes
+from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis, make_hypothesis
+from frf_ipz.diagnosis.evidence.map_fit import adopt_modes, fit_map
 from frf_ipz.diagnosis.measured.transfer_functions import Whitening, make_whitening, select_points
 from frf_ipz.diagnosis.model.basis import make_basis
-from frf_ipz.diagnosis.model.change import NOTHING
-from frf_ipz.diagnosis.model.layout import lay_out
-from frf_ipz.diagnosis.model.modes import modify, rows_of, scatter
-from frf_ipz.diagnosis.model.nuisance import make_nuisance
+from frf_ipz.diagnosis.model.change import NO_CHANGE
+from frf_ipz.diagnosis.model.layout import make_layout
+from frf_ipz.diagnosis.model.modes import make_motion_rows, modify_structure, scatter_modes
+from frf_ipz.diagnosis.model.nuisance import make_nuisance_prior
 from frf_ipz.diagnosis.model.response import respond
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.model.basis import Basis
     from frf_ipz.diagnosis.model.layout import Layout
-    from frf_ipz.diagnosis.model.nuisance import Nuisance
+    from frf_ipz.diagnosis.model.nuisance import NuisancePrior
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.structure import StructuralModel
 
@@ -43,9 +43,9 @@ class InferenceProblem:
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
-    nuisance : Nuisance
+    nuisance_prior : Nuisance
         What cannot be known.
     effects : mapping of str to Effect
         What is looked for.
@@ -53,68 +53,80 @@ class InferenceProblem:
         Transfer functions far from the axis, and on the way to it.
     data : Data
         Those near the axis, with their errors.
-    early : Data
+    rough_data : Data
         The same, with larger errors: for first steps.
-    thin : Data
+    sparse_data : Data
         Fewer points near the axis: for a first look at small effects.
     kind : str
         What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     """
 
-    specimen: ModelContext
-    nuisance: Nuisance
+    context: ModelContext
+    nuisance_prior: NuisancePrior
     effects: Mapping[str, Effect]
     coarse: TransferFunctions
     middle: TransferFunctions
     data: Data
-    early: Data
-    thin: Data
+    rough_data: Data
+    sparse_data: Data
     kind: str
 
-    def suppose(self, causes: tuple[Cause, ...], *, exact: bool = True) -> Hypothesis:
+    def make_hypothesis(self, components: tuple[Component, ...], *, exact: bool = True) -> Hypothesis:
         """Make a hypothesis."""
-        return suppose(self.specimen, self.nuisance, causes, exact=exact)
+        return make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
 
-    def fit(self, causes: tuple[Cause, ...], values: FloatArray, *, bar: float = np.inf) -> Fit:
+    def fit(self, components: tuple[Component, ...], values: FloatArray, *, cost_limit: float = np.inf) -> Fit:
         """Fit causes, from values of their parameters; given up where the cost does not come below a bar."""
-        return self.fit_from(self.fit_early(causes, values), bar=bar)
+        return self.fit_exactly(self.fit_roughly(components, values), cost_limit=cost_limit)
 
-    def fit_early(self, causes: tuple[Cause, ...], values: FloatArray, unknown: FloatArray | None = None) -> Fit:
+    def fit_roughly(
+        self, components: tuple[Component, ...], values: FloatArray, nuisance: FloatArray | None = None
+    ) -> Fit:
         """Fit causes with large errors, from values of their parameters, and from some scatter if it is known."""
-        return polish(self.suppose(causes), self.early, values, unknown=unknown, iterations=6, tolerance=1.0)
+        return fit_map(
+            self.make_hypothesis(components), self.rough_data, values, nuisance=nuisance, iterations=6, tolerance=1.0
+        )
 
-    def fit_from(self, fit: Fit, *, bar: float = np.inf) -> Fit:
+    def fit_exactly(self, fit: Fit, *, cost_limit: float = np.inf) -> Fit:
         """Fit exactly, from a fit with large errors; given up where the cost does not come below a bar."""
         freely = replace(self.data, is_bounded=False)  # costs no more than with bounds
-        near = polish(fit.hypothesis, freely, fit.values, unknown=fit.unknown, iterations=16, bar=bar)
-        iterations = 12 if near.cost < bar else 0
-        return polish(fit.hypothesis, self.data, near.values, unknown=near.unknown, iterations=iterations, bar=bar)
+        near = fit_map(fit.hypothesis, freely, fit.values, nuisance=fit.nuisance, iterations=16, cost_limit=cost_limit)
+        iterations = 12 if near.cost < cost_limit else 0
+        return fit_map(
+            fit.hypothesis, self.data, near.values, nuisance=near.nuisance, iterations=iterations, cost_limit=cost_limit
+        )
 
-    def fit_beside(self, hypothesis: Hypothesis, values: FloatArray, base: Fit, *, bar: float = np.inf) -> Fit:
+    def fit_from_base(
+        self, hypothesis: Hypothesis, values: FloatArray, base: Fit, *, cost_limit: float = np.inf
+    ) -> Fit:
         """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies.
 
         It is given up where the cost does not come below a bar.
         """
-        inside, unknown = self.nearest(hypothesis, (values,), base)
-        return polish(hypothesis, self.data, inside, unknown=unknown, iterations=8, tolerance=0.2, bar=bar)
+        inside, nuisance = self.nearest_start(hypothesis, (values,), base)
+        return fit_map(
+            hypothesis, self.data, inside, nuisance=nuisance, iterations=8, tolerance=0.2, cost_limit=cost_limit
+        )
 
-    def nearest(self, hypothesis: Hypothesis, starts: Sequence[FloatArray], fit: Fit) -> tuple[FloatArray, FloatArray]:
+    def nearest_start(
+        self, hypothesis: Hypothesis, starts: Sequence[FloatArray], fit: Fit
+    ) -> tuple[FloatArray, FloatArray]:
         """Choose the start that is nearest to the data, with the scatter of a fit or with its frequencies."""
-        inside = [hypothesis.physical(hypothesis.start_at(values)) for values in starts]
-        both = [(at, unknown) for at in inside for unknown in (fit.unknown, same_modes(hypothesis, at, fit))]
+        inside = [hypothesis.to_physical(hypothesis.clip_to_searched(values)) for values in starts]
+        both = [(at, nuisance) for at in inside for nuisance in (fit.nuisance, adopt_modes(hypothesis, at, fit))]
         return min(both, key=lambda start: self._cost(hypothesis, *start))
 
-    def _cost(self, hypothesis: Hypothesis, values: FloatArray, unknown: FloatArray) -> float:
-        white = self.data.misfit(hypothesis.respond(values, unknown, self.data.measured.s))
-        pulls, _ = self.nuisance.pulls(unknown)
-        return float(white @ white + pulls @ pulls)
+    def _cost(self, hypothesis: Hypothesis, values: FloatArray, nuisance: FloatArray) -> float:
+        white = self.data.misfit(hypothesis.respond(values, nuisance, self.data.measured.s))
+        whitened_nuisance, _ = self.nuisance_prior.whiten(nuisance)
+        return float(white @ white + whitened_nuisance @ whitened_nuisance)
 
-    def go_on(self, fit: Fit) -> Fit:
+    def fit_to_convergence(self, fit: Fit) -> Fit:
         """Go on with a fit that has not converged."""
-        return polish(fit.hypothesis, self.data, fit.values, unknown=fit.unknown, iterations=LAST_STEPS)
+        return fit_map(fit.hypothesis, self.data, fit.values, nuisance=fit.nuisance, iterations=LAST_STEPS)
 
 
-def weights_of(measured: TransferFunctions, error: float) -> FloatArray:
+def compute_weights(measured: TransferFunctions, error: float) -> FloatArray:
     """Weigh squared misfits, line by line.
 
     Parameters
@@ -133,7 +145,7 @@ def weights_of(measured: TransferFunctions, error: float) -> FloatArray:
     return np.asarray(1 / ((error * measured.size) ** 2 + noise))
 
 
-def set_up(
+def pose_problem(
     model: StructuralModel,
     source: DataSplit,
     band_hz: tuple[float, float],
@@ -169,32 +181,32 @@ def set_up(
     InputError
         If the model lacks a DOF that was measured.
     """
-    layout = lay_out(source.training.labels)
-    places = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
-    basis = make_basis(model, 2 * np.pi * band_hz[1], places)
-    nuisance = make_nuisance(basis, layout, options)
+    layout = make_layout(source.training.labels)
+    measured_rows = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
+    basis = make_basis(model, 2 * np.pi * band_hz[1], measured_rows)
+    nuisance_prior = make_nuisance_prior(basis, layout, options)
     coarse, middle = source.coarse, source.middle
     if free_gains != "none":
-        coarse, middle = (_scaled(one, basis, layout, nuisance, free_gains) for one in (coarse, middle))
+        coarse, middle = (_scale_to_nominal(one, basis, layout, nuisance_prior, free_gains) for one in (coarse, middle))
     n_points = len(source.training.s)
     half = select_points(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
     few = select_points(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
-    specimen = ModelContext(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
-    early = with_errors(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
+    context = ModelContext(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
+    rough = make_data(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
     return InferenceProblem(
-        specimen=specimen,
-        nuisance=nuisance,
+        context=context,
+        nuisance_prior=nuisance_prior,
         effects=effects,
         coarse=coarse,
         middle=middle,
-        data=with_errors(source.training, options, free_gains=free_gains),
-        early=replace(early, is_bounded=False),
-        thin=with_errors(few, options, free_gains=free_gains),
+        data=make_data(source.training, options, free_gains=free_gains),
+        rough_data=replace(rough, is_bounded=False),
+        sparse_data=make_data(few, options, free_gains=free_gains),
         kind=source.kind,
     )
 
 
-def with_errors(
+def make_data(
     measured: TransferFunctions, options: DiagnoseOptions, *, free_gains: str = "none", floor: float = 1.0
 ) -> Data:
     """Put tolerances beside measurements.
@@ -206,7 +218,7 @@ def with_errors(
     options : DiagnoseOptions
         Tolerances.
     free_gains : str
-        As for `set_up`.
+        As for `pose_problem`.
     floor : float
         Factor of the model's errors.
 
@@ -223,13 +235,18 @@ def with_errors(
     return Data(measured=measured, whitening=whitening, free_gains=free_gains)
 
 
-def _scaled(
-    measured: TransferFunctions, basis: Basis, layout: Layout, nuisance: Nuisance, free_gains: str
+def _scale_to_nominal(
+    measured: TransferFunctions, basis: Basis, layout: Layout, nuisance_prior: NuisancePrior, free_gains: str
 ) -> TransferFunctions:
     """Bring measured FRFs of unknown scale to the scale of the nominal model."""
-    unknowns = nuisance.unpack(np.zeros(nuisance.size))
-    modes = scatter(basis, modify(basis, NOTHING), rows_of(basis, layout, NOTHING, nuisance), unknowns)
-    nominal = respond(modes, NOTHING, layout, unknowns, measured.s, basis)
+    nuisance_values = nuisance_prior.unpack(np.zeros(nuisance_prior.size))
+    modes = scatter_modes(
+        basis,
+        modify_structure(basis, NO_CHANGE),
+        make_motion_rows(basis, layout, NO_CHANGE, nuisance_prior),
+        nuisance_values,
+    )
+    nominal = respond(modes, NO_CHANGE, layout, nuisance_values, measured.s, basis)
     whitening = Whitening(factors=np.zeros((0, 0, 0), complex), blocks=())
     gains = Data(measured=measured, whitening=whitening, free_gains=free_gains).gains(nominal)
     size = np.abs(gains)

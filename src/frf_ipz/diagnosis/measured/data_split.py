@@ -81,7 +81,7 @@ def split_data(observations: Observations) -> DataSplit:
     InputError
         If there are neither records nor FRFs, or nothing of the band remains.
     """
-    if not observations.are_from_rest or _has_sweeps(observations):
+    if not observations.start_at_rest or _has_sweeps(observations):
         return _split_frfs(observations)
     held_out = _records_to_hold_out(observations)
     names = {record.name for record in held_out}
@@ -116,7 +116,7 @@ def _records_to_hold_out(observations: Observations) -> tuple[ObservedRecord, ..
     """Give the second strongest impact of each group, if all groups have enough of them."""
     groups: dict[tuple[object, ...], list[ObservedRecord]] = {}
     for dof in observations.input_dofs:
-        for record in observations.at(dof):
+        for record in observations.records_at(dof):
             key = (record.input_dof, *((sensor.channel, sensor.dof) for sensor in record.sensors))
             groups.setdefault(key, []).append(record)
     if observations.kind != "hammer" or min(len(group) for group in groups.values()) < MIN_RECORDS:

@@ -22,7 +22,7 @@ from frf_ipz.diagnosis.measured.forces import (
 from frf_ipz.diagnosis.measured.group_spectra import GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
 from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
-from frf_ipz.diagnosis.observations import Observations, ObservedRecord, spectra
+from frf_ipz.diagnosis.observations import Observations, ObservedRecord, transform_records
 from frf_ipz.frf import FrfLabel
 
 WINDOW_DECAYS = 8.0  # of the window within a record: 3e-4 of a mode remains at its end
@@ -319,7 +319,7 @@ def _dc_offset_error(points: GroupSpectra, group: tuple[ObservedRecord, ...], co
     """Error of an FRF, (n_points,), by one standard deviation of a channel's remaining dc offset."""
     durations = np.array([record.duration_s for record in group])
     units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
-    stds = np.array([0.0 if record.constant_std is None else record.constant_std[column] for record in group])
+    stds = np.array([0.0 if record.dc_offset_std is None else record.dc_offset_std[column] for record in group])
     return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
 
 
@@ -347,7 +347,7 @@ def _truncated_motion(
     """
     decay = WINDOW_DECAYS / _duration_s(group)
     backwards = [replace(record, force=record.force[::-1], responses=record.responses[:, ::-1]) for record in group]
-    pairs = spectra(backwards, np.asarray(decay + 1j * resonances.omega_rad_s, np.complex128))
+    pairs = transform_records(backwards, np.asarray(decay + 1j * resonances.omega_rad_s, np.complex128))
     poles = -resonances.decay_1_s + 1j * resonances.omega_rad_s
     ends = np.exp(-np.outer(points.s, [record.duration_s for record in group]))
     return ends[:, :, None] / (points.s[:, None, None] - poles), decay * np.abs([response for _, response in pairs])
@@ -368,7 +368,7 @@ def _bias_factor(survey: RecordSurvey, index: int, points: GroupSpectra) -> Floa
 
 
 def _transform_to(group: tuple[ObservedRecord, ...], s: ComplexArray) -> GroupSpectra:
-    pairs = spectra(group, s)
+    pairs = transform_records(group, s)
     return GroupSpectra(
         s=s,
         force=np.stack([force for force, _ in pairs], 1),

@@ -105,7 +105,7 @@ def group_records(observations: Observations) -> tuple[tuple[ObservedRecord, ...
     return tuple(
         tuple(
             record
-            for record in observations.at(key[0])
+            for record in observations.records_at(key[0])
             if tuple((sensor.channel, sensor.dof) for sensor in record.sensors) == key[1]
         )
         for key in keys

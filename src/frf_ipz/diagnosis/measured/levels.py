@@ -144,7 +144,9 @@ def _compare_halves(group: Sequence[ObservedRecord], spectra: Sequence[ComplexAr
 def _records_by_level(observations: Observations) -> Iterator[tuple[ObservedRecord, ...]]:
     """Group records of several levels with one excited point and the same sensors, the strongest first."""
     for dof in observations.input_dofs:
-        records = [record for record in observations.at(dof) if record.rested or observations.kind != "hammer"]
+        records = [
+            record for record in observations.records_at(dof) if record.starts_at_rest or observations.kind != "hammer"
+        ]
         for labels in dict.fromkeys(tuple(_labels(record)) for record in records):
             group = tuple(record for record in records if tuple(_labels(record)) == labels)
             if len(group) >= MIN_RECORDS and group[0].level > MIN_LEVEL_RATIO * group[-1].level:

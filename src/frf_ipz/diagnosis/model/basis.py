@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.structure import Matrix, StructuralModel
 
-BEYOND = 4.0  # times the highest frequency: modes that are kept
-LEAST_MODES = 12
+MODES_UP_TO = 4.0  # times the highest frequency: modes that are kept
+MIN_MODES = 12
 INDEPENDENT = 1e-8  # of a vector: what is left of it beside the basis
-ALIKE = 1e-12  # of the sum of squares: new shapes that are combinations of others
+DEPENDENT = 1e-12  # of the sum of squares: new shapes that are combinations of others
 LOADED_MODES = 1.5  # times the highest frequency: modes whose loads by an effect get a static shape
 
 
@@ -50,7 +50,7 @@ class Basis:
         Of the nominal model; damping is the viscous one of its matrix.
     highest_rad_s : float
         Top of the band.
-    places : tuple of int
+    measured_rows : tuple of int
         Rows of all DOFs where sensors and blows are.
     """
 
@@ -60,13 +60,13 @@ class Basis:
     stiffness: FloatArray
     damping: FloatArray
     highest_rad_s: float
-    places: tuple[int, ...]
+    measured_rows: tuple[int, ...]
 
     @property
-    def loaded(self) -> FloatArray:
+    def loaded_shapes(self) -> FloatArray:
         """Shapes of the modes near the band, at all DOFs, (n_all, m) array."""
         count = max(int(np.count_nonzero(np.sqrt(self.modes.eigenvalues) <= LOADED_MODES * self.highest_rad_s)), 1)
-        return _everywhere(self.model, self.modes.shapes[:, :count])
+        return _to_all_dofs(self.model, self.modes.shapes[:, :count])
 
     def project(self, matrix: Matrix) -> FloatArray:
         """Bring a matrix of all DOFs into these coordinates.
@@ -84,7 +84,7 @@ class Basis:
         return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
 
 
-def make_basis(model: StructuralModel, highest_rad_s: float, places: Sequence[int]) -> Basis:
+def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequence[int]) -> Basis:
     """Find the modes of a model, and the static shapes of its sensors and blows.
 
     Parameters
@@ -93,7 +93,7 @@ def make_basis(model: StructuralModel, highest_rad_s: float, places: Sequence[in
         The nominal model.
     highest_rad_s : float
         Top of the band.
-    places : sequence of int
+    measured_rows : sequence of int
         Rows of all DOFs where sensors and blows are.
 
     Returns
@@ -102,31 +102,31 @@ def make_basis(model: StructuralModel, highest_rad_s: float, places: Sequence[in
         For the nominal model.
     """
     order = int(np.count_nonzero(~model.fixed))
-    modes = solve_basis(model) if order < DENSE_ORDER else _large(model, highest_rad_s)
-    low = max(int(np.count_nonzero(np.sqrt(modes.eigenvalues) <= BEYOND * highest_rad_s)), min(LEAST_MODES, order))
+    modes = solve_basis(model) if order < DENSE_ORDER else _solve_lowest_modes(model, highest_rad_s)
+    low = max(int(np.count_nonzero(np.sqrt(modes.eigenvalues) <= MODES_UP_TO * highest_rad_s)), min(MIN_MODES, order))
     start = modes.first(low)
-    loads = np.zeros((len(model.all_dofs), len(places)))
-    loads[list(places), np.arange(len(places))] = 1.0
+    loads = np.zeros((len(model.all_dofs), len(measured_rows)))
+    loads[list(measured_rows), np.arange(len(measured_rows))] = 1.0
     plain = Basis(
         model=model,
         modes=modes,
-        vectors=_everywhere(model, start.shapes),
+        vectors=_to_all_dofs(model, start.shapes),
         stiffness=np.diag(start.eigenvalues),
         damping=np.zeros((low, low)),
         highest_rad_s=highest_rad_s,
-        places=tuple(places),
+        measured_rows=tuple(measured_rows),
     )
-    return _joined(plain, _deflections(plain, loads))
+    return _add_shapes(plain, _deflections(plain, loads))
 
 
-def _large(model: StructuralModel, highest_rad_s: float) -> ModalBasis:
-    modes = solve_basis(model, up_to_hz=BEYOND * highest_rad_s / (2 * np.pi))
-    if len(modes.eigenvalues) < LEAST_MODES:
-        modes = solve_basis(model, n_modes=LEAST_MODES)
+def _solve_lowest_modes(model: StructuralModel, highest_rad_s: float) -> ModalBasis:
+    modes = solve_basis(model, up_to_hz=MODES_UP_TO * highest_rad_s / (2 * np.pi))
+    if len(modes.eigenvalues) < MIN_MODES:
+        modes = solve_basis(model, n_modes=MIN_MODES)
     return modes
 
 
-def enrich(basis: Basis, change: Change) -> Basis:
+def enrich_basis(basis: Basis, change: Change) -> Basis:
     """Add the static shapes that a change needs.
 
     Parameters
@@ -142,13 +142,13 @@ def enrich(basis: Basis, change: Change) -> Basis:
         For this effect at this place.
     """
     if change.model is not None:
-        basis = _exchanged(change.model, basis.highest_rad_s, basis.places)
+        basis = _exchanged(change.model, basis.highest_rad_s, basis.measured_rows)
     model, loads, shapes = basis.model, [], []
     if change.released:
         constraint = _constraint_shapes(basis, change.released)
         shapes.append(constraint)
         loads.append(_inertia(model, constraint))
-    around = np.hstack([basis.loaded, *shapes])
+    around = np.hstack([basis.loaded_shapes, *shapes])
     for matrix in (change.stiffness, change.mass):
         if matrix is not None:
             first = multiply(matrix, around)
@@ -161,15 +161,15 @@ def enrich(basis: Basis, change: Change) -> Basis:
     if not loads:
         return basis
     shapes.append(_deflections(basis, np.hstack(loads)))
-    return _joined(basis, np.hstack(shapes))
+    return _add_shapes(basis, np.hstack(shapes))
 
 
 @lru_cache(maxsize=2)  # a search asks for the same one again and again
-def _exchanged(model: StructuralModel, highest_rad_s: float, places: tuple[int, ...]) -> Basis:
-    return make_basis(model, highest_rad_s, places)
+def _exchanged(model: StructuralModel, highest_rad_s: float, measured_rows: tuple[int, ...]) -> Basis:
+    return make_basis(model, highest_rad_s, measured_rows)
 
 
-def solved(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
+def solve_changed_modes(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
     """Solve for the modes of a modified structure.
 
     The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
@@ -210,7 +210,7 @@ def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:
     return loads
 
 
-def _everywhere(model: StructuralModel, shapes: FloatArray) -> FloatArray:
+def _to_all_dofs(model: StructuralModel, shapes: FloatArray) -> FloatArray:
     everywhere = np.zeros((len(model.all_dofs), shapes.shape[1]))
     everywhere[~model.fixed] = shapes
     return everywhere
@@ -222,17 +222,17 @@ def _deflections(basis: Basis, loads: FloatArray) -> FloatArray:
     sizes = np.linalg.norm(free, axis=0)
     left, sizes, _ = np.linalg.svd(free[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
     free = left[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
-    return _everywhere(basis.model, basis.modes.factor.solve(free))
+    return _to_all_dofs(basis.model, basis.modes.factor.solve(free))
 
 
 def _constraint_shapes(basis: Basis, released: tuple[int, ...]) -> FloatArray:
     """Motion of everything when one held DOF after the other is moved by 1."""
     model, free = basis.model, np.flatnonzero(~basis.model.fixed)
     shapes = np.zeros((len(model.all_dofs), len(released)))
-    for column, place in enumerate(released):
-        pull = model.stiffness_all[:, [place]].toarray() + basis.modes.shift * model.mass_all[:, [place]].toarray()
-        shapes[free, column] = -basis.modes.factor.solve(pull[free, 0])
-        shapes[place, column] = 1.0
+    for column, row in enumerate(released):
+        restoring = model.stiffness_all[:, [row]].toarray() + basis.modes.shift * model.mass_all[:, [row]].toarray()
+        shapes[free, column] = -basis.modes.factor.solve(restoring[free, 0])
+        shapes[row, column] = 1.0
     return shapes
 
 
@@ -240,7 +240,7 @@ def _inertia(model: StructuralModel, shapes: FloatArray) -> FloatArray:
     return multiply(model.mass_all, shapes)
 
 
-def _joined(basis: Basis, shapes: FloatArray) -> Basis:
+def _add_shapes(basis: Basis, shapes: FloatArray) -> Basis:
     """Add shapes, made orthonormal in mass; those that the basis holds already are left out."""
     model = basis.model
     for _ in range(2):  # the second time takes off what rounding left in the first
@@ -250,7 +250,7 @@ def _joined(basis: Basis, shapes: FloatArray) -> Basis:
         shapes = shapes[:, _sizes(model, shapes) > INDEPENDENT]
     shapes = shapes / _sizes(model, shapes)
     values, axes = linalg.eigh(shapes.T @ multiply(model.mass_all, shapes))
-    kept = values > ALIKE
+    kept = values > DEPENDENT
     fresh = shapes @ (axes[:, kept] / np.sqrt(values[kept]))
     vectors = np.hstack([basis.vectors, fresh])
     return Basis(
@@ -260,7 +260,7 @@ def _joined(basis: Basis, shapes: FloatArray) -> Basis:
         stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
         damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
         highest_rad_s=basis.highest_rad_s,
-        places=basis.places,
+        measured_rows=basis.measured_rows,
     )
 
 

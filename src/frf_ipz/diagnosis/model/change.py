@@ -118,15 +118,15 @@ def _sum(first: Matrix | None, second: Matrix | None) -> Matrix | None:
 def _product(first: Mapping[str, Transfer], second: Mapping[str, Transfer]) -> dict[str, Transfer]:
     both = {**first, **second}
     for name in first.keys() & second.keys():
-        both[name] = _both(first[name], second[name])
+        both[name] = _product_of(first[name], second[name])
     return both
 
 
-def _both(first: Transfer, second: Transfer) -> Transfer:
+def _product_of(first: Transfer, second: Transfer) -> Transfer:
     return lambda s: np.asarray(first(s) * second(s))
 
 
-NOTHING = Change()
+NO_CHANGE = Change()
 
 
 def with_change(model: StructuralModel, change: Change) -> StructuralModel:
@@ -165,17 +165,17 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
         modal_damping=stated,
     )
     for attachment in change.attachments:
-        changed = _attached(changed, attachment)
+        changed = _attach(changed, attachment)
     return changed
 
 
-def _attached(model: StructuralModel, attachment: Attachment) -> StructuralModel:
+def _attach(model: StructuralModel, attachment: Attachment) -> StructuralModel:
     """Put mass, damping and stiffness between the motions of an attachment and motions of its own."""
     if attachment.matrices is None:
         return model
     own = attachment.matrices[0].shape[0] - 1
     mass, damping, stiffness = (
-        _grown(matrix, own) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
+        _enlarge(matrix, own) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
     )
     for motion in attachment.motions.T:
         padded = sparse.csr_array(np.concatenate([motion, np.zeros(len(model.all_dofs) - len(motion) + own)])[None])
@@ -190,7 +190,7 @@ def _attached(model: StructuralModel, attachment: Attachment) -> StructuralModel
     return _with_dofs(model, attachment.motions[:, 0], own, (mass, damping, stiffness))
 
 
-def _grown(matrix: Matrix, by: int) -> Matrix:
+def _enlarge(matrix: Matrix, by: int) -> Matrix:
     return sparse.csr_array(sparse.block_diag([matrix, sparse.csr_array((by, by))])) if by else matrix
 
 

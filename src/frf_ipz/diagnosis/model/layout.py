@@ -71,7 +71,7 @@ def _gain_signs(layout: Layout) -> FloatArray:
     return signs
 
 
-def lay_out(labels: Sequence[FrfLabel]) -> Layout:
+def make_layout(labels: Sequence[FrfLabel]) -> Layout:
     """Sort what FRFs connect.
 
     Parameters
@@ -98,7 +98,7 @@ def lay_out(labels: Sequence[FrfLabel]) -> Layout:
     )
 
 
-def motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
+def make_motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
     """Weights of all DOFs in the motion that a sensor at a DOF sees, with its sign.
 
     Parameters
@@ -118,7 +118,7 @@ def motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
     return row
 
 
-def extents(model: StructuralModel) -> Mapping[str, float]:
+def measure_extents(model: StructuralModel) -> Mapping[str, float]:
     """Size of a structure along each axis.
 
     Parameters
@@ -137,7 +137,7 @@ def extents(model: StructuralModel) -> Mapping[str, float]:
     return {axis: float(span) for axis, span in zip(AXES, spans, strict=True) if span > FLAT * spans.max()}
 
 
-def shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
+def make_shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
     """How the motion at a DOF changes with its place.
 
     Parameters
@@ -152,11 +152,11 @@ def shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
     dict of str to (n_all,) array
         For each axis along which it could be elsewhere, weights of all DOFs in the derivative, 1/m.
     """
-    axes = [axis for axis in extents(model) if axis != dof.direction]
+    axes = [axis for axis in measure_extents(model) if axis != dof.direction]
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
 
 
-def kink_beside(model: StructuralModel, dof: Dof) -> float:
+def shear_slope_at_force(model: StructuralModel, dof: Dof) -> float:
     """How fast the motion falls on both sides of a force, by local shear.
 
     Parameters
@@ -194,13 +194,13 @@ def _shift_row(model: StructuralModel, dof: Dof, axis: str) -> FloatArray:
 
 def _from_neighbours(model: StructuralModel, dof: Dof, axis: int) -> FloatArray:
     """Slope of a plane through the motion of the nearest nodes."""
-    rows = [place for other, place in model.full_indices.items() if other.direction == dof.direction]
+    rows = [row for candidate, row in model.full_indices.items() if candidate.direction == dof.direction]
     nodes = np.array([model.all_dofs[row].node for row in rows])
-    places = model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, nodes)]
-    here = places[nodes == dof.node][0]
-    distance = np.linalg.norm(places - here, axis=1)
+    coordinates_m = model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, nodes)]
+    here = coordinates_m[nodes == dof.node][0]
+    distance = np.linalg.norm(coordinates_m - here, axis=1)
     near = np.argsort(distance)[: NEIGHBOURS + 1]
-    offsets = (places - here)[near]
+    offsets = (coordinates_m - here)[near]
     used = np.ptp(offsets, axis=0) > FLAT * distance[near].max()
     plane = np.hstack([np.ones((len(near), 1)), offsets[:, used]])
     row = np.zeros(len(model.all_dofs))

@@ -13,9 +13,9 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.model.basis import solved
-from frf_ipz.diagnosis.model.layout import motion_row
-from frf_ipz.diagnosis.model.nuisance import all_shift_rows
+from frf_ipz.diagnosis.model.basis import solve_changed_modes
+from frf_ipz.diagnosis.model.layout import make_motion_row
+from frf_ipz.diagnosis.model.nuisance import make_all_shift_rows
 from frf_ipz.dofs import Dof
 from frf_ipz.numerics.pencils import generalised_eigh
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.basis import Basis
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.model.layout import Layout
-    from frf_ipz.diagnosis.model.nuisance import Nuisance, Unknowns
+    from frf_ipz.diagnosis.model.nuisance import NuisancePrior, NuisanceValues
 
 RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
-LEAST_RATIO = 1e-6  # where a model states no damping at all
+MIN_RATIO = 1e-6  # where a model states no damping at all
 UNCOUPLED = 1e-3  # of the largest damping of a mode: what a matrix couples modes by that counts for nothing
 SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
-MOST_OF_MASS = 0.5  # of a modal mass: scatter takes no more away
+MAX_MASS_PART = 0.5  # of a modal mass: scatter takes no more away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Modified:
+class ModifiedStructure:
     """A modified structure without scatter.
 
     Parameters
@@ -57,7 +57,7 @@ class Modified:
     is_coupled: bool
 
 
-def modify(basis: Basis, change: Change) -> Modified:
+def modify_structure(basis: Basis, change: Change) -> ModifiedStructure:
     """Solve for the modes of a modified structure.
 
     Parameters
@@ -69,10 +69,10 @@ def modify(basis: Basis, change: Change) -> Modified:
 
     Returns
     -------
-    Modified
+    ModifiedStructure
         Its modes, by ascending frequency.
     """
-    squares, vectors = solved(basis, change)
+    squares, vectors = solve_changed_modes(basis, change)
     largest = vectors[np.argmax(np.abs(vectors), 0), np.arange(len(squares))]
     vectors = vectors * np.sign(largest)  # scatter between two modes has a sign: theirs must not change by chance
     n_rigid = basis.modes.n_rigid
@@ -86,12 +86,14 @@ def modify(basis: Basis, change: Change) -> Modified:
         viscous = vectors.T @ basis.damping @ vectors
         own, omega = np.diag(viscous), np.sqrt(np.abs(squares))
         stated[n_rigid:] += own[n_rigid:] / (2 * omega[n_rigid:])
-        is_coupled = bool(np.abs(coupling(viscous)).max() > UNCOUPLED * own.max())
+        is_coupled = bool(np.abs(modal_coupling(viscous)).max() > UNCOUPLED * own.max())
     stated[:n_rigid] = SUSPENSION_RATIO
-    return Modified(change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled)
+    return ModifiedStructure(
+        change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled
+    )
 
 
-def coupling(viscous: FloatArray) -> FloatArray:
+def modal_coupling(viscous: FloatArray) -> FloatArray:
     """Take the damping of each mode by itself out of a damping matrix in modal coordinates, (q, q)."""
     return viscous - np.diag(np.diag(viscous))
 
@@ -101,7 +103,7 @@ def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
         return np.full(len(squares), change.modal_ratio)
     stated = basis.model.modal_damping
     if not stated.size:
-        return np.full(len(squares), LEAST_RATIO if not basis.damping.any() else 0.0)
+        return np.full(len(squares), MIN_RATIO if not basis.damping.any() else 0.0)
     number = np.maximum(np.arange(len(squares)) - basis.modes.n_rigid, 0)
     return stated[np.minimum(number, stated.size - 1)].copy()
 
@@ -144,7 +146,7 @@ class Modes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rows:
+class MotionRows:
     """Sensors and blows in the coordinates of a basis.
 
     Parameters
@@ -161,7 +163,7 @@ class Rows:
     input_shifts: FloatArray
 
 
-def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) -> Rows:
+def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prior: NuisancePrior) -> MotionRows:
     """Bring sensors and blows into the coordinates of a basis.
 
     Parameters
@@ -172,37 +174,39 @@ def rows_of(basis: Basis, layout: Layout, change: Change, nuisance: Nuisance) ->
         Sensors and blows.
     change : Change
         Says which sensors are elsewhere.
-    nuisance : Nuisance
+    nuisance_prior : Nuisance
         Says along which axes places are uncertain.
 
     Returns
     -------
-    Rows
+    MotionRows
         Sensors where the change says they are.
     """
     outputs = tuple(
         Dof(change.moved.get(channel, dof.node), dof.direction, dof.sign) for channel, dof in layout.outputs
     )
-    return Rows(
-        outputs=np.array([motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,
-        inputs=np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors,
-        output_shifts=all_shift_rows(basis, nuisance, outputs),
-        input_shifts=all_shift_rows(basis, nuisance, layout.inputs),
+    return MotionRows(
+        outputs=np.array([make_motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,
+        inputs=np.array([make_motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors,
+        output_shifts=make_all_shift_rows(basis, nuisance_prior, outputs),
+        input_shifts=make_all_shift_rows(basis, nuisance_prior, layout.inputs),
     )
 
 
-def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) -> Modes:
+def scatter_modes(
+    basis: Basis, modified: ModifiedStructure, rows: MotionRows, nuisance_values: NuisanceValues
+) -> Modes:
     """Add to a modified structure what cannot be known.
 
     Parameters
     ----------
     basis : Basis
         Coordinates.
-    modified : Modified
+    modified : ModifiedStructure
         The structure.
-    rows : Rows
+    rows : MotionRows
         Sensors and blows.
-    unknowns : Unknowns
+    nuisance_values : Unknowns
         What cannot be known.
 
     Returns
@@ -211,13 +215,13 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
         By ascending frequency without scatter.
     """
     omega = np.sqrt(np.abs(modified.squares))
-    scattered, rotation = _scatter(modified.squares, omega, unknowns)
+    scattered, rotation = _scatter(modified.squares, omega, nuisance_values)
     m = len(rotation)
     turned = modified.vectors.copy()
     turned[:, :m] = modified.vectors[:, :m] @ rotation
     ratio = modified.stated_ratio.copy()
-    ratio[:m] *= 1 + unknowns.damping
-    viscous = coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
+    ratio[:m] *= 1 + nuisance_values.damping
+    viscous = modal_coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
     return Modes(
         omega=omega,
         squares=scattered,
@@ -233,16 +237,16 @@ def scatter(basis: Basis, modified: Modified, rows: Rows, unknowns: Unknowns) ->
     )
 
 
-def _scatter(squares: FloatArray, omega: FloatArray, unknowns: Unknowns) -> tuple[FloatArray, FloatArray]:
-    m, rigid = len(unknowns.kappa), len(unknowns.cords)
-    if not (unknowns.kappa.any() or unknowns.mu.any() or unknowns.cords.any()):
+def _scatter(squares: FloatArray, omega: FloatArray, nuisance_values: NuisanceValues) -> tuple[FloatArray, FloatArray]:
+    m, rigid = len(nuisance_values.kappa), len(nuisance_values.suspension)
+    if not (nuisance_values.kappa.any() or nuisance_values.mu.any() or nuisance_values.suspension.any()):
         return squares, np.eye(m)
-    block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * unknowns.kappa
-    block[np.arange(rigid), np.arange(rigid)] += unknowns.cords
-    mu = unknowns.mu
-    if np.linalg.norm(mu) > MOST_OF_MASS:  # no step may take all mass away
+    block = np.diag(squares[:m]) + np.outer(omega[:m], omega[:m]) * nuisance_values.kappa
+    block[np.arange(rigid), np.arange(rigid)] += nuisance_values.suspension
+    mu = nuisance_values.mu
+    if np.linalg.norm(mu) > MAX_MASS_PART:  # no step may take all mass away
         least = float(linalg.eigvalsh(mu, subset_by_index=(0, 0), check_finite=False)[0])
-        mu = mu * min(1.0, MOST_OF_MASS / max(-least, 1e-12))
+        mu = mu * min(1.0, MAX_MASS_PART / max(-least, 1e-12))
     values, rotation = generalised_eigh(block, np.eye(m) + mu)
     rotation = rotation * np.where(np.diag(rotation) < 0, -1.0, 1.0)
     return np.concatenate([values, squares[m:]]), rotation

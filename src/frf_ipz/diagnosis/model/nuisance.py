@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.diagnosis.model.layout import extents, kink_beside, motion_row, shift_rows
+from frf_ipz.diagnosis.model.layout import make_motion_row, make_shift_rows, measure_extents, shear_slope_at_force
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -38,25 +38,25 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
 
-UNIFORM = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
+UNIFORM_STD = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
 ACROSS = 0.5  # kappa and mu between two modes, over those of one: fields average out
 MASS_PART = 0.5  # tolerance of masses over that of stiffness
-CORDS = 0.02  # frequency of a free structure in its cords, over its first elastic one
+SUSPENSION_FREQUENCY = 0.02  # frequency of a free structure in its cords, over its first elastic one
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
 LOWERED = 1.2  # times the top of the band: modes that shear would bring there
-MOST_MODES = 16
+MAX_MODES = 16
 LESS_CONVERGED = 20.0  # growth of a mode's error with its frequency over the top of the band: meshes suit the band
 REDUCED = 80.0  # the same with the square: what is far beyond the band may be lost in a reduction
-LOCAL = 0.05  # of the compliance of all modes beyond those with scatter: what is not known
-MOST_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
+LOCAL_PART = 0.05  # of the compliance of all modes beyond those with scatter: what is not known
+MAX_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
 STEEPER = 1.0  # per standard deviation: how much faster
-FARTHEST = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
+MAX_BEYOND_EDGE = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
 UNSTATED_SPREAD = 0.5  # of the damping ratio of a mode that nobody states: in its cords, or far beyond the band
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Unknowns:
+class NuisanceValues:
     """Values of all that cannot be known.
 
     Parameters
@@ -65,7 +65,7 @@ class Unknowns:
         Relative errors of stiffness and mass on the first modes, symmetric.
     damping : (m,) array
         Relative errors of damping ratios.
-    cords : (n_rigid,) array
+    suspension : (n_rigid,) array
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
         How far sensors and blows are from their places, m.
@@ -78,7 +78,7 @@ class Unknowns:
     kappa: FloatArray
     mu: FloatArray
     damping: FloatArray
-    cords: FloatArray
+    suspension: FloatArray
     output_shift: FloatArray
     input_shift: FloatArray
     local: FloatArray
@@ -86,7 +86,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Nuisance:
+class NuisancePrior:
     """Parameters of what cannot be known, each in units of its standard deviation.
 
     Parameters
@@ -97,7 +97,7 @@ class Nuisance:
         Standard deviations.
     damping_std : (m,) array
         Of damping ratios, relative.
-    cords_std : float
+    suspension_std : float
         Of squared frequencies of rigid-body modes, (rad/s)^2.
     axes : tuple of str
         Along which places are uncertain.
@@ -120,7 +120,7 @@ class Nuisance:
     kappa_std: FloatArray
     mu_std: FloatArray
     damping_std: FloatArray
-    cords_std: float
+    suspension_std: float
     axes: tuple[str, ...]
     shift_std: FloatArray
     n_outputs: int
@@ -151,18 +151,18 @@ class Nuisance:
         return sum(self.sizes)
 
     @property
-    def frequency_places(self) -> IntArray:
+    def frequency_indices(self) -> IntArray:
         """Where the relative errors of the squared frequencies, kappa_ii, stand among the parameters."""
         rows, columns = self.pairs
         return np.flatnonzero(rows == columns).astype(np.int64)
 
     @property
-    def damping_places(self) -> IntArray:
+    def damping_indices(self) -> IntArray:
         """Where the relative errors of the damping ratios stand among the parameters."""
         return np.arange(self.n_modes) + 2 * self.sizes[0]
 
     @property
-    def gain_places(self) -> IntArray:
+    def gain_indices(self) -> IntArray:
         """Where the gains stand among the parameters."""
         return np.arange(self.size - self.n_channels, self.size)
 
@@ -172,11 +172,11 @@ class Nuisance:
         rows, columns = self.pairs
         own = (rows == columns) & self.is_stated[rows]
         n_shifts = len(self.axes) * (self.n_outputs + self.n_inputs)
-        cords, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
+        suspension, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
         shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
-        return np.concatenate([own, own, self.is_stated, cords, shifts, local, gains])
+        return np.concatenate([own, own, self.is_stated, suspension, shifts, local, gains])
 
-    def with_part(self, part: float) -> Nuisance:
+    def with_part(self, part: float) -> NuisancePrior:
         """Give the same with a part of the tolerances of stiffness, mass and frequencies.
 
         Parameters
@@ -209,7 +209,7 @@ class Nuisance:
         n_fields = sum(self.sizes[:2])
         return np.concatenate([values[:n_fields] / part, values[n_fields:]])
 
-    def pulls(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
+    def whiten(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
         """Give the square roots of twice the prior's cost, and their slopes.
 
         Parameters
@@ -221,7 +221,7 @@ class Nuisance:
 
         Returns
         -------
-        pulls : (size,) array
+        whitened_nuisance : (size,) array
             As the parameters, but beyond the edge of a tolerance larger and larger.
         slopes : (size,) array
             Of the pulls by the parameters.
@@ -229,11 +229,11 @@ class Nuisance:
         if not is_bounded:
             return values, np.ones_like(values)
         outside = np.where(self.is_bounded, np.maximum(np.abs(values) - EDGE, 0.0), 0.0)
-        curved = np.minimum(outside, FARTHEST)
+        curved = np.minimum(outside, MAX_BEYOND_EDGE)
         added = STEEPER * curved * (2 * outside - curved)
         return values + np.sign(values) * added, 1 + 2 * STEEPER * curved
 
-    def unpack(self, values: FloatArray) -> Unknowns:
+    def unpack(self, values: FloatArray) -> NuisanceValues:
         """Give physical values.
 
         Parameters
@@ -248,15 +248,15 @@ class Nuisance:
         """
         ends = list(accumulate(self.sizes))
         parts = [values[start:end] for start, end in pairwise((0, *ends))]
-        return Unknowns(
+        return NuisanceValues(
             kappa=self._symmetric(parts[0]) * self.kappa_std,
             mu=self._symmetric(parts[1]) * self.mu_std,
             damping=np.maximum(parts[2] * self.damping_std, -0.95),
-            cords=parts[3] * self.cords_std,
+            suspension=parts[3] * self.suspension_std,
             output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
             input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
             local=self.local_std * parts[6],
-            gains=np.clip(parts[7] * self.gain_std, -MOST_GAIN, MOST_GAIN),
+            gains=np.clip(parts[7] * self.gain_std, -MAX_GAIN, MAX_GAIN),
         )
 
     def _symmetric(self, triangle: FloatArray) -> FloatArray:
@@ -272,7 +272,7 @@ def _triangle(size: int) -> tuple[IntArray, IntArray]:
     return rows.astype(np.int64), columns.astype(np.int64)
 
 
-def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nuisance:
+def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) -> NuisancePrior:
     """Turn tolerances into standard deviations.
 
     Parameters
@@ -290,42 +290,44 @@ def make_nuisance(basis: Basis, layout: Layout, options: DiagnoseOptions) -> Nui
         The parameters.
     """
     frequencies = np.sqrt(basis.modes.eigenvalues)
-    n_modes = max(int(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s)), 1, _lowered(basis))
-    n_modes = min(n_modes, MOST_MODES, len(frequencies))
+    n_modes = max(
+        int(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s)), 1, _count_lowered_modes(basis)
+    )
+    n_modes = min(n_modes, MAX_MODES, len(frequencies))
     n_rigid = min(basis.modes.n_rigid, n_modes)
-    stiffness, mass = options.stiffness_tolerance * UNIFORM, MASS_PART * options.stiffness_tolerance * UNIFORM
+    stiffness, mass = options.stiffness_tolerance * UNIFORM_STD, MASS_PART * options.stiffness_tolerance * UNIFORM_STD
     kappa, mu = np.full((n_modes, n_modes), ACROSS * stiffness), np.full((n_modes, n_modes), ACROSS * mass)
-    np.fill_diagonal(kappa, np.hypot(stiffness, 2 * options.frequency_tolerance * UNIFORM))
+    np.fill_diagonal(kappa, np.hypot(stiffness, 2 * options.frequency_tolerance * UNIFORM_STD))
     np.fill_diagonal(mu, mass)
     beyond = np.maximum(frequencies[:n_modes] / basis.highest_rad_s - 1, 0.0)
     growth = 1 + LESS_CONVERGED * beyond + REDUCED * beyond**2
     kappa *= np.sqrt(np.outer(growth, growth))
     kappa[:n_rigid] = kappa[:, :n_rigid] = 0.0
     first = frequencies[n_rigid] if len(frequencies) > n_rigid else 0.0
-    span = extents(basis.model)
+    span = measure_extents(basis.model)
     directions = {dof.direction for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)}
     axes = tuple(axis for axis in span if directions != {axis})
-    shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM for axis in axes])
-    beyond_scatter = LOCAL * _local(basis, layout, n_modes)
-    return Nuisance(
+    shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM_STD for axis in axes])
+    beyond_scatter = LOCAL_PART * _local_compliance(basis, layout, n_modes)
+    return NuisancePrior(
         n_modes=n_modes,
         n_rigid=n_rigid,
         kappa_std=kappa,
         mu_std=mu,
-        damping_std=_damping_std(options.damping_tolerance * UNIFORM, growth, n_rigid),
-        cords_std=(CORDS * first) ** 2,
+        damping_std=_damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid),
+        suspension_std=(SUSPENSION_FREQUENCY * first) ** 2,
         axes=axes,
         shift_std=shift_std,
         n_outputs=len(layout.outputs),
         n_inputs=len(layout.inputs),
-        local_std=np.copysign(np.hypot(beyond_scatter, _corners(basis, layout, shift_std)), beyond_scatter),
+        local_std=np.copysign(np.hypot(beyond_scatter, _corner_compliance(basis, layout, shift_std)), beyond_scatter),
         n_channels=len(layout.channels),
-        gain_std=options.gain_tolerance * UNIFORM,
+        gain_std=options.gain_tolerance * UNIFORM_STD,
         is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
     )
 
 
-def _lowered(basis: Basis) -> int:
+def _count_lowered_modes(basis: Basis) -> int:
     """Count the modes that shear, where a thick beam was modelled without it, could bring into the band."""
     source = basis.model.source
     if not isinstance(source, BeamFile) or source.beam.formulation != "euler-bernoulli":
@@ -341,34 +343,34 @@ def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
     return std
 
 
-def _local(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
+def _local_compliance(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
     """Compliance of each FRF by all modes beyond those with scatter, m/N."""
-    outputs = np.array([motion_row(basis.model, dof) for _, dof in layout.outputs]) @ basis.vectors
-    inputs = np.array([motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors
+    outputs = np.array([make_motion_row(basis.model, dof) for _, dof in layout.outputs]) @ basis.vectors
+    inputs = np.array([make_motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors
     shift = basis.modes.shift
     whole = outputs @ np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), inputs.T)
     scattered = (outputs[:, :n_modes] / (basis.modes.eigenvalues[:n_modes] + shift)) @ inputs[:, :n_modes].T
     return np.asarray((whole - scattered)[layout.output_of, layout.input_of])
 
 
-def _corners(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
+def _corner_compliance(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
     """Give the compliance, m/N, by which an FRF may be off where sensor and blow meet: it has a corner there."""
     apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
     sensors = np.array([dof.node for _, dof in layout.outputs])
     struck = np.array([dof.node for dof in layout.inputs])
     meet = sensors[layout.output_of] == struck[layout.input_of]
-    kinks = np.array([kink_beside(basis.model, dof) for dof in layout.inputs])
+    kinks = np.array([shear_slope_at_force(basis.model, dof) for dof in layout.inputs])
     return np.asarray(np.where(meet, apart * kinks[layout.input_of], 0.0))
 
 
-def all_shift_rows(basis: Basis, nuisance: Nuisance, dofs: tuple[Dof, ...]) -> FloatArray:
+def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple[Dof, ...]) -> FloatArray:
     """Rows in the basis by which motions change with places.
 
     Parameters
     ----------
     basis : Basis
         Coordinates.
-    nuisance : Nuisance
+    nuisance_prior : Nuisance
         Says along which axes places are uncertain.
     dofs : tuple of Dof
         Of sensors or blows.
@@ -378,9 +380,9 @@ def all_shift_rows(basis: Basis, nuisance: Nuisance, dofs: tuple[Dof, ...]) -> F
     (n_dofs, n_axes, q) array
         1/m.
     """
-    rows = np.zeros((len(dofs), len(nuisance.axes), basis.vectors.shape[1]))
+    rows = np.zeros((len(dofs), len(nuisance_prior.axes), basis.vectors.shape[1]))
     for index, dof in enumerate(dofs):
-        for axis, row in shift_rows(basis.model, dof).items():
-            if axis in nuisance.axes:
-                rows[index, nuisance.axes.index(axis)] = row @ basis.vectors
+        for axis, row in make_shift_rows(basis.model, dof).items():
+            if axis in nuisance_prior.axes:
+                rows[index, nuisance_prior.axes.index(axis)] = row @ basis.vectors
     return rows

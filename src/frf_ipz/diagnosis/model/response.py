@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.model.layout import Layout
     from frf_ipz.diagnosis.model.modes import Modes
-    from frf_ipz.diagnosis.model.nuisance import Nuisance, Unknowns
+    from frf_ipz.diagnosis.model.nuisance import NuisancePrior, NuisanceValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,7 +55,7 @@ class Response:
 
 
 def respond(
-    modes: Modes, change: Change, layout: Layout, unknowns: Unknowns, s: ComplexArray, basis: Basis
+    modes: Modes, change: Change, layout: Layout, nuisance_values: NuisanceValues, s: ComplexArray, basis: Basis
 ) -> Response:
     """Evaluate the FRFs of a modified structure.
 
@@ -67,7 +67,7 @@ def respond(
         Its attachments, loss factor and channels.
     layout : Layout
         Sensors and blows.
-    unknowns : Unknowns
+    nuisance_values : Unknowns
         Shifts of sensors and blows, and gains.
     s : (n_points,) complex array
         rad/s.
@@ -79,8 +79,8 @@ def respond(
     Response
         What would be measured without noise.
     """
-    left = modes.outputs + np.einsum("na,naq->nq", unknowns.output_shift, modes.output_shifts)
-    right = modes.inputs + np.einsum("na,naq->nq", unknowns.input_shift, modes.input_shifts)
+    left = modes.outputs + np.einsum("na,naq->nq", nuisance_values.output_shift, modes.output_shifts)
+    right = modes.inputs + np.einsum("na,naq->nq", nuisance_values.input_shift, modes.input_shifts)
     n_left = len(left)
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
@@ -90,8 +90,10 @@ def respond(
     stiffness = _coupled(own, attached, change, s)
     motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
     output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
-    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of] + unknowns.local
-    chain = s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ unknowns.gains)
+    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of] + nuisance_values.local
+    chain = (
+        s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ nuisance_values.gains)
+    )
     return Response(
         values=receptance * chain,
         modes=modes,
@@ -154,14 +156,14 @@ def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:
     return factors
 
 
-def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) -> ComplexArray:
+def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout: Layout) -> ComplexArray:
     """Differentiate FRFs by what cannot be known.
 
     Parameters
     ----------
     response : Response
         At the point of linearisation.
-    nuisance : Nuisance
+    nuisance_prior : Nuisance
         The parameters.
     layout : Layout
         Sensors and blows.
@@ -171,45 +173,45 @@ def nuisance_jacobian(response: Response, nuisance: Nuisance, layout: Layout) ->
     (n_points, n_frfs, size) complex array
         Per standard deviation of each parameter.
     """
-    modes, s, m = response.modes, response.s, nuisance.n_modes
+    modes, s, m = response.modes, response.s, nuisance_prior.n_modes
     scattered_left = response.output_motion[:, :m].swapaxes(1, 2)[:, layout.output_of]  # point, FRF, mode
     scattered_right = response.input_motion[:, :m].swapaxes(1, 2)[:, layout.input_of]
     left, right = scattered_left @ modes.rotation.T, scattered_right @ modes.rotation.T
-    i, j = nuisance.pairs
+    i, j = nuisance_prior.pairs
     omega = modes.omega[:m]
     products = left[:, :, i] * right[:, :, j]
     products += np.where(i != j, left[:, :, j] * right[:, :, i], 0.0)
     products *= -response.chain[:, :, None]
-    own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance.damping_std
-    rigid = slice(0, nuisance.n_rigid)
+    own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance_prior.damping_std
+    rigid = slice(0, nuisance_prior.n_rigid)
     changed = -response.chain[:, :, None] * scattered_left * scattered_right
     parts = [
-        products * (omega[i] * omega[j] * nuisance.kappa_std[i, j]),
-        products * nuisance.mu_std[i, j] * (s**2)[:, None, None],
+        products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j]),
+        products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None],
         changed * own * s[:, None, None],
-        -response.chain[:, :, None] * left[:, :, rigid] * right[:, :, rigid] * nuisance.cords_std,
+        -response.chain[:, :, None] * left[:, :, rigid] * right[:, :, rigid] * nuisance_prior.suspension_std,
         *(
             np.moveaxis(part, 1, 2) * response.chain[:, :, None]
-            for part in _shift_jacobians(response, nuisance, layout)
+            for part in _shift_jacobians(response, nuisance_prior, layout)
         ),
-        response.chain[:, :, None] * np.diag(nuisance.local_std),
-        response.values[:, :, None] * (layout.gain_signs * nuisance.gain_std),
+        response.chain[:, :, None] * np.diag(nuisance_prior.local_std),
+        response.values[:, :, None] * (layout.gain_signs * nuisance_prior.gain_std),
     ]
     return np.concatenate(parts, axis=2)
 
 
-def _shift_jacobians(response: Response, nuisance: Nuisance, layout: Layout) -> list[ComplexArray]:
+def _shift_jacobians(response: Response, nuisance_prior: NuisancePrior, layout: Layout) -> list[ComplexArray]:
     modes = response.modes
     outputs = np.einsum("naq,kqi->knai", modes.output_shifts, response.input_motion)
     inputs = np.einsum("naq,kqo->knao", modes.input_shifts, response.output_motion)
     n_frfs = len(layout.output_of)
     found: list[ComplexArray] = []
     for count, own, other, motion in (
-        (nuisance.n_outputs, layout.output_of, layout.input_of, outputs),
-        (nuisance.n_inputs, layout.input_of, layout.output_of, inputs),
+        (nuisance_prior.n_outputs, layout.output_of, layout.input_of, outputs),
+        (nuisance_prior.n_inputs, layout.input_of, layout.output_of, inputs),
     ):
-        part = np.zeros((len(response.s), count, len(nuisance.axes), n_frfs), np.complex128)
+        part = np.zeros((len(response.s), count, len(nuisance_prior.axes), n_frfs), np.complex128)
         frf = np.arange(n_frfs)
         part[:, own, :, frf] = motion[:, own, :, other]
-        found.append((part * nuisance.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
+        found.append((part * nuisance_prior.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
     return found

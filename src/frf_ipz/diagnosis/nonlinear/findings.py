@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.result import Estimate, Finding, doubt_of_place
+from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -87,7 +87,7 @@ def findings_of(
             parameters=numbers,
             probability=float(probability[mine].sum()),
             log_evidence_gain=float(gains[index]),
-            statement=says + doubt_of_place(places),
+            statement=says + describe_location_set(places),
             location_set=places,
         )
     return tuple(found.values())

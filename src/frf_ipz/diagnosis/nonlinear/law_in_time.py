@@ -49,7 +49,7 @@ def show_law(recordings: FittedSegments, track: LawFitProgress, fit: LawFit) -> 
 
 
 def _is_from_rest(record: ObservedRecord, *, is_hammer: bool) -> bool:
-    return not record.follows if is_hammer else starts_at_rest(record)
+    return not record.has_predecessor if is_hammer else starts_at_rest(record)
 
 
 def _with_response(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.result import Linearised
+from frf_ipz.diagnosis.result import LinearisedLaw
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
 
 
-def linearise(fit: LawFit, modal_model: ModalModel) -> Linearised:
+def linearise(fit: LawFit, modal_model: ModalModel) -> LinearisedLaw:
     """Replace a law by a spring and a damper.
 
     Parameters
@@ -41,13 +41,13 @@ def linearise(fit: LawFit, modal_model: ModalModel) -> Linearised:
     rms = np.sqrt(np.mean(motion**2, axis=1))
     order = np.argsort(rms)
     stiffness, damping = _spring_and_damper(motion.ravel(), velocity.ravel(), force.ravel())
-    return Linearised(
+    return LinearisedLaw(
         ends=modal_model.places[fit.place].ends,
         stiffness=stiffness,
         damping=damping,
         motion_rms_m=rms[order],
-        stiffness_each=each[order, 0],
-        damping_each=each[order, 1],
+        stiffness_by_record=each[order, 0],
+        damping_by_record=each[order, 1],
     )
 
 

@@ -96,7 +96,7 @@ def _at_place(
     """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
     n, step = min(record.n_samples for record in records), records[0].step_s
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
-    looked_at = observations.looks_at(frequency, REACH / (n * step)) & (len(records) >= LEAST_RECORDS)
+    looked_at = observations.mask_band(frequency, REACH / (n * step)) & (len(records) >= LEAST_RECORDS)
     used, n_groups = _groups(np.flatnonzero(looked_at))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
@@ -135,7 +135,7 @@ def _left_over(records: tuple[ObservedRecord, ...], row: int, frequency_hz: Floa
     ends = [record.responses[row, -max(record.n_samples // END, 1) :] for record in records]
     largest = 2 * max(float(np.mean(end**2)) for end in ends)
     energy = largest / (sigma**2 + (2 * np.pi * frequency_hz) ** 2)
-    return np.array([energy if record.follows and sigma else np.zeros_like(energy) for record in records])
+    return np.array([energy if record.has_predecessor and sigma else np.zeros_like(energy) for record in records])
 
 
 def _groups(used: IntArray) -> tuple[IntArray, int]:

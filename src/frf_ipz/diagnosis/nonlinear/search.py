@@ -40,7 +40,7 @@ from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import agreement_with
 from frf_ipz.diagnosis.nonlinear.proof import prove, relative_misfit, working_range
 from frf_ipz.diagnosis.nonlinear.recorded.noise import read_noise
-from frf_ipz.diagnosis.result import doubt_of_place
+from frf_ipz.diagnosis.result import describe_location_set
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -302,7 +302,7 @@ def _with_place(found: LawSearch, modal_model: ModalModel, best: AnyForce, part:
     where = (
         f"A force of another kind at {place.words} would: {np.sqrt(left):.2g} times the expected misfit is then left."
     )
-    doubt = doubt_of_place([modal_model.places[i].location for i in best.alike])
+    doubt = describe_location_set([modal_model.places[i].location for i in best.alike])
     return replace(found, location=dict(place.location), statement=f"{found.statement} {where}{doubt}")
 
 
@@ -310,7 +310,7 @@ def _divide(observations: Observations) -> tuple[Observations, Observations]:
     """Hold out one blow at each place that has enough: the second strongest, whose level others enclose."""
     held = []
     if observations.kind == "hammer":
-        groups = [observations.at(dof) for dof in observations.input_dofs]
+        groups = [observations.records_at(dof) for dof in observations.input_dofs]
         held = [group[1] for group in groups if len(group) >= LEAST_TO_HOLD]
     kept = tuple(record for record in observations.records if not any(record is other for other in held))
     return replace(observations, records=kept), replace(observations, records=tuple(held))

@@ -183,7 +183,7 @@ def _measured(observations: Observations, modal_model: ModalModel, stretches: Se
 
 def _misfit(measured: FloatArray, simulated: FloatArray, step_s: float, observations: Observations) -> FloatArray:
     frequency = np.asarray(np.fft.rfftfreq(measured.shape[-1], step_s))
-    inside = observations.looks_at(frequency, frequency[1])
+    inside = observations.mask_band(frequency, frequency[1])
     present = np.abs(measured).max(-1, keepdims=True) > 0
     there, away = (_lines(signals)[..., inside] for signals in (measured, (measured - simulated) * present))
     return np.asarray(np.linalg.norm(away, axis=(1, 2)) / np.maximum(np.linalg.norm(there, axis=(1, 2)), 1e-300))

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
-from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, weights_of
-from frf_ipz.diagnosis.search.robust_refinement import Start, robust_misfit
+from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
+from frf_ipz.diagnosis.search.robust_refinement import Start, compute_robust_misfit
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.effect import Effect, Signature
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.layout import Layout
     from frf_ipz.diagnosis.model.response import Response
 
-AT_ONCE = 400  # motions: keeps arrays within some ten MB
+MOTIONS_AT_ONCE = 400  # motions: keeps arrays within some ten MB
 AMPLITUDES = np.geomspace(1e-3, 300.0, 20)  # over the stiffness of the structure against the motion
-CLOSER = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
+FINER_STEPS = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
 LARGEST_FLEXIBILITY = 2500  # DOFs up to which the static flexibility of all of them is found
-WIDE_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
-SCATTER_ERROR = 0.1  # the same where scatter was fitted
-LOOKED_AROUND = 16  # places of each effect: where not all places are looked at, those beside the best are
+SCAN_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
+NUISANCE_ERROR = 0.1  # the same where scatter was fitted
+NEIGHBOURS_OF = 16  # places of each effect: where not all places are looked at, those beside the best are
 
 
 Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
@@ -59,7 +59,9 @@ class Receptances:
     own: ComplexArray
 
 
-def receptances(base: Response, basis: Basis, layout: Layout, motions: FloatArray, rest: FloatArray) -> Receptances:
+def evaluate_receptances(
+    base: Response, basis: Basis, layout: Layout, motions: FloatArray, rest: FloatArray
+) -> Receptances:
     """Evaluate FRFs of motions.
 
     Parameters
@@ -92,7 +94,7 @@ def receptances(base: Response, basis: Basis, layout: Layout, motions: FloatArra
     return Receptances(across=np.moveaxis(across, 1, 2), own=np.asarray(own))
 
 
-def missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
+def compute_missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
     """Find the static flexibility of motions that a basis lacks.
 
     Parameters
@@ -121,17 +123,17 @@ def missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(whole - inside, 0.0))
 
 
-def search_sketches(
-    causes: Sequence[Cause], sketches: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
+def scan_signatures(
+    components: Sequence[Component], signatures: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
     measured: TransferFunctions, weights: FloatArray,
 ) -> list[Start]:  # fmt: skip
     """Find the best values of each effect at each place.
 
     Parameters
     ----------
-    causes : sequence of Cause
+    components : sequence of Cause
         What is tried.
-    sketches : sequence of Signature
+    signatures : sequence of Signature
         The same as dynamic stiffness.
     base : Response
         Of what is supposed already.
@@ -152,46 +154,46 @@ def search_sketches(
     misfit = measured.values - base.values
     constant = np.sum(weights * np.abs(misfit) ** 2, 1)
     found = []
-    for group in _by_motion(sketches):
-        motions = np.stack([sketches[members[0]].motion for members in group], 1)
-        parts = receptances(base, basis, layout, motions, missing_flexibility(basis, motions))
+    for group in _group_by_motion(signatures):
+        motions = np.stack([signatures[members[0]].motion for members in group], 1)
+        parts = evaluate_receptances(base, basis, layout, motions, compute_missing_flexibility(basis, motions))
         linear = np.einsum("kf,kfp->kp", weights * misfit.conj(), parts.across)
         square = np.einsum("kf,kfp->kp", weights, np.abs(parts.across) ** 2)
         for column, members in enumerate(group):
             terms = constant, linear[:, column], square[:, column], parts.own[:, column]
-            found += [_best(causes[member], sketches[member], terms) for member in members]
+            found += [_best_amplitude(components[member], signatures[member], terms) for member in members]
     return found
 
 
-def _by_motion(sketches: Sequence[Signature]) -> Iterator[list[list[int]]]:
+def _group_by_motion(signatures: Sequence[Signature]) -> Iterator[list[list[int]]]:
     """Sketches on the same motion share their receptances; motions come in handy numbers."""
     same: dict[bytes, list[int]] = {}
-    for index, sketch in enumerate(sketches):
-        same.setdefault(sketch.motion.tobytes(), []).append(index)
+    for index, signature in enumerate(signatures):
+        same.setdefault(signature.motion.tobytes(), []).append(index)
     groups = list(same.values())
-    for start in range(0, len(groups), AT_ONCE):
-        yield groups[start : start + AT_ONCE]
+    for start in range(0, len(groups), MOTIONS_AT_ONCE):
+        yield groups[start : start + MOTIONS_AT_ONCE]
 
 
-def _best(cause: Cause, sketch: Signature, terms: Terms) -> Start:
+def _best_amplitude(component: Component, signature: Signature, terms: Terms) -> Start:
     own = terms[3]
-    if sketch.amplitudes is None:
-        scale = np.median(np.abs(own)) * np.median(np.abs(sketch.shapes), axis=1)
+    if signature.amplitudes is None:
+        scale = np.median(np.abs(own)) * np.median(np.abs(signature.shapes), axis=1)
         amplitudes = AMPLITUDES[None, :] / scale[:, None]
     else:
-        amplitudes = np.broadcast_to(sketch.amplitudes, (len(sketch.shapes), len(sketch.amplitudes)))
-    costs = _costs(sketch.shapes, amplitudes, terms)
+        amplitudes = np.broadcast_to(signature.amplitudes, (len(signature.shapes), len(signature.amplitudes)))
+    costs = _costs(signature.shapes, amplitudes, terms)
     shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
     best, cost = amplitudes[shape, size], costs[shape, size]
-    for closer in CLOSER if amplitudes.shape[1] > 1 else ():
+    for closer in FINER_STEPS if amplitudes.shape[1] > 1 else ():
         around = best * closer
-        costs = _costs(sketch.shapes[shape, None], around[None], terms)[0]
+        costs = _costs(signature.shapes[shape, None], around[None], terms)[0]
         nearest = int(np.argmin(costs))
         best, cost = around[nearest], costs[nearest]
-    values = sketch.values[shape].copy()
+    values = signature.values[shape].copy()
     if len(values):
-        values[sketch.amplitude] *= best
-    return Start(cause=cause, values=values, cost=float(cost))
+        values[signature.amplitude] *= best
+    return Start(component=component, values=values, cost=float(cost))
 
 
 def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
@@ -203,12 +205,12 @@ def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatA
     return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2))
 
 
-def wide_search(bench: InferenceProblem, base: Fit) -> list[Start]:
+def scan_globally(problem: InferenceProblem, base: Fit) -> list[Start]:
     """Look for large effects, far from the axis.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -218,17 +220,17 @@ def wide_search(bench: InferenceProblem, base: Fit) -> list[Start]:
     list of Start
         The best values of each cause, by rising cost.
     """
-    return _search(bench, bench.specimen, bench.coarse, base, np.zeros(bench.nuisance.size), WIDE_ERROR)
+    return _scan(problem, problem.context, problem.coarse, base, np.zeros(problem.nuisance_prior.size), SCAN_ERROR)
 
 
-def search_among_scatter(bench: InferenceProblem, base: Fit) -> list[Start]:
+def scan_beside_nuisance(problem: InferenceProblem, base: Fit) -> list[Start]:
     """Look for large effects half-way to the axis, beside the scatter that was fitted without them.
 
     Scatter takes up what shifts natural frequencies; what it cannot, stands out.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -238,18 +240,18 @@ def search_among_scatter(bench: InferenceProblem, base: Fit) -> list[Start]:
     list of Start
         The best values of each cause, by rising cost.
     """
-    specimen = replace(bench.specimen, contour=bench.middle.s)
-    return _search(bench, specimen, bench.middle, base, base.unknown, SCATTER_ERROR)
+    context = replace(problem.context, contour=problem.middle.s)
+    return _scan(problem, context, problem.middle, base, base.nuisance, NUISANCE_ERROR)
 
 
-def causes_of(effect: Effect, specimen: ModelContext) -> list[Cause]:
+def list_components(effect: Effect, context: ModelContext) -> list[Component]:
     """Give an effect at all its places.
 
     Parameters
     ----------
     effect : Effect
         What.
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
 
     Returns
@@ -257,87 +259,93 @@ def causes_of(effect: Effect, specimen: ModelContext) -> list[Cause]:
     list of Cause
         One a place.
     """
-    places = effect.places(specimen)
-    return [Cause(effect=effect, place=place, n_places=len(places)) for place in places]
+    locations = effect.locations(context)
+    return [Component(effect=effect, location=location, n_locations=len(locations)) for location in locations]
 
 
-def _search(
-    bench: InferenceProblem,
-    specimen: ModelContext,
+def _scan(
+    problem: InferenceProblem,
+    context: ModelContext,
     measured: TransferFunctions,
     base: Fit,
-    unknown: FloatArray,
+    nuisance: FloatArray,
     error: float,
 ) -> list[Start]:
-    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
-    weights = weights_of(measured, error)
-    response = base.hypothesis.respond(base.values, unknown, measured.s)
-    sketch = partial(_sketched, specimen, measured, base, response, weights)
-    found, direct = sketch(causes)
+    components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
+    weights = compute_weights(measured, error)
+    response = base.hypothesis.respond(base.values, nuisance, measured.s)
+    signature = partial(_scan_with_signatures, context, measured, base, response, weights)
+    found, direct = signature(components)
     found.sort(key=lambda start: start.cost)
-    found += sketch(_between(specimen, causes, found))[0]
-    found += [best_start(bench, base, cause, measured, weights, unknown) for cause in direct]
+    found += signature(_unlisted_neighbours(context, components, found))[0]
+    found += [find_best_start(problem, base, component, measured, weights, nuisance) for component in direct]
     return sorted(found, key=lambda start: start.cost)
 
 
-def _sketched(
-    specimen: ModelContext,
+def _scan_with_signatures(
+    context: ModelContext,
     measured: TransferFunctions,
     base: Fit,
     response: Response,
     weights: FloatArray,
-    causes: Sequence[Cause],
-) -> tuple[list[Start], list[Cause]]:
+    components: Sequence[Component],
+) -> tuple[list[Start], list[Component]]:
     """Find the best values of causes that can be sketched, and which ones cannot."""
-    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
-    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
-    found = search_sketches(
-        [cause for cause, _ in drawn], [sketch for _, sketch in drawn], response, base.hypothesis.basis,
-        specimen.layout, measured, weights,
+    signatures = [component.effect.signature(context, component.location) for component in components]
+    drawn = [
+        (component, signature)
+        for component, signature in zip(components, signatures, strict=True)
+        if signature is not None
+    ]
+    found = scan_signatures(
+        [component for component, _ in drawn], [signature for _, signature in drawn], response, base.hypothesis.basis,
+        context.layout, measured, weights,
     )  # fmt: skip
-    return found, [cause for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    return found, [component for component, signature in zip(components, signatures, strict=True) if signature is None]
 
 
-def _between(specimen: ModelContext, causes: Sequence[Cause], starts: Sequence[Start]) -> list[Cause]:
+def _unlisted_neighbours(
+    context: ModelContext, components: Sequence[Component], starts: Sequence[Start]
+) -> list[Component]:
     """Give the places beside the best of each effect that are none of those where it was looked for."""
-    seen = {cause.key for cause in causes}
-    counts, found = Counter[str](), list[Cause]()
+    seen = {component.key for component in components}
+    counts, found = Counter[str](), list[Component]()
     for start in starts:
-        effect = start.cause.effect
+        effect = start.component.effect
         counts[effect.name] += 1
-        if counts[effect.name] > LOOKED_AROUND:
+        if counts[effect.name] > NEIGHBOURS_OF:
             continue
-        for place in effect.neighbours(specimen, start.cause.place):
-            cause = Cause(effect=effect, place=place, n_places=start.cause.n_places)
-            if cause.key not in seen:
-                seen.add(cause.key)
-                found.append(cause)
+        for location in effect.neighbours(context, start.component.location):
+            component = Component(effect=effect, location=location, n_locations=start.component.n_locations)
+            if component.key not in seen:
+                seen.add(component.key)
+                found.append(component)
     return found
 
 
-def best_start(
-    bench: InferenceProblem,
+def find_best_start(
+    problem: InferenceProblem,
     base: Fit,
-    cause: Cause,
+    component: Component,
     measured: TransferFunctions,
     weights: FloatArray,
-    unknown: FloatArray,
+    nuisance: FloatArray,
 ) -> Start:
     """Try the values that an effect proposes to start from.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
-    cause : Cause
+    component : Cause
         Effect and place.
     measured : TransferFunctions
         Transfer functions.
     weights : (n_points, n_frfs) array
         Over the squared misfit.
-    unknown : (n_nuisance,) array
+    nuisance : (n_nuisance,) array
         What cannot be known, in standard deviations.
 
     Returns
@@ -345,11 +353,11 @@ def best_start(
     Start
         The best of them.
     """
-    hypothesis = bench.suppose((*base.hypothesis.causes, cause), exact=False)
-    grid = cause.effect.starts(bench.specimen, cause.place)
+    hypothesis = problem.make_hypothesis((*base.hypothesis.components, component), exact=False)
+    grid = component.effect.start_values(problem.context, component.location)
     costs = []
     for values in grid:
-        response = hypothesis.respond(np.concatenate([base.values, values]), unknown, measured.s)
-        costs.append(robust_misfit(measured.values - response.values, weights))
-    place = int(np.argmin(costs))
-    return Start(cause=cause, values=grid[place], cost=costs[place])
+        response = hypothesis.respond(np.concatenate([base.values, values]), nuisance, measured.s)
+        costs.append(compute_robust_misfit(measured.values - response.values, weights))
+    best = int(np.argmin(costs))
+    return Start(component=component, values=grid[best], cost=costs[best])

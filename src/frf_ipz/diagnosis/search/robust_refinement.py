@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
-from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, weights_of
+from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 STEP = 1e-4  # of the logarithm of a parameter, for its derivative
 LONGEST_STEP = 0.5
-MOST_DAMPING = 1e4
-GOOD_ENOUGH = 0.01  # change of the robust misfit
+MAX_DAMPING = 1e4
+MIN_GAIN = 0.01  # change of the robust misfit
 REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
-PLACES_EACH = 3  # of an effect that are refined
-STEPPED, NOT_FAR = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
-STEPPED_CLOSER = 3  # the same half-way to the axis
-NEAR = 2  # nodes or elements: places so near count as one there
-MOST_STEPS = 12
+LOCATIONS_PER_EFFECT = 3  # of an effect that are refined
+N_STEPPED, COST_RATIO = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
+N_STEPPED_HALFWAY = 3  # the same half-way to the axis
+NEIGHBOURHOOD = 2  # nodes or elements: places so near count as one there
+MAX_STEPS = 12
 GAIN = 0.5  # nats: a neighbour must be better by that
 
 
@@ -42,7 +42,7 @@ class Start:
 
     Parameters
     ----------
-    cause : Cause
+    component : Cause
         Effect and place.
     values : (n_parameters,) array
         Physical values of its parameters.
@@ -50,12 +50,12 @@ class Start:
         Robust misfit there; the lower the better.
     """
 
-    cause: Cause
+    component: Component
     values: FloatArray
     cost: float
 
 
-def robust_misfit(misfit: ComplexArray, weights: FloatArray) -> float:
+def compute_robust_misfit(misfit: ComplexArray, weights: FloatArray) -> float:
     """Sum of the logarithms of the lines' misfits.
 
     Parameters
@@ -103,37 +103,37 @@ def refine(
     misfit : float
         Robust misfit there.
     """
-    unknown = np.zeros(hypothesis.nuisance.size)
+    nuisance = np.zeros(hypothesis.nuisance_prior.size)
 
     def misfit_at(searched: FloatArray) -> ComplexArray:
-        response = hypothesis.respond(hypothesis.physical(searched), unknown, measured.s)
+        response = hypothesis.respond(hypothesis.to_physical(searched), nuisance, measured.s)
         return np.asarray(measured.values - response.values)
 
-    point = hypothesis.start_at(values)
+    point = hypothesis.clip_to_searched(values)
     misfit = misfit_at(point)
-    cost, damping = robust_misfit(misfit, weights), 1e-2
+    cost, damping = compute_robust_misfit(misfit, weights), 1e-2
     if not len(point):
         return values, cost
     for _ in range(iterations):
-        curvature, gradient = _normal(misfit_at, point, misfit, weights, hypothesis.high)
+        curvature, gradient = _normal_equations(misfit_at, point, misfit, weights, hypothesis.high)
         gain = 0.0
-        while damping < MOST_DAMPING:
+        while damping < MAX_DAMPING:
             step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature) + 1e-12), gradient)
             step *= min(1.0, LONGEST_STEP / float(np.abs(step).max() + 1e-300))
             trial = np.clip(point + step, hypothesis.low, hypothesis.high)
             trial_misfit = misfit_at(trial)
-            trial_cost = robust_misfit(trial_misfit, weights)
+            trial_cost = compute_robust_misfit(trial_misfit, weights)
             if trial_cost < cost:
                 gain, point, misfit, cost = cost - trial_cost, trial, trial_misfit, trial_cost
                 damping = max(0.2 * damping, 1e-6)
                 break
             damping *= 6.0
-        if gain < GOOD_ENOUGH:
+        if gain < MIN_GAIN:
             break
-    return hypothesis.physical(point), cost
+    return hypothesis.to_physical(point), cost
 
 
-def _normal(
+def _normal_equations(
     misfit_at: Callable[[FloatArray], ComplexArray],
     point: FloatArray,
     misfit: ComplexArray,
@@ -152,16 +152,16 @@ def _normal(
     return (derivative.conj().T @ weighted).real, (weighted.conj().T @ misfit.ravel()).real
 
 
-Supposed: TypeAlias = tuple[tuple[Cause, ...], Start]
+StartBeside: TypeAlias = tuple[tuple[Component, ...], Start]
 """What is supposed already, and one more cause with the values of all."""
 
 
-def refine_far(bench: InferenceProblem, base: Fit, starts: Sequence[Start]) -> list[Start]:
+def refine_starts(problem: InferenceProblem, base: Fit, starts: Sequence[Start]) -> list[Start]:
     """Refine the best starts of a wide search, and step to better places.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already.
@@ -173,30 +173,30 @@ def refine_far(bench: InferenceProblem, base: Fit, starts: Sequence[Start]) -> l
     list of Start
         With the values of all causes, by rising cost.
     """
-    weights = weights_of(bench.coarse, REFINED_ERROR)
+    weights = compute_weights(problem.coarse, REFINED_ERROR)
     found = []
-    for start in spread(starts, PLACES_EACH):
-        hypothesis = bench.suppose((*base.hypothesis.causes, start.cause))
-        values, cost = refine(hypothesis, bench.coarse, weights, np.concatenate([base.values, start.values]))
-        found.append(Start(cause=start.cause, values=values, cost=cost))
+    for start in select_apart(starts, LOCATIONS_PER_EFFECT):
+        hypothesis = problem.make_hypothesis((*base.hypothesis.components, start.component))
+        values, cost = refine(hypothesis, problem.coarse, weights, np.concatenate([base.values, start.values]))
+        found.append(Start(component=start.component, values=values, cost=cost))
     found.sort(key=lambda start: start.cost)
     stepped = [
-        step_far(bench, base.hypothesis.causes, start)
-        for start in found[:STEPPED]
-        if start.cost < NOT_FAR * found[0].cost
+        step_to_neighbours(problem, base.hypothesis.components, start)
+        for start in found[:N_STEPPED]
+        if start.cost < COST_RATIO * found[0].cost
     ]
     best: dict[tuple[object, ...], Start] = {}
     for start in sorted([*stepped, *found[len(stepped) :]], key=lambda start: start.cost):
-        best.setdefault(start.cause.key, start)
+        best.setdefault(start.component.key, start)
     return list(best.values())
 
 
-def bring_closer(bench: InferenceProblem, starts: Sequence[Supposed]) -> list[Supposed]:
+def refine_halfway(problem: InferenceProblem, starts: Sequence[StartBeside]) -> list[StartBeside]:
     """Bring starts half the way to the axis: their values, and the places of the best.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     starts : sequence of (tuple of Cause, Start)
         Each with what is supposed besides.
@@ -206,22 +206,22 @@ def bring_closer(bench: InferenceProblem, starts: Sequence[Supposed]) -> list[Su
     list of (tuple of Cause, Start)
         By rising cost half-way.
     """
-    weights = weights_of(bench.middle, REFINED_ERROR)
+    weights = compute_weights(problem.middle, REFINED_ERROR)
     closer = []
     for known, start in starts:
-        values, cost = refine(bench.suppose((*known, start.cause)), bench.middle, weights, start.values)
-        closer.append((known, Start(cause=start.cause, values=values, cost=cost)))
+        values, cost = refine(problem.make_hypothesis((*known, start.component)), problem.middle, weights, start.values)
+        closer.append((known, Start(component=start.component, values=values, cost=cost)))
     closer.sort(key=lambda one: one[1].cost)
-    best = [(known, _step(bench, known, start, bench.middle)) for known, start in closer[:STEPPED_CLOSER]]
-    return sorted([*best, *closer[STEPPED_CLOSER:]], key=lambda one: one[1].cost)
+    best = [(known, _step(problem, known, start, problem.middle)) for known, start in closer[:N_STEPPED_HALFWAY]]
+    return sorted([*best, *closer[N_STEPPED_HALFWAY:]], key=lambda one: one[1].cost)
 
 
-def step_far(bench: InferenceProblem, known: tuple[Cause, ...], start: Start) -> Start:
+def step_to_neighbours(problem: InferenceProblem, known: tuple[Component, ...], start: Start) -> Start:
     """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     known : tuple of Cause
         What is supposed besides, at the same places.
@@ -233,30 +233,32 @@ def step_far(bench: InferenceProblem, known: tuple[Cause, ...], start: Start) ->
     Start
         The same cause at a better place.
     """
-    return _step(bench, known, start, bench.coarse)
+    return _step(problem, known, start, problem.coarse)
 
 
-def _step(bench: InferenceProblem, known: tuple[Cause, ...], start: Start, measured: TransferFunctions) -> Start:
-    weights = weights_of(measured, REFINED_ERROR)
-    seen = {start.cause.key}
-    for _ in range(MOST_STEPS):
+def _step(problem: InferenceProblem, known: tuple[Component, ...], start: Start, measured: TransferFunctions) -> Start:
+    weights = compute_weights(measured, REFINED_ERROR)
+    seen = {start.component.key}
+    for _ in range(MAX_STEPS):
         better = start
-        for place in start.cause.effect.neighbours(bench.specimen, start.cause.place):
-            cause = Cause(effect=start.cause.effect, place=place, n_places=start.cause.n_places)
-            hypothesis = bench.suppose((*known, cause))
-            if cause.key in seen or len(hypothesis.parameters) != len(start.values):
+        for location in start.component.effect.neighbours(problem.context, start.component.location):
+            component = Component(
+                effect=start.component.effect, location=location, n_locations=start.component.n_locations
+            )
+            hypothesis = problem.make_hypothesis((*known, component))
+            if component.key in seen or len(hypothesis.parameters) != len(start.values):
                 continue
-            seen.add(cause.key)
+            seen.add(component.key)
             values, cost = refine(hypothesis, measured, weights, start.values, iterations=3)
             if cost < better.cost - GAIN:
-                better = Start(cause=cause, values=values, cost=cost)
+                better = Start(component=component, values=values, cost=cost)
         if better is start:
             break
         start = better
     return start
 
 
-def spread(starts: Iterable[Start], each: int) -> list[Start]:
+def select_apart(starts: Iterable[Start], each: int) -> list[Start]:
     """Take the best places of each effect that are not beside each other.
 
     Parameters
@@ -273,16 +275,16 @@ def spread(starts: Iterable[Start], each: int) -> list[Start]:
     """
     taken: dict[str, list[Start]] = {}
     for start in starts:
-        mine = taken.setdefault(start.cause.effect.name, [])
-        if len(mine) < each and not any(_beside(start.cause, other.cause) for other in mine):
+        mine = taken.setdefault(start.component.effect.name, [])
+        if len(mine) < each and not any(_are_neighbours(start.component, other.component) for other in mine):
             mine.append(start)
     return [start for mine in taken.values() for start in mine]
 
 
-def _beside(first: Cause, second: Cause) -> bool:
-    if len(first.place.key) != len(second.place.key):
+def _are_neighbours(first: Component, second: Component) -> bool:
+    if len(first.location.key) != len(second.location.key):
         return False
-    pairs = list(zip(first.place.key, second.place.key, strict=True))
+    pairs = list(zip(first.location.key, second.location.key, strict=True))
     numbers = [abs(a - b) for a, b in pairs if isinstance(a, int) and isinstance(b, int)]
     others_agree = all(a == b for a, b in pairs if not (isinstance(a, int) and isinstance(b, int)))
-    return others_agree and bool(numbers) and max(numbers) <= NEAR
+    return others_agree and bool(numbers) and max(numbers) <= NEIGHBOURHOOD

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
-from frf_ipz.diagnosis.search.global_scan import AT_ONCE, causes_of, receptances
+from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances, list_components
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Parameter, Signature
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
-    from frf_ipz.diagnosis.evidence.hypothesis import Cause, Hypothesis
+    from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.model.response import Response
 
-COLUMNS = 600  # signatures that are weighed together
-BESIDE = 1e-5  # of a neutral value, or of a range: so near, everything is linear
-LARGEST = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
-FADING = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
+BATCH_SIZE = 600  # signatures that are weighed together
+SMALL_STEP = 1e-5  # of a neutral value, or of a range: so near, everything is linear
+MAX_SCALING = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
+VANISHING_RATIO = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Score:
+class ScoreTest:
     """Weighs misfits by what scatter cannot explain.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         The data.
     base : Fit
         What is supposed already.
@@ -49,30 +49,30 @@ class Score:
         Whitened derivatives of the FRFs by the pulls of what cannot be known.
     factor : (n_nuisance, n_nuisance) array
         Lower Cholesky factor of their curvature with its prior.
-    pulls : (n_nuisance,) array
+    whitened_nuisance : (n_nuisance,) array
         Of the base.
     response : Response
         Of the base.
     """
 
-    bench: InferenceProblem
+    problem: InferenceProblem
     base: Fit
     data: Data
     misfit: FloatArray
     columns: FloatArray
     factor: FloatArray
-    pulls: FloatArray
+    whitened_nuisance: FloatArray
     response: Response
 
     def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
         """Change of the FRFs by some values, scatter as in the base."""
-        searched = hypothesis.start_at(np.concatenate([self.base.values, values]))
-        response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, self.data.measured.s)
+        searched = hypothesis.clip_to_searched(np.concatenate([self.base.values, values]))
+        response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, self.data.measured.s)
         return np.asarray(response.values - self.response.values)
 
     def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Half the fall of the sum of squares at some values, nats."""
-        misfit = self._misfit(hypothesis, hypothesis.start_at(np.concatenate([self.base.values, values])))
+        misfit = self._misfit(hypothesis, hypothesis.clip_to_searched(np.concatenate([self.base.values, values])))
         return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
 
     def weigh(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -98,20 +98,20 @@ class Score:
     def _misfit(self, hypothesis: Hypothesis, searched: FloatArray) -> FloatArray:
         """Whitened misfit, as it would be without scatter."""
         data = self.data
-        response = hypothesis.respond(hypothesis.physical(searched), self.base.unknown, data.measured.s)
-        return data.misfit(response) + self.columns @ self.pulls
+        response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, data.measured.s)
+        return data.misfit(response) + self.columns @ self.whitened_nuisance
 
     def _square(self, one: FloatArray, other: FloatArray) -> float:
         seen = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (one, other)]
         return float(one @ other - seen[0] @ seen[1])
 
 
-def score_on(bench: InferenceProblem, base: Fit, data: Data) -> Score:
+def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:
     """Prepare scores on top of a fit.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         What is tested.
     base : Fit
         What is supposed already.
@@ -120,31 +120,31 @@ def score_on(bench: InferenceProblem, base: Fit, data: Data) -> Score:
 
     Returns
     -------
-    Score
+    ScoreTest
         For any further cause.
     """
-    response = base.hypothesis.respond(base.values, base.unknown, data.measured.s)
-    jacobian = nuisance_jacobian(response, bench.nuisance, bench.specimen.layout)
-    pulls, slopes = bench.nuisance.pulls(base.unknown)
+    response = base.hypothesis.respond(base.values, base.nuisance, data.measured.s)
+    jacobian = nuisance_jacobian(response, problem.nuisance_prior, problem.context.layout)
+    whitened_nuisance, slopes = problem.nuisance_prior.whiten(base.nuisance)
     columns = data.slopes(response, jacobian) / slopes
-    return Score(
-        bench=bench,
+    return ScoreTest(
+        problem=problem,
         base=base,
         data=data,
-        misfit=data.misfit(response) + columns @ pulls,
+        misfit=data.misfit(response) + columns @ whitened_nuisance,
         columns=columns,
         factor=cholesky_with_prior(columns.T),
-        pulls=pulls,
+        whitened_nuisance=whitened_nuisance,
         response=response,
     )
 
 
-def close_search(bench: InferenceProblem, base: Fit) -> list[Start]:
+def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
     """Look for small effects.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and effects.
     base : Fit
         What is supposed already, nearly right.
@@ -154,71 +154,81 @@ def close_search(bench: InferenceProblem, base: Fit) -> list[Start]:
     list of Start
         The best values of each cause, the most promising first; the cost is minus the gain in nats.
     """
-    score = score_on(bench, base, bench.thin)
-    specimen = replace(bench.specimen, contour=bench.thin.measured.s)
-    causes = [cause for effect in bench.effects.values() for cause in causes_of(effect, specimen)]
-    sketches = [cause.effect.sketch(specimen, cause.place) for cause in causes]
-    drawn = [(cause, sketch) for cause, sketch in zip(causes, sketches, strict=True) if sketch is not None]
-    response = base.hypothesis.respond(base.values, base.unknown, specimen.contour)
-    found = _drawn(score, response, drawn)
-    found += [_direct(score, cause) for cause, sketch in zip(causes, sketches, strict=True) if sketch is None]
+    score = prepare_score_test(problem, base, problem.sparse_data)
+    context = replace(problem.context, contour=problem.sparse_data.measured.s)
+    components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
+    signatures = [component.effect.signature(context, component.location) for component in components]
+    drawn = [
+        (component, signature)
+        for component, signature in zip(components, signatures, strict=True)
+        if signature is not None
+    ]
+    response = base.hypothesis.respond(base.values, base.nuisance, context.contour)
+    found = _score_signatures(score, response, drawn)
+    found += [
+        _score_directly(score, component)
+        for component, signature in zip(components, signatures, strict=True)
+        if signature is None
+    ]
     return sorted(found, key=lambda start: start.cost)
 
 
-def _drawn(score: Score, response: Response, drawn: list[tuple[Cause, Signature]]) -> list[Start]:
+def _score_signatures(score: ScoreTest, response: Response, drawn: list[tuple[Component, Signature]]) -> list[Start]:
     """Weigh all shapes of all sketches; keep the best of each."""
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
-    for first in range(0, len(drawn), AT_ONCE):
-        some = drawn[first : first + AT_ONCE]
-        motions = np.stack([sketch.motion for _, sketch in some], 1)
+    for first in range(0, len(drawn), MOTIONS_AT_ONCE):
+        some = drawn[first : first + MOTIONS_AT_ONCE]
+        motions = np.stack([signature.motion for _, signature in some], 1)
         hypothesis = score.base.hypothesis
-        layout = hypothesis.specimen.layout
-        across = receptances(response, hypothesis.basis, layout, motions, np.zeros(len(some))).across
-        for column, (_, sketch) in enumerate(some):
-            for shape, curve in enumerate(sketch.shapes):
+        layout = hypothesis.context.layout
+        across = evaluate_receptances(response, hypothesis.basis, layout, motions, np.zeros(len(some))).across
+        for column, (_, signature) in enumerate(some):
+            for shape, curve in enumerate(signature.shapes):
                 batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))
-                if len(batch) == COLUMNS:
-                    _weigh(score, drawn, batch, best)
+                if len(batch) == BATCH_SIZE:
+                    _score_batch(score, drawn, batch, best)
                     batch = []
     if batch:
-        _weigh(score, drawn, batch, best)
+        _score_batch(score, drawn, batch, best)
     return list(best.values())
 
 
-def _weigh(
-    score: Score,
-    drawn: list[tuple[Cause, Signature]],
+def _score_batch(
+    score: ScoreTest,
+    drawn: list[tuple[Component, Signature]],
     batch: list[tuple[int, int, ComplexArray]],
     best: dict[int, Start],
 ) -> None:
     sizes, gains = score.weigh(np.stack([change for _, _, change in batch], 2))
     for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):
         if size > 0 and (index not in best or -gain < best[index].cost):
-            cause, sketch = drawn[index]
-            values = sketch.values[shape].copy()
-            if sketch.amplitudes is not None and len(sketch.amplitudes) == 1:
-                values = 1 + (values - 1) * min(size, LARGEST)
+            component, signature = drawn[index]
+            values = signature.values[shape].copy()
+            if signature.amplitudes is not None and len(signature.amplitudes) == 1:
+                values = 1 + (values - 1) * min(size, MAX_SCALING)
             else:
-                values[sketch.amplitude] *= size
-            best[index] = Start(cause=cause, values=values, cost=-gain)
+                values[signature.amplitude] *= size
+            best[index] = Start(component=component, values=values, cost=-gain)
 
 
-def _direct(score: Score, cause: Cause) -> Start:
+def _score_directly(score: ScoreTest, component: Component) -> Start:
     """Take the first parameter away from where the effect vanishes, by as much as explains most."""
-    hypothesis = score.bench.suppose((*score.base.hypothesis.causes, cause), exact=False)
+    hypothesis = score.problem.make_hypothesis((*score.base.hypothesis.components, component), exact=False)
     if not hypothesis.counts[-1]:
-        return Start(cause=cause, values=np.zeros(0), cost=-score.at(hypothesis, np.zeros(0)))
+        return Start(component=component, values=np.zeros(0), cost=-score.at(hypothesis, np.zeros(0)))
     first, *others = hypothesis.parameters[len(score.base.values) :]
     rest = [float(np.sqrt(parameter.low * parameter.high)) for parameter in others]
-    neutral, values = _small(first)
+    neutral, values = _smallest_values(first)
     is_between = first.low < first.neutral < first.high
     changed = score.change(hypothesis, np.array([values, *rest]))
     if is_between:
         changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
-    elif not _fades(changed, score.change(hypothesis, np.array([_twice(first, values), *rest]))):
+    elif not _vanishes_with_parameter(
+        changed, score.change(hypothesis, np.array([_double_effect(first, values), *rest]))
+    ):
         middle = np.array([float(np.sqrt(first.low * first.high)), *rest])
-        return Start(cause=cause, values=middle, cost=-score.at(hypothesis, middle))
+        return Start(component=component, values=middle, cost=-score.at(hypothesis, middle))
     sizes, gains = score.weigh(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
     if is_between:
@@ -230,23 +240,25 @@ def _direct(score: Score, cause: Cause) -> Start:
         value, gain = values, 0.0
     else:
         value = values * size if first.neutral == 0 else values / size
-    return Start(cause=cause, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain)
+    return Start(
+        component=component, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain
+    )
 
 
-def _fades(change: ComplexArray, of_twice: ComplexArray) -> bool:
+def _vanishes_with_parameter(change: ComplexArray, of_twice: ComplexArray) -> bool:
     """Whether an effect vanishes with its parameter; a sensor that is turned round does not."""
-    return bool(np.linalg.norm(of_twice) > FADING * np.linalg.norm(change))
+    return bool(np.linalg.norm(of_twice) > VANISHING_RATIO * np.linalg.norm(change))
 
 
-def _twice(parameter: Parameter, value: float) -> float:
+def _double_effect(parameter: Parameter, value: float) -> float:
     return value / 2 if np.isinf(parameter.neutral) else 2 * value
 
 
-def _small(parameter: Parameter) -> tuple[float, float]:
+def _smallest_values(parameter: Parameter) -> tuple[float, float]:
     """Where an effect vanishes, and a value just beside."""
     if np.isinf(parameter.neutral):
         return parameter.neutral, parameter.high
     if parameter.low < parameter.neutral < parameter.high:
-        step = BESIDE * (abs(parameter.neutral) or parameter.high - parameter.low)
+        step = SMALL_STEP * (abs(parameter.neutral) or parameter.high - parameter.low)
         return parameter.neutral, parameter.neutral + step
     return parameter.neutral, parameter.low

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
     from frf_ipz.diagnosis.nonlinear.linearity import Linearity
 
-RECIPROCAL = 4.0  # the same of FRFs the other way round, over noise and tolerances
-COHERENT = 0.5  # noise power over signal power, at the median of the points
-RINGS = 1e-4  # of a blow's peak: less ringing at the start of a record changes nothing
-BEFORE = 100  # samples before a blow that hold all ringing
-EXCHANGED = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
+MAX_RECIPROCITY_ERROR = 4.0  # the same of FRFs the other way round, over noise and tolerances
+MAX_NOISE_SHARE = 0.5  # noise power over signal power, at the median of the points
+MIN_RINGING = 1e-4  # of a blow's peak: less ringing at the start of a record changes nothing
+RINGING_SAMPLES = 100  # samples before a blow that hold all ringing
+RECIPROCITY_TOLERANCE = 0.02  # relative tolerance of FRFs the other way round: two places and two gains each
 
 
-def check(source: DataSplit, linearity: Linearity | None) -> tuple[DataCheck, ...]:
+def run_data_checks(source: DataSplit, linearity: Linearity | None) -> tuple[DataCheck, ...]:
     """Check a measurement.
 
     Parameters
@@ -39,10 +39,10 @@ def check(source: DataSplit, linearity: Linearity | None) -> tuple[DataCheck, ..
     tuple of DataCheck
         Homogeneity, reciprocity, coherence.
     """
-    return homogeneity(linearity), reciprocity(source.training), coherence(source.training)
+    return check_homogeneity(linearity), check_reciprocity(source.training), check_coherence(source.training)
 
 
-def warn(source: DataSplit, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
+def list_warnings(source: DataSplit, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     """Say what a user has to know before they believe a diagnosis.
 
     Parameters
@@ -50,14 +50,14 @@ def warn(source: DataSplit, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     source : DataSplit
         What was measured.
     gates : tuple of DataCheck
-        As `check` gives them.
+        As `run_data_checks` gives them.
 
     Returns
     -------
     tuple of str
         What failed, which records began too late, and which FRFs were too faint to tell anything.
     """
-    failed = (*(gate.statement for gate in gates if not gate.passed), *_late(source))
+    failed = (*(gate.statement for gate in gates if not gate.passed), *_warn_of_missing_ringing(source))
     faint = find_faint_frfs(source.training)
     if not faint:
         return failed
@@ -70,7 +70,7 @@ def warn(source: DataSplit, gates: tuple[DataCheck, ...]) -> tuple[str, ...]:
     )
 
 
-def _late(source: DataSplit) -> tuple[str, ...]:
+def _warn_of_missing_ringing(source: DataSplit) -> tuple[str, ...]:
     """Say which records begin within the ringing that the converter's filter makes before a blow."""
     if source.kind != "hammer" or not isinstance(source.survey, RecordSurvey):
         return ()
@@ -79,23 +79,23 @@ def _late(source: DataSplit) -> tuple[str, ...]:
     late = [
         record.name
         for record, pulse in zip(records, pulses, strict=True)
-        if missing_ringing(pulse, record.responses)[0] > RINGS * record.level
+        if missing_ringing(pulse, record.responses)[0] > MIN_RINGING * record.level
     ]
     if not late:
         return ()
     return (
         f"{', '.join(late)}: the recording begins within the ringing that the converter's filter makes before a blow, "
-        f"and lacks part of it: FRFs are less certain by that. Let it start {BEFORE} samples before the blow.",
+        f"and lacks part of it: FRFs are less certain by that. Let it start {RINGING_SAMPLES} samples before the blow.",
     )
 
 
-def homogeneity(linearity: Linearity | None) -> DataCheck:
+def check_homogeneity(linearity: Linearity | None) -> DataCheck:
     """Say whether strong and weak blows agree.
 
     Parameters
     ----------
     linearity : Linearity, optional
-        As for `check`.
+        As for `run_data_checks`.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def homogeneity(linearity: Linearity | None) -> DataCheck:
     return DataCheck(name="homogeneity", value=linearity.score, limit=linearity.limit, statement=statement)
 
 
-def reciprocity(measured: TransferFunctions) -> DataCheck:
+def check_reciprocity(measured: TransferFunctions) -> DataCheck:
     """Compare FRFs whose sensor and blow change places.
 
     Parameters
@@ -133,34 +133,34 @@ def reciprocity(measured: TransferFunctions) -> DataCheck:
         for other in range(index + 1, len(ends)):
             same = measured.labels[index].quantity is measured.labels[other].quantity
             if ends[other] == (struck, output) and output != struck and same:
-                ratios.append(_exchanged(measured, index, other))
+                ratios.append(_reciprocity_error(measured, index, other))
     if not ratios:
         return DataCheck(
             name="reciprocity",
             value=np.nan,
-            limit=RECIPROCAL,
+            limit=MAX_RECIPROCITY_ERROR,
             statement="Reciprocity could not be checked: no FRF was measured both ways.",
         )
     value = max(ratios)
-    good = value <= RECIPROCAL
+    is_reciprocal = value <= MAX_RECIPROCITY_ERROR
     statement = (
         "FRFs are the same with sensor and blow exchanged."
-        if good
+        if is_reciprocal
         else f"FRFs differ with sensor and blow exchanged, {value:.3g} times more than noise and tolerances explain: a "
         "place, a gain or a delay is wrong, or something is not linear."
     )
-    return DataCheck(name="reciprocity", value=value, limit=RECIPROCAL, statement=statement)
+    return DataCheck(name="reciprocity", value=value, limit=MAX_RECIPROCITY_ERROR, statement=statement)
 
 
-def _exchanged(measured: TransferFunctions, first: int, second: int) -> float:
+def _reciprocity_error(measured: TransferFunctions, first: int, second: int) -> float:
     signs = measured.labels[first].sign * measured.labels[second].sign
     difference = measured.values[:, first] - signs * measured.values[:, second]
     size = np.maximum(measured.size[:, first], measured.size[:, second])
-    noise = _noise(measured)[:, first] + _noise(measured)[:, second] + (EXCHANGED * size) ** 2
+    noise = _noise(measured)[:, first] + _noise(measured)[:, second] + (RECIPROCITY_TOLERANCE * size) ** 2
     return float(np.mean(np.abs(difference) ** 2 / noise))
 
 
-def coherence(measured: TransferFunctions) -> DataCheck:
+def check_coherence(measured: TransferFunctions) -> DataCheck:
     """Compare noise with signal.
 
     Parameters
@@ -178,11 +178,11 @@ def coherence(measured: TransferFunctions) -> DataCheck:
     value = float(share[worst])
     statement = (
         "The FRFs stand out of the noise."
-        if value <= COHERENT
+        if value <= MAX_NOISE_SHARE
         else f"The FRF {measured.labels[worst]} drowns in noise over half of the band or more: strike harder, average "
         "more, or leave it out."
     )
-    return DataCheck(name="coherence", value=value, limit=COHERENT, statement=statement)
+    return DataCheck(name="coherence", value=value, limit=MAX_NOISE_SHARE, statement=statement)
 
 
 def _noise(measured: TransferFunctions) -> FloatArray:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.result import Estimate, Finding, doubt_of_place
-from frf_ipz.diagnosis.search.component_search import by_effect
+from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set
+from frf_ipz.diagnosis.search.component_search import group_by_effect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
 
 NORMAL_95 = 1.96
-LISTED = 0.95  # probability that the listed places hold
-MOST_PLACES = 12
-INSIGNIFICANT = 2.0  # times a tolerance: a user's tolerances are half widths, not standard deviations
+LISTED_PROBABILITY = 0.95  # probability that the listed places hold
+MAX_LOCATIONS = 12
+INSIGNIFICANT_RATIO = 2.0  # times a tolerance: a user's tolerances are half widths, not standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Weighed:
+class RankedEffect:
     """An effect, with all its places weighed together.
 
     Parameters
@@ -48,10 +48,10 @@ class Weighed:
     @property
     def name(self) -> str:
         """The effect."""
-        return self.best.hypothesis.causes[-1].effect.name
+        return self.best.hypothesis.components[-1].effect.name
 
 
-def weigh(fits: Sequence[Fit], scale: float) -> list[Weighed]:
+def rank_effects(fits: Sequence[Fit], scale: float) -> list[RankedEffect]:
     """Turn evidence into probabilities of effects.
 
     Parameters
@@ -63,47 +63,53 @@ def weigh(fits: Sequence[Fit], scale: float) -> list[Weighed]:
 
     Returns
     -------
-    list of Weighed
+    list of RankedEffect
         By falling probability; the first is the best of its ranking.
     """
     if not fits:
         return []
     top = max(fit.log_evidence for fit in fits)
     found = []
-    for group in by_effect(fits):
+    for group in group_by_effect(fits):
         weights = np.exp(np.maximum((np.array([fit.log_evidence for fit in group]) - top) / scale, -700.0))
         found.append((group, float(weights.sum()), tuple((weights / weights.sum()).tolist())))
     total = sum(weight for _, weight, _ in found)
-    return [Weighed(fits=group, probability=weight / total, shares=shares) for group, weight, shares in found]
+    return [RankedEffect(fits=group, probability=weight / total, shares=shares) for group, weight, shares in found]
 
 
-def finding_of(weighed: Weighed, gain: float, scale: float) -> Finding:
+def make_finding(weighed: RankedEffect, gain: float, scale: float) -> Finding:
     """Describe the newest cause of a fit.
 
     Parameters
     ----------
-    weighed : Weighed
+    weighed : RankedEffect
         The effect.
     gain : float
         Its evidence over that without it, nats.
     scale : float
-        As for `weigh`: intervals grow with its root.
+        As for `rank_effects`: intervals grow with its root.
 
     Returns
     -------
     Finding
         To report.
     """
-    return describe(
-        weighed.best, -1, weighed.probability, gain, scale, places=_places(weighed), across=_across_places(weighed)
+    return describe_component(
+        weighed.best,
+        -1,
+        weighed.probability,
+        gain,
+        scale,
+        location_set=_location_set(weighed),
+        across=_variance_across_locations(weighed),
     )
 
 
-def _across_places(weighed: Weighed) -> FloatArray:
+def _variance_across_locations(weighed: RankedEffect) -> FloatArray:
     """Variance, as searched, of the newest cause's parameters from place to place: the place is not certain either."""
     count = weighed.best.hypothesis.counts[-1]
     own = [
-        (share, fit.hypothesis.start_at(fit.values)[len(fit.values) - count :])
+        (share, fit.hypothesis.clip_to_searched(fit.values)[len(fit.values) - count :])
         for fit, share in zip(weighed.fits, weighed.shares, strict=True)
         if fit.hypothesis.counts[-1] == count and count
     ]
@@ -113,14 +119,14 @@ def _across_places(weighed: Weighed) -> FloatArray:
     return np.asarray(np.array([share for share, _ in own]) @ off**2)
 
 
-def describe(
+def describe_component(
     fit: Fit,
     which: int,
     probability: float,
     gain: float,
     scale: float,
     *,
-    places: tuple[dict[str, object], ...],
+    location_set: tuple[dict[str, object], ...],
     across: FloatArray | float = 0.0,
 ) -> Finding:
     """Describe one cause of a fit.
@@ -137,7 +143,7 @@ def describe(
         Its evidence over that without it, nats.
     scale : float
         Intervals grow with its root.
-    places : tuple of dict
+    location_set : tuple of dict
         Where else it could be, the most probable first.
     across : (n_parameters,) array or float
         Variance of its parameters, as searched, from place to place.
@@ -148,40 +154,41 @@ def describe(
         To report.
     """
     hypothesis = fit.hypothesis
-    cause = hypothesis.causes[which]
-    place = which % len(hypothesis.causes)
-    numbers = _estimates(fit, place, scale, across)
-    start = sum(hypothesis.counts[:place])
+    component = hypothesis.components[which]
+    index = which % len(hypothesis.components)
+    estimates = _estimate_parameters(fit, index, scale, across)
+    start = sum(hypothesis.counts[:index])
     return Finding(
-        effect=cause.effect.name,
-        location=dict(cause.place.location),
-        parameters={**cause.place.text, **numbers},
+        effect=component.effect.name,
+        location=dict(component.location.entries),
+        parameters={**component.location.text, **estimates},
         probability=probability,
         log_evidence_gain=gain,
-        statement=cause.effect.statement(hypothesis.specimen, cause.place, numbers) + doubt_of_place(places),
-        location_set=places,
-        is_significant=is_significant(fit, place),
-        key=cause.place.key,
-        values=tuple(float(value) for value in fit.values[start : start + hypothesis.counts[place]]),
+        statement=component.effect.statement(hypothesis.context, component.location, estimates)
+        + describe_location_set(location_set),
+        location_set=location_set,
+        is_significant=is_significant(fit, index),
+        key=component.location.key,
+        values=tuple(float(value) for value in fit.values[start : start + hypothesis.counts[index]]),
     )
 
 
-def _places(weighed: Weighed) -> tuple[dict[str, object], ...]:
+def _location_set(weighed: RankedEffect) -> tuple[dict[str, object], ...]:
     found: list[dict[str, object]] = []
     total = 0.0
-    for fit, share in zip(weighed.fits[:MOST_PLACES], weighed.shares, strict=False):
-        location = dict(fit.hypothesis.causes[-1].place.location)
+    for fit, share in zip(weighed.fits[:MAX_LOCATIONS], weighed.shares, strict=False):
+        location = dict(fit.hypothesis.components[-1].location.entries)
         if location not in found:
             found.append(location)
         total += share
-        if total >= LISTED:
+        if total >= LISTED_PROBABILITY:
             break
     return tuple(found)
 
 
-def _estimates(fit: Fit, which: int, scale: float, across: FloatArray | float) -> dict[str, Estimate]:
+def _estimate_parameters(fit: Fit, which: int, scale: float, across: FloatArray | float) -> dict[str, Estimate]:
     hypothesis = fit.hypothesis
-    cause, start = hypothesis.causes[which], sum(hypothesis.counts[:which])
+    component, start = hypothesis.components[which], sum(hypothesis.counts[:which])
     variance = np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0)
     variance[start : start + hypothesis.counts[which]] += across
     spread = np.sqrt(variance)
@@ -196,8 +203,10 @@ def _estimates(fit: Fit, which: int, scale: float, across: FloatArray | float) -
         else:
             std *= parameter.high - parameter.low
             ends = value - NORMAL_95 * std, value + NORMAL_95 * std
-        low, high = sorted(cause.effect.reported(cause.place, parameter.name, float(end)) for end in ends)
-        shown = cause.effect.reported(cause.place, parameter.name, value)
+        low, high = sorted(
+            component.effect.report_value(component.location, parameter.name, float(end)) for end in ends
+        )
+        shown = component.effect.report_value(component.location, parameter.name, value)
         found[parameter.name] = Estimate(value=shown, std=std, low=low, high=high)
     return found
 
@@ -218,7 +227,7 @@ def is_significant(fit: Fit, which: int) -> bool:
         False where every parameter lies within its tolerance.
     """
     hypothesis = fit.hypothesis
-    which %= len(hypothesis.causes)
+    which %= len(hypothesis.components)
     start = sum(hypothesis.counts[:which])
     own = range(start, start + hypothesis.counts[which])
     stated = [index for index in own if hypothesis.parameters[index].tolerance > 0]
@@ -226,6 +235,6 @@ def is_significant(fit: Fit, which: int) -> bool:
         return True
     return any(
         abs(fit.values[index] - hypothesis.parameters[index].neutral)
-        > INSIGNIFICANT * hypothesis.parameters[index].tolerance
+        > INSIGNIFICANT_RATIO * hypothesis.parameters[index].tolerance
         for index in stated
     )

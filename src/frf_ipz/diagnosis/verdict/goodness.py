@@ -11,19 +11,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import IntArray
-from frf_ipz.diagnosis.model.nuisance import UNIFORM
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-FOUND_NATS = 30.0  # evidence over the nominal model's: what a finding needs
-PARTIAL_NATS = 50.0  # evidence of a second finding over the first one's alone, where the two do not explain all
-STRONG_NATS = 200.0  # evidence of a second finding: with less, a third one is not looked for
-MOST_PULL = 45.0  # sum of squares of what cannot be known, where the data determine little of it
-PULL_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
-MOST_OF_ONE = 3.2  # standard deviations of one damping ratio or gain: 172 tests with nothing missing reached 2.6
-PIECES = 6  # of the band, by points
+FIRST_LOG_BAYES_FACTOR = 30.0  # evidence over the nominal model's: what a finding needs
+PARTIAL_LOG_BAYES_FACTOR = (
+    50.0  # evidence of a second finding over the first one's alone, where the two do not explain all
+)
+STRONG_LOG_BAYES_FACTOR = 200.0  # evidence of a second finding: with less, a third one is not looked for
+NUISANCE_CHI2_FLOOR = 45.0  # sum of squares of what cannot be known, where the data determine little of it
+NUISANCE_CHI2_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
+MAX_SINGLE_DEVIATION = (
+    3.2  # standard deviations of one damping ratio or gain: 172 tests with nothing missing reached 2.6
+)
+N_SUBBANDS = 6  # of the band, by points
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,25 +38,25 @@ class Limits:
     ----------
     misfit : float
         Sum of squares over the number of values.
-    piece : float
+    subband : float
         The same of an FRF over a piece of the band.
-    found_nats : float
+    first_log_bayes_factor : float
         Evidence over the nominal model's that a first finding needs.
-    second_nats : float
+    second_log_bayes_factor : float
         Evidence over the first one's alone that a second finding needs with which nothing is left to explain.
-    beside_nats : float
+    beside_log_bayes_factor : float
         The same where the first one leaves nothing to explain either.
-    detuned : float
+    frequency_deviation : float
         Standard deviations of one natural frequency: 153 tests with nothing missing reached 1.0; FRFs of two states,
         whose tolerances are learnt from one of them, 2.8.
     """
 
     misfit: float
-    piece: float
-    found_nats: float = FOUND_NATS
-    second_nats: float = PARTIAL_NATS
-    beside_nats: float = 80.0
-    detuned: float = 2.5
+    subband: float
+    first_log_bayes_factor: float = FIRST_LOG_BAYES_FACTOR
+    second_log_bayes_factor: float = PARTIAL_LOG_BAYES_FACTOR
+    beside_log_bayes_factor: float = 80.0
+    frequency_deviation: float = 2.5
 
 
 # By what was looked at: the coarser its noise is known, the wider. With nothing missing, 50 tests with a hammer
@@ -63,10 +67,10 @@ class Limits:
 # cause a second one gained no more than 1 nat in 40 tests with a hammer. Where one leaves something to explain that a
 # second one explains, odds of 20 to 1 are enough.
 LIMITS = {
-    "hammer": Limits(misfit=1.1, piece=3.6, second_nats=3.0, beside_nats=8.0),
-    "random": Limits(misfit=1.3, piece=5.0, second_nats=3.0, beside_nats=8.0),
-    "running": Limits(misfit=1.5, piece=5.0, found_nats=40.0),
-    "frf": Limits(misfit=2.2, piece=6.5, found_nats=80.0, detuned=MOST_OF_ONE),
+    "hammer": Limits(misfit=1.1, subband=3.6, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
+    "random": Limits(misfit=1.3, subband=5.0, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
+    "running": Limits(misfit=1.5, subband=5.0, first_log_bayes_factor=40.0),
+    "frf": Limits(misfit=2.2, subband=6.5, first_log_bayes_factor=80.0, frequency_deviation=MAX_SINGLE_DEVIATION),
 }
 
 
@@ -78,27 +82,27 @@ class Goodness:
     ----------
     misfit : float
         Mean square of the whitened misfit.
-    pull : float
+    nuisance_chi2 : float
         Sum of squares of what cannot be known, in standard deviations.
-    worst_piece : float
+    worst_subband : float
         Largest mean square of an FRF over a piece of the band.
-    farthest : float
+    largest_deviation : float
         Largest deviation of one damping ratio or gain, in standard deviations: that others have none makes up for none.
-    detuned : float
+    frequency_deviation : float
         Largest deviation of one natural frequency, in standard deviations.
     limits : Limits
         What they may be.
-    most_pull : float
+    nuisance_chi2_limit : float
         What the pull may be.
     """
 
     misfit: float
-    pull: float
-    worst_piece: float
-    farthest: float
-    detuned: float
+    nuisance_chi2: float
+    worst_subband: float
+    largest_deviation: float
+    frequency_deviation: float
     limits: Limits
-    most_pull: float
+    nuisance_chi2_limit: float
 
     @property
     def is_good(self) -> bool:
@@ -111,45 +115,47 @@ class Goodness:
         return max(self._over_limits)
 
     @property
-    def complaint(self) -> str:
+    def shortfall(self) -> str:
         """What is worst about it, in words that begin with "the best explanation"."""
         worst = (
             f"leaves {np.sqrt(self.misfit):.3g} times the expected misfit",
             "needs more than the tolerances of the nominal model allow "
-            f"({self.pull:.0f} squared deviations, {self.most_pull:.0f} are likely)",
-            f"leaves {np.sqrt(self.worst_piece):.3g} times the expected misfit in one FRF over a part of the band",
-            f"needs a damping ratio or a gain that is {self.farthest * UNIFORM:.2g} times its tolerance off",
-            f"needs a natural frequency that is {self.detuned * UNIFORM:.2g} times what the tolerances allow off",
+            f"({self.nuisance_chi2:.0f} squared deviations, {self.nuisance_chi2_limit:.0f} are likely)",
+            f"leaves {np.sqrt(self.worst_subband):.3g} times the expected misfit in one FRF over a part of the band",
+            f"needs a damping ratio or a gain that is {self.largest_deviation * UNIFORM_STD:.2g} times its tolerance "
+            "off",
+            f"needs a natural frequency that is {self.frequency_deviation * UNIFORM_STD:.2g} times what the tolerances "
+            "allow off",
         )[int(np.argmax(self._over_limits))]
         return f"the best explanation {worst}"
 
     @property
-    def times_underrated(self) -> float:
+    def error_underestimation(self) -> float:
         """How much the errors of a good model are underrated somewhere: a cause beside it must explain as much more."""
-        return max(1.0, self.worst_piece) if self.is_good else 1.0
+        return max(1.0, self.worst_subband) if self.is_good else 1.0
 
     @property
-    def needed_nats(self) -> float:
+    def required_log_bayes_factor(self) -> float:
         """Evidence that a first cause must have where this is the nominal model."""
-        return self.times_underrated * self.limits.found_nats
+        return self.error_underestimation * self.limits.first_log_bayes_factor
 
     @property
     def _over_limits(self) -> tuple[float, float, float, float, float]:
         return (
             self.misfit / self.limits.misfit,
-            self.pull / self.most_pull,
-            self.worst_piece / self.limits.piece,
-            (self.farthest / MOST_OF_ONE) ** 2,
-            (self.detuned / self.limits.detuned) ** 2,
+            self.nuisance_chi2 / self.nuisance_chi2_limit,
+            self.worst_subband / self.limits.subband,
+            (self.largest_deviation / MAX_SINGLE_DEVIATION) ** 2,
+            (self.frequency_deviation / self.limits.frequency_deviation) ** 2,
         )
 
 
-def goodness(bench: InferenceProblem, fit: Fit) -> Goodness:
+def assess_goodness(problem: InferenceProblem, fit: Fit) -> Goodness:
     """Measure how well a fit explains what it was fitted to.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With the data.
     fit : Fit
         Any fit.
@@ -159,26 +165,30 @@ def goodness(bench: InferenceProblem, fit: Fit) -> Goodness:
     Goodness
         The figures.
     """
-    white, nuisance = _white(bench.data, fit), bench.nuisance
-    pieces = [piece for piece in np.array_split(white, PIECES, axis=2) if piece.size]
-    worst = max(float(np.mean(piece**2, axis=(1, 2)).max()) for piece in pieces)
-    most_pull = max(MOST_PULL, fit.freedom + PULL_DEVIATIONS * np.sqrt(2 * fit.freedom))
+    white, nuisance_prior = _whitened_misfit(problem.data, fit), problem.nuisance_prior
+    subbands = [subband for subband in np.array_split(white, N_SUBBANDS, axis=2) if subband.size]
+    worst = max(float(np.mean(subband**2, axis=(1, 2)).max()) for subband in subbands)
+    nuisance_chi2_limit = max(
+        NUISANCE_CHI2_FLOOR, fit.n_determined + NUISANCE_CHI2_DEVIATIONS * np.sqrt(2 * fit.n_determined)
+    )
     return Goodness(
         misfit=float(np.mean(white**2)),
-        pull=fit.pull,
-        worst_piece=worst,
-        farthest=_farthest(fit, np.concatenate([nuisance.damping_places[nuisance.is_stated], nuisance.gain_places])),
-        detuned=_farthest(fit, nuisance.frequency_places[nuisance.is_stated]),
-        limits=LIMITS[bench.kind],
-        most_pull=float(most_pull),
+        nuisance_chi2=fit.nuisance_chi2,
+        worst_subband=worst,
+        largest_deviation=_largest_deviation(
+            fit, np.concatenate([nuisance_prior.damping_indices[nuisance_prior.is_stated], nuisance_prior.gain_indices])
+        ),
+        frequency_deviation=_largest_deviation(fit, nuisance_prior.frequency_indices[nuisance_prior.is_stated]),
+        limits=LIMITS[problem.kind],
+        nuisance_chi2_limit=float(nuisance_chi2_limit),
     )
 
 
-def _farthest(fit: Fit, places: IntArray) -> float:
-    return float(np.abs(fit.unknown[places]).max(initial=0.0))
+def _largest_deviation(fit: Fit, indices: IntArray) -> float:
+    return float(np.abs(fit.nuisance[indices]).max(initial=0.0))
 
 
-def _white(data: Data, fit: Fit) -> np.ndarray:
+def _whitened_misfit(data: Data, fit: Fit) -> np.ndarray:
     """Whitened misfit by FRF, real and imaginary part, and point."""
-    response = fit.hypothesis.respond(fit.values, fit.unknown, data.measured.s)
+    response = fit.hypothesis.respond(fit.values, fit.nuisance, data.measured.s)
     return data.misfit(response).reshape(len(data.measured.labels), 2, len(data.measured.s))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.diagnosis.evidence.hypothesis import Cause
+from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
@@ -20,22 +20,24 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-PLACES = 2  # of each effect, spread over the structure
-STEPS = 5  # halvings of the range
-MOST_CANDIDATES = 60
-TELLS = 0.02  # relative difference of FRFs that a measurement shows beyond doubt
+N_LOCATIONS = 2  # of each effect, spread over the structure
+N_HALVINGS = 5  # halvings of the range
+MAX_CANDIDATES = 60
+DISTINCT = 0.02  # relative difference of FRFs that a measurement shows beyond doubt
 
 
-def detectable_sizes(bench: InferenceProblem, null: Fit, needed_nats: float) -> dict[str, dict[str, float]]:
+def find_detectable_sizes(
+    problem: InferenceProblem, null: Fit, required_log_bayes_factor: float
+) -> dict[str, dict[str, float]]:
     """Find the size at which each effect changes the FRFs by more than noise and tolerances can explain.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         The measurement.
     null : Fit
         Of the nominal model.
-    needed_nats : float
+    required_log_bayes_factor : float
         Evidence that a finding needs.
 
     Returns
@@ -44,10 +46,13 @@ def detectable_sizes(bench: InferenceProblem, null: Fit, needed_nats: float) -> 
         For each effect, the value of its first parameter at the place where it shows best; effects that have no
         parameter, or do not apply, are left out.
     """
-    measure = _evidence(bench, null)
+    measure = _make_evidence(problem, null)
     found = {}
-    for effect in bench.effects.values():
-        sizes = [_smallest(bench, effect, place, measure, needed_nats) for place in _some_places(bench, effect)]
+    for effect in problem.effects.values():
+        sizes = [
+            _smallest(problem, effect, location, measure, required_log_bayes_factor)
+            for location in _spread_locations(problem, effect)
+        ]
         known = [size for size in sizes if size is not None]
         if known:
             best = min(known, key=lambda size: size[2])
@@ -55,17 +60,17 @@ def detectable_sizes(bench: InferenceProblem, null: Fit, needed_nats: float) -> 
     return found
 
 
-def _some_places(bench: InferenceProblem, effect: Effect) -> list[Cause]:
-    places = list(effect.places(bench.specimen))
-    chosen = places[:: -(-len(places) // PLACES)] if places else []
-    return [Cause(effect=effect, place=place, n_places=len(places)) for place in chosen]
+def _spread_locations(problem: InferenceProblem, effect: Effect) -> list[Component]:
+    locations = list(effect.locations(problem.context))
+    chosen = locations[:: -(-len(locations) // N_LOCATIONS)] if locations else []
+    return [Component(effect=effect, location=location, n_locations=len(locations)) for location in chosen]
 
 
-def _evidence(bench: InferenceProblem, null: Fit) -> Callable[[Hypothesis, FloatArray], float]:
+def _make_evidence(problem: InferenceProblem, null: Fit) -> Callable[[Hypothesis, FloatArray], float]:
     """Half the squared norm of a change that no scatter explains."""
-    data, nothing = bench.data, np.zeros(bench.nuisance.size)
+    data, nothing = problem.data, np.zeros(problem.nuisance_prior.size)
     nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
-    columns = data.slopes(nominal, nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout))
+    columns = data.slopes(nominal, nuisance_jacobian(nominal, problem.nuisance_prior, problem.context.layout))
     factor = cholesky_with_prior(columns.T)
 
     def evidence(hypothesis: Hypothesis, values: FloatArray) -> float:
@@ -78,32 +83,32 @@ def _evidence(bench: InferenceProblem, null: Fit) -> Callable[[Hypothesis, Float
 
 
 def _smallest(
-    bench: InferenceProblem,
+    problem: InferenceProblem,
     effect: Effect,
-    cause: Cause,
+    component: Component,
     measure: Callable[[Hypothesis, FloatArray], float],
-    needed_nats: float,
+    required_log_bayes_factor: float,
 ) -> tuple[str, float, float] | None:
     """Name, value and relative size of the first parameter at the threshold; None where there is none."""
-    parameters = effect.parameters(bench.specimen, cause.place)
+    parameters = effect.parameters(problem.context, component.location)
     if not parameters:
         return None
-    hypothesis = bench.suppose((cause,))
+    hypothesis = problem.make_hypothesis((component,))
     first = parameters[0]
     others = [float(np.sqrt(p.low * p.high)) if p.is_log else 0.5 * (p.low + p.high) for p in parameters[1:]]
     near, far = 0.0, 1.0
-    if measure(hypothesis, np.array([_at(first, far), *others])) < needed_nats:
+    if measure(hypothesis, np.array([_value_at(first, far), *others])) < required_log_bayes_factor:
         return None
-    for _ in range(STEPS):
+    for _ in range(N_HALVINGS):
         middle = 0.5 * (near + far)
-        if measure(hypothesis, np.array([_at(first, middle), *others])) < needed_nats:
+        if measure(hypothesis, np.array([_value_at(first, middle), *others])) < required_log_bayes_factor:
             near = middle
         else:
             far = middle
-    return first.name, effect.reported(cause.place, first.name, _at(first, far)), far
+    return first.name, effect.report_value(component.location, first.name, _value_at(first, far)), far
 
 
-def _at(parameter: Parameter, part: float) -> float:
+def _value_at(parameter: Parameter, part: float) -> float:
     """From where an effect vanishes (0) to where it is largest (1)."""
     if not parameter.is_log:
         return parameter.neutral + part * (parameter.high - parameter.neutral)
@@ -114,12 +119,12 @@ def _at(parameter: Parameter, part: float) -> float:
     return float(np.exp(start + part * (high - start)))
 
 
-def best_sensor(bench: InferenceProblem, first: Fit, second: Fit) -> str:
+def find_best_sensor(problem: InferenceProblem, first: Fit, second: Fit) -> str:
     """Find the place at which two explanations predict the most different FRFs.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With the test as it is.
     first, second : Fit
         The explanations.
@@ -129,16 +134,16 @@ def best_sensor(bench: InferenceProblem, first: Fit, second: Fit) -> str:
     str
         A sentence.
     """
-    specimen = bench.specimen
-    dofs = specimen.moving_dofs[:: -(-len(specimen.moving_dofs) // MOST_CANDIDATES)]
-    motions = np.stack([specimen.unit(dof) for dof in dofs], 1)
-    s = specimen.contour
+    context = problem.context
+    dofs = context.moving_dofs[:: -(-len(context.moving_dofs) // MAX_CANDIDATES)]
+    motions = np.stack([context.unit(dof) for dof in dofs], 1)
+    s = context.contour
     one, other = (_receptances(fit, motions, s) for fit in (first, second))
     size = np.sqrt(np.mean(np.abs(one) ** 2, axis=0))
     apart = np.sqrt(np.mean(np.abs(one - other) ** 2, axis=0)) / np.maximum(size, 1e-3 * size.max())
     sensor, struck = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    where, record = specimen.where(dofs[int(sensor)].node), specimen.layout.inputs[int(struck)]
-    if apart[sensor, struck] < TELLS:
+    where, record = context.where(dofs[int(sensor)].node), context.layout.inputs[int(struck)]
+    if apart[sensor, struck] < DISTINCT:
         return (
             "No further sensor in the directions of this test tells them apart; that takes a wider band, or another "
             "kind of test."
@@ -150,6 +155,6 @@ def best_sensor(bench: InferenceProblem, first: Fit, second: Fit) -> str:
 
 
 def _receptances(fit: Fit, motions: FloatArray, s: ComplexArray) -> ComplexArray:
-    response = fit.hypothesis.respond(fit.values, fit.unknown, s)
+    response = fit.hypothesis.respond(fit.values, fit.nuisance, s)
     shapes = motions.T @ fit.hypothesis.basis.vectors @ response.modes.vectors
     return np.asarray(np.matmul(shapes, response.input_motion))

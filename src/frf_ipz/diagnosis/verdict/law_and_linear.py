@@ -14,9 +14,9 @@ from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_ef
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.nonlinear.simulate import subtract_law
-from frf_ipz.diagnosis.search.component_search import fit_nothing, search
-from frf_ipz.diagnosis.verdict.decision import EXPLAINED, gain_over
-from frf_ipz.diagnosis.verdict.findings import finding_of, is_significant, weigh
+from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
+from frf_ipz.diagnosis.verdict.decision import EXPLAINED, log_bayes_factor
+from frf_ipz.diagnosis.verdict.findings import is_significant, make_finding, rank_effects
 from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
 if TYPE_CHECKING:
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.verdict.decision import Decision
     from frf_ipz.structure import StructuralModel
 
-MOST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
+MAX_COST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
 STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
-FOLLOWED = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
-RUN_AWAY = 100.0  # times the largest response: no structure moves so much more without a law
-EASED = 0.5  # times the strain: what a linear cause beside a law must come down to
+MAX_MISFIT = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
+MAX_GROWTH = 100.0  # times the largest response: no structure moves so much more without a law
+RELIEF = 0.5  # times the strain: what a linear cause beside a law must come down to
 
 
 def search_beside_linear(
-    bench: InferenceProblem,
+    problem: InferenceProblem,
     linear: Decision,
     alone: LawSearch,
     model: StructuralModel,
@@ -48,7 +48,7 @@ def search_beside_linear(
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data, model and linear effects.
     linear : Decision
         What a linear search came to; where none was made, it is made here.
@@ -68,12 +68,15 @@ def search_beside_linear(
         and beside the cause the law no longer strains the nominal model. None where less holds.
     """
     null = linear.null
-    ranking = linear.ranking if linear.ranking.fits else search(bench, null)
+    ranking = linear.ranking if linear.ranking.fits else search_component(problem, null)
     best = ranking.best
-    is_most = best.cost <= MOST_LEFT * null.cost
+    is_most = best.cost <= MAX_COST_LEFT * null.cost
     if best is null or not (is_most or alone.nuisance_chi2 >= STRAINED) or not is_significant(best, -1):
         return None
-    if gain_over(best, null) < LIMITS[bench.kind].found_nats or best.hypothesis.causes[-1].effect.has_dynamics:
+    if (
+        log_bayes_factor(best, null) < LIMITS[problem.kind].first_log_bayes_factor
+        or best.hypothesis.components[-1].effect.has_dynamics
+    ):
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
@@ -81,11 +84,11 @@ def search_beside_linear(
     if sum((is_most, laws.verdict == EXPLAINED, is_relieved)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
-    return laws, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+    return laws, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
 
 
 def search_beside_law(
-    bench_of: Callable[[Observations], InferenceProblem],
+    pose_with_observations: Callable[[Observations], InferenceProblem],
     laws: LawSearch,
     model: StructuralModel,
     observations: Observations,
@@ -95,7 +98,7 @@ def search_beside_law(
 
     Parameters
     ----------
-    bench_of : callable
+    pose_with_observations : callable
         Brings the nominal model and what was measured together.
     laws : LawSearch
         The law that was found with the nominal model.
@@ -113,17 +116,21 @@ def search_beside_law(
         even follow the recordings, where no cause relieves the model, or where the law explains first moments only,
         with the cause as without it.
     """
-    without = _without(observations, laws)
+    without = _remove_law(observations, laws)
     if without is None:
         return None
-    explains, bench = laws.verdict == EXPLAINED, bench_of(without)
-    null = fit_nothing(bench)
-    ranking = search(bench, null)
+    explains, problem = laws.verdict == EXPLAINED, pose_with_observations(without)
+    null = fit_null_model(problem)
+    ranking = search_component(problem, null)
     best = ranking.best
-    if best is null or gain_over(best, null) < LIMITS[bench.kind].found_nats or not is_significant(best, -1):
+    if (
+        best is null
+        or log_bayes_factor(best, null) < LIMITS[problem.kind].first_log_bayes_factor
+        or not is_significant(best, -1)
+    ):
         return None
-    follows_traces = best.hypothesis.causes[-1].effect.has_dynamics
-    if any(best.hypothesis.doubts(best.values)) or (follows_traces and not explains):
+    follows_traces = best.hypothesis.components[-1].effect.has_dynamics
+    if any(best.hypothesis.implausibilities(best.values)) or (follows_traces and not explains):
         return None
     change = best.hypothesis.change(best.values)
     again = search_laws(with_change(model, change), undo_chain_effects(observations, change))
@@ -132,10 +139,10 @@ def search_beside_law(
     if laws.is_early and again.is_early:  # what the law misses later is no better explained
         return None
     scale = max(1.0, best.mean_misfit)
-    return again, finding_of(weigh(ranking.fits, scale)[0], gain_over(best, null), scale)
+    return again, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
 
 
-def _without(observations: Observations, laws: LawSearch) -> Observations | None:
+def _remove_law(observations: Observations, laws: LawSearch) -> Observations | None:
     """Take a law out that strained the model; None where it did not, or where what it leaves is no linear system."""
     if (
         laws.nuisance_chi2 < STRAINED
@@ -144,7 +151,7 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
         or len(laws.nuisance_prior.moving)
     ):
         return None
-    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > FOLLOWED):
+    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > MAX_MISFIT):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
         without = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)
@@ -152,10 +159,10 @@ def _without(observations: Observations, laws: LawSearch) -> Observations | None
         [np.abs(record.responses).max(initial=0.0) for record in both]
         for both in zip(without.records, observations.records, strict=True)
     ]
-    runs_away = not all(left <= RUN_AWAY * measured for left, measured in sizes)
+    runs_away = not all(left <= MAX_GROWTH * measured for left, measured in sizes)
     return None if runs_away else without
 
 
 def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
     """Say whether a law strains the nominal model, and much less so beside a linear cause."""
-    return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= EASED * alone.nuisance_chi2
+    return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= RELIEF * alone.nuisance_chi2

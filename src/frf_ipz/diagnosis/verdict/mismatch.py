@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from frf_ipz.diagnosis.evidence.inference_problem import weights_of
+from frf_ipz.diagnosis.evidence.inference_problem import compute_weights
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.result import Curves
-from frf_ipz.diagnosis.search.global_scan import receptances
+from frf_ipz.diagnosis.search.global_scan import evaluate_receptances
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -27,15 +27,15 @@ DISAGREES = 3.0  # standard deviations
 NAMED = 3  # FRFs and bands in the text
 ERROR = 0.01  # of an FRF's size: what counts as a misfit
 FEWEST_FRFS = 2
-TELLS = 0.1  # of the misfit: a node that explains less tells nothing
+MIN_EXPLAINED = 0.1  # of the misfit: a node that explains less tells nothing
 
 
-def disagreement(bench: InferenceProblem, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
+def describe_mismatch(problem: InferenceProblem, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
     """Say where the nominal model disagrees, beyond noise and what its tolerances allow.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With what was fitted.
     null : Fit
         Of the nominal model.
@@ -51,9 +51,9 @@ def disagreement(bench: InferenceProblem, null: Fit, curves: Curves) -> tuple[Fl
     table : DataFrame
         Each FRF and band, as in `Diagnosis.mismatch`.
     """
-    nothing = np.zeros(bench.nuisance.size)
+    nothing = np.zeros(problem.nuisance_prior.size)
     nominal = null.hypothesis.respond(null.values, nothing, curves.s)
-    allowed = np.sum(np.abs(nuisance_jacobian(nominal, bench.nuisance, bench.specimen.layout)) ** 2, 2)
+    allowed = np.sum(np.abs(nuisance_jacobian(nominal, problem.nuisance_prior, problem.context.layout)) ** 2, 2)
     spread = np.sqrt(curves.expected**2 + allowed)
     before = np.abs(curves.measured - curves.nominal) / spread
     after = np.abs(curves.measured - curves.explained) / curves.expected
@@ -91,12 +91,12 @@ def _in_words(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
     )
 
 
-def trace(bench: InferenceProblem, null: Fit) -> dict[str, list[int]]:
+def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[int]]:
     """Trace the misfit of the nominal model to a node.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With the data.
     null : Fit
         Of the nominal model.
@@ -106,25 +106,25 @@ def trace(bench: InferenceProblem, null: Fit) -> dict[str, list[int]]:
     dict
         ``{"nodes": [node]}``; empty where one FRF is all there is, or no node explains much of the misfit.
     """
-    if len(bench.data.measured.labels) < FEWEST_FRFS:
+    if len(problem.data.measured.labels) < FEWEST_FRFS:
         return {}
-    dofs = bench.specimen.moving_dofs
-    before, left = _misfits(bench, null, np.stack([bench.specimen.unit(dof) for dof in dofs], 1))
+    dofs = problem.context.moving_dofs
+    before, left = _misfits(problem, null, np.stack([problem.context.unit(dof) for dof in dofs], 1))
     best = int(np.argmin(left))
-    return {"nodes": [dofs[best].node]} if left[best] < (1 - TELLS) * before else {}
+    return {"nodes": [dofs[best].node]} if left[best] < (1 - MIN_EXPLAINED) * before else {}
 
 
-def _misfits(bench: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
+def _misfits(problem: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
     """Robust misfit without and with a free dynamic stiffness on each of some motions."""
     is_near = null.is_nearly_right
-    data = bench.thin.measured if is_near else bench.coarse
-    unknown = null.unknown if is_near else np.zeros(bench.nuisance.size)
-    response = null.hypothesis.respond(null.values, unknown, data.s)
-    gains = bench.thin.gains(response) if is_near else 1.0
-    weights = weights_of(data, ERROR)
+    data = problem.sparse_data.measured if is_near else problem.coarse
+    nuisance = null.nuisance if is_near else np.zeros(problem.nuisance_prior.size)
+    response = null.hypothesis.respond(null.values, nuisance, data.s)
+    gains = problem.sparse_data.gains(response) if is_near else 1.0
+    weights = compute_weights(data, ERROR)
     misfit = data.values - gains * response.values
     none = np.zeros(motions.shape[1])
-    across = receptances(response, null.hypothesis.basis, bench.specimen.layout, motions, none).across
+    across = evaluate_receptances(response, null.hypothesis.basis, problem.context.layout, motions, none).across
     seen = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
     size = np.einsum("kf,kfp->kp", weights, np.abs(across) ** 2)
     before = np.sum(weights * np.abs(misfit) ** 2, axis=1)

@@ -17,34 +17,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.model.layout import extents
+from frf_ipz.diagnosis.model.layout import measure_extents
 from frf_ipz.diagnosis.verdict.decision import UNEXPLAINED
-from frf_ipz.diagnosis.verdict.goodness import goodness
+from frf_ipz.diagnosis.verdict.goodness import assess_goodness
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.evidence.fit import Fit
-    from frf_ipz.diagnosis.evidence.hypothesis import Cause
+    from frf_ipz.diagnosis.evidence.hypothesis import Component
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.verdict.decision import Decision
 
-OF_MODES = ("damping_level", "structural_damping")
-ANY = 20.0  # relative tolerance of damping ratios: more than a factor of ten
-MOSTLY = 0.5  # of all pulls
-NEAR = 0.05  # of the largest extent of a structure
-TWO_ALIKE = (
+DAMPING_EFFECTS = ("damping_level", "structural_damping")
+FREE_TOLERANCE = 20.0  # relative tolerance of damping ratios: more than a factor of ten
+MAIN_PART = 0.5  # of all pulls
+SAME_LOCATION = 0.05  # of the largest extent of a structure
+TWO_DYNAMIC = (
     "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place: they "
     "rather are one thing of another kind"
 )
 
 
-def is_damping_alone(bench: InferenceProblem, found: Decision) -> bool:
+def is_damping_only(problem: InferenceProblem, found: Decision) -> bool:
     """Tell whether damping ratios are what the tolerances do not allow.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and model.
     found : Decision
         Unexplained.
@@ -56,17 +56,17 @@ def is_damping_alone(bench: InferenceProblem, found: Decision) -> bool:
     """
     if found.verdict != UNEXPLAINED:
         return False
-    suspects = (found.final,) if found.final.is_nearly_all else (found.final, found.null)
-    return any(_is_of_damping(bench, fit) for fit in suspects)
+    suspects = (found.final,) if found.final.explains_nearly_all else (found.final, found.null)
+    return any(_is_of_damping(problem, fit) for fit in suspects)
 
 
-def _is_of_damping(bench: InferenceProblem, fit: Fit) -> bool:
-    pulls, _ = bench.nuisance.pulls(fit.unknown)
-    own = float(np.sum(pulls[bench.nuisance.damping_places] ** 2))
-    return own > max(goodness(bench, fit).most_pull, MOSTLY * fit.pull)
+def _is_of_damping(problem: InferenceProblem, fit: Fit) -> bool:
+    whitened_nuisance, _ = problem.nuisance_prior.whiten(fit.nuisance)
+    own = float(np.sum(whitened_nuisance[problem.nuisance_prior.damping_indices] ** 2))
+    return own > max(assess_goodness(problem, fit).nuisance_chi2_limit, MAIN_PART * fit.nuisance_chi2)
 
 
-def with_any_damping(options: DiagnoseOptions) -> DiagnoseOptions:
+def free_damping(options: DiagnoseOptions) -> DiagnoseOptions:
     """Leave the damping of modes free.
 
     Parameters
@@ -79,15 +79,15 @@ def with_any_damping(options: DiagnoseOptions) -> DiagnoseOptions:
     DiagnoseOptions
         The others.
     """
-    return replace(options, damping_tolerance=max(ANY, options.damping_tolerance))
+    return replace(options, damping_tolerance=max(FREE_TOLERANCE, options.damping_tolerance))
 
 
-def without_level(bench: InferenceProblem) -> InferenceProblem:
+def drop_damping_effects(problem: InferenceProblem) -> InferenceProblem:
     """Leave out what damping ratios that may be anything stand for.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With damping left free.
 
     Returns
@@ -95,11 +95,11 @@ def without_level(bench: InferenceProblem) -> InferenceProblem:
     InferenceProblem
         Without the effects of modal damping.
     """
-    kept = {name: effect for name, effect in bench.effects.items() if name not in OF_MODES}
-    return replace(bench, effects=kept)
+    kept = {name: effect for name, effect in problem.effects.items() if name not in DAMPING_EFFECTS}
+    return replace(problem, effects=kept)
 
 
-def complain(fit: Fit, options: DiagnoseOptions) -> str:
+def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
     """Say which damping ratios are not those of the model.
 
     Parameters
@@ -114,9 +114,9 @@ def complain(fit: Fit, options: DiagnoseOptions) -> str:
     str
         In words that follow "Something is missing that nothing in the catalogue explains: ".
     """
-    nuisance, modes = fit.hypothesis.nuisance, fit.hypothesis.modes(fit.values, fit.unknown)
-    changes = fit.unknown[nuisance.damping_places] * nuisance.damping_std
-    beyond = np.flatnonzero((np.abs(changes) > options.damping_tolerance) & nuisance.is_stated)
+    nuisance_prior, modes = fit.hypothesis.nuisance_prior, fit.hypothesis.modes(fit.values, fit.nuisance)
+    changes = fit.nuisance[nuisance_prior.damping_indices] * nuisance_prior.damping_std
+    beyond = np.flatnonzero((np.abs(changes) > options.damping_tolerance) & nuisance_prior.is_stated)
     said = [
         f"{100 * stated * (1 + change):.2g} % instead of {100 * stated:.2g} % at {omega / (2 * np.pi):.4g} Hz"
         for stated, change, omega in zip(
@@ -126,7 +126,7 @@ def complain(fit: Fit, options: DiagnoseOptions) -> str:
     return f"damping ratios are not those of the model ({', '.join(said)})"
 
 
-def another_kind(fit: Fit) -> str:
+def describe_implausibility(fit: Fit) -> str:
     """Say why causes are rather one that the catalogue lacks.
 
     Parameters
@@ -141,30 +141,30 @@ def another_kind(fit: Fit) -> str:
         imitate neither something at their place nor something that is spread, and all have numbers of their kind.
     """
     hypothesis = fit.hypothesis
-    dynamic = [cause for cause in hypothesis.causes if cause.effect.has_dynamics]
+    dynamic = [component for component in hypothesis.components if component.effect.has_dynamics]
     if any(
-        one.effect.name == other.effect.name or _at_one_place(hypothesis.specimen, one, other)
+        one.effect.name == other.effect.name or _at_one_place(hypothesis.context, one, other)
         for one, other in combinations(dynamic, 2)
     ):
-        return TWO_ALIKE
-    return next((doubt for doubt in hypothesis.doubts(fit.values) if doubt), "")
+        return TWO_DYNAMIC
+    return next((doubt for doubt in hypothesis.implausibilities(fit.values) if doubt), "")
 
 
-def _at_one_place(specimen: ModelContext, first: Cause, second: Cause) -> bool:
-    nodes = [_nodes(cause) for cause in (first, second)]
+def _at_one_place(context: ModelContext, first: Component, second: Component) -> bool:
+    nodes = [_nodes_of(component) for component in (first, second)]
     if nodes[0] & nodes[1]:
         return True
-    spans = extents(specimen.model)
+    spans = measure_extents(context.model)
     if not spans:
         return False
-    apart = [_apart(specimen, a, b) for a in nodes[0] for b in nodes[1]]
-    return min(apart, default=np.inf) <= NEAR * max(spans.values())
+    apart = [_distance(context, a, b) for a in nodes[0] for b in nodes[1]]
+    return min(apart, default=np.inf) <= SAME_LOCATION * max(spans.values())
 
 
-def _nodes(cause: Cause) -> set[int]:
-    named = cause.place.location.get("nodes")
+def _nodes_of(component: Component) -> set[int]:
+    named = component.location.entries.get("nodes")
     return {int(node) for node in named} if isinstance(named, list) else set()
 
 
-def _apart(specimen: ModelContext, first: int, second: int) -> float:
-    return float(np.linalg.norm(specimen.positions[first] - specimen.positions[second]))
+def _distance(context: ModelContext, first: int, second: int) -> float:
+    return float(np.linalg.norm(context.positions[first] - context.positions[second]))

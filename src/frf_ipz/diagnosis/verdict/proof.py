@@ -37,12 +37,12 @@ class Proof:
     curves: Curves
 
 
-def prove(bench: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Proof:
+def prove(problem: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Proof:
     """Compare models with what was fitted and what was not.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         With what was fitted.
     held_out : Data
         What was not.
@@ -54,11 +54,11 @@ def prove(bench: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Pro
     Proof
         Figures and curves.
     """
-    nothing = np.zeros(bench.nuisance.size)
-    cases = ((null, nothing), (null, null.unknown), (final, final.unknown))
-    figures = [_misfit(fit, unknown, bench.data, held_out) for fit, unknown in cases]
-    shown = [_shown(fit, unknown, bench.data) for fit, unknown in cases]
-    measured = bench.data.measured
+    nothing = np.zeros(problem.nuisance_prior.size)
+    cases = ((null, nothing), (null, null.nuisance), (final, final.nuisance))
+    figures = [_misfit(fit, nuisance, problem.data, held_out) for fit, nuisance in cases]
+    shown = [_model_frfs(fit, nuisance, problem.data) for fit, nuisance in cases]
+    measured = problem.data.measured
     curves = Curves(
         s=measured.s,
         labels=measured.labels,
@@ -66,12 +66,12 @@ def prove(bench: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> Pro
         nominal=shown[0],
         updated=shown[1],
         explained=shown[2],
-        expected=expected(bench.data, bench.specimen.options),
+        expected=compute_error_std(problem.data, problem.context.options),
     )
     return Proof(before=figures[0], updated=figures[1], after=figures[2], curves=curves)
 
 
-def expected(data: Data, options: DiagnoseOptions) -> FloatArray:
+def compute_error_std(data: Data, options: DiagnoseOptions) -> FloatArray:
     """Give the standard deviation of noise and of what no parameter of a model stands for.
 
     Parameters
@@ -93,20 +93,20 @@ def expected(data: Data, options: DiagnoseOptions) -> FloatArray:
     return np.asarray(np.sqrt(noise + shared * np.abs(measured.values) ** 2 + model * measured.size**2))
 
 
-def _shown(fit: Fit, unknown: FloatArray, data: Data) -> ComplexArray:
-    response = fit.hypothesis.respond(fit.values, unknown, data.measured.s)
+def _model_frfs(fit: Fit, nuisance: FloatArray, data: Data) -> ComplexArray:
+    response = fit.hypothesis.respond(fit.values, nuisance, data.measured.s)
     return np.asarray(data.gains(response) * response.values)
 
 
-def _misfit(fit: Fit, unknown: FloatArray, training: Data, held_out: Data) -> Misfit:
+def _misfit(fit: Fit, nuisance: FloatArray, training: Data, held_out: Data) -> Misfit:
     figures = []
     for data in (training, held_out):
-        response = fit.hypothesis.respond(fit.values, unknown, data.measured.s)
+        response = fit.hypothesis.respond(fit.values, nuisance, data.measured.s)
         white = data.misfit(response)
-        seen = _stands_out(data)
+        seen = _is_above_noise(data)
         measured = np.where(seen, data.measured.values, 0.0)
         wrong = measured - np.where(seen, data.gains(response) * response.values, 0.0)
-        figures.append((_relative(wrong, measured), float(np.sqrt(white @ white / len(white)))))
+        figures.append((_relative_norm(wrong, measured), float(np.sqrt(white @ white / len(white)))))
     return Misfit(
         training=figures[0][0],
         held_out=figures[1][0],
@@ -115,14 +115,14 @@ def _misfit(fit: Fit, unknown: FloatArray, training: Data, held_out: Data) -> Mi
     )
 
 
-def _stands_out(data: Data) -> BoolArray:
+def _is_above_noise(data: Data) -> BoolArray:
     """Where the FRFs are more than noise; everywhere, if they are nowhere."""
     noise = np.array([np.diag(covariance).real for covariance in data.measured.covariance]).T
     seen = noise < (MOST_NOISE * data.measured.size) ** 2
     return np.asarray(seen | ~seen.any(0))
 
 
-def _relative(wrong: ComplexArray, measured: ComplexArray) -> float:
+def _relative_norm(wrong: ComplexArray, measured: ComplexArray) -> float:
     """Norm over norm; each FRF that shows anything counts by its own size, for sensors have several units."""
     scale = np.sqrt(np.mean(np.abs(measured) ** 2, 0))
     shown = scale > 0

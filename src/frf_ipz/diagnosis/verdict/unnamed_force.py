@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Place, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Location, Parameter, Signature
 from frf_ipz.diagnosis.catalogue.effects.viscoelastic_joint import SOFTEST, STIFFEST, ViscoelasticJoint, motion_at
 from frf_ipz.diagnosis.model.change import Attachment, Change
-from frf_ipz.diagnosis.search.component_search import ranked
-from frf_ipz.diagnosis.search.global_scan import wide_search
-from frf_ipz.diagnosis.search.neighbourhood_search import climb_all
-from frf_ipz.diagnosis.search.robust_refinement import bring_closer, refine_far
+from frf_ipz.diagnosis.search.component_search import rank_fits
+from frf_ipz.diagnosis.search.global_scan import scan_globally
+from frf_ipz.diagnosis.search.neighbourhood_search import search_neighbourhoods
+from frf_ipz.diagnosis.search.robust_refinement import refine_halfway, refine_starts
 from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
 if TYPE_CHECKING:
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
-    from frf_ipz.diagnosis.search.robust_refinement import Start, Supposed
+    from frf_ipz.diagnosis.search.robust_refinement import Start, StartBeside
     from frf_ipz.diagnosis.verdict.decision import Decision
 
 ORDERS = 0.05, 1.95
 LOSSES = 1e-3, 30.0  # in the middle of the band; with more it is a damper
-FITTED = 5  # places with large errors
-FAR_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
+N_ROUGH = 5  # places with large errors
+MAX_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
 
 
 class LocalForce(ViscoelasticJoint):
@@ -59,14 +59,14 @@ class LocalForce(ViscoelasticJoint):
     def words(self, where: str, second: float) -> str:
         """Say what explains the measurement better than the catalogue."""
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness in the middle of the band, and the second one."""
-        own = specimen.stiffness_against(motion_at(specimen, place))
+        own = context.stiffness_against(motion_at(context, location))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own), self.second_parameter())
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness; no matrices have it."""
-        motion, middle = motion_at(specimen, place)[:, None], _middle(specimen)
+        motion, middle = motion_at(context, location)[:, None], _middle(context)
         none = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:
@@ -80,24 +80,24 @@ class LocalForce(ViscoelasticJoint):
 
         return change
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+    def signature(self, context: ModelContext, location: Location) -> Signature:
         """Draw some values of the second parameter."""
-        unit = specimen.contour / _middle(specimen)
+        unit = context.contour / _middle(context)
         return Signature(
-            motion=motion_at(specimen, place),
+            motion=motion_at(context, location),
             shapes=np.array([self.per_stiffness(unit, second) for second in self.tried]),
             values=np.stack([np.ones(len(self.tried)), self.tried], 1),
         )
 
 
-def where_of(specimen: ModelContext, place: Place) -> str:
+def describe_location(context: ModelContext, location: Location) -> str:
     """Say in words where a force acts.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
-    place : Place
+    location : Place
         Of a joint.
 
     Returns
@@ -105,14 +105,14 @@ def where_of(specimen: ModelContext, place: Place) -> str:
     str
         A node or a spring.
     """
-    nodes = place.location.get("nodes")
+    nodes = location.entries.get("nodes")
     if isinstance(nodes, list):
-        return specimen.where(int(nodes[0]))
-    return f"spring {place.key[1]}"
+        return context.where(int(nodes[0]))
+    return f"spring {location.key[1]}"
 
 
-def _middle(specimen: ModelContext) -> float:
-    return float(2 * np.pi * np.sqrt(np.prod(specimen.band_hz)))
+def _middle(context: ModelContext) -> float:
+    return float(2 * np.pi * np.sqrt(np.prod(context.band_hz)))
 
 
 class PowerLaw(LocalForce):
@@ -171,12 +171,12 @@ class NegativeSpring(LocalForce):
 KINDS: tuple[LocalForce, ...] = (PowerLaw(), NegativeSpring())
 
 
-def find_unnamed_force(bench: InferenceProblem, found: Decision) -> Fit | None:
+def find_unnamed_force(problem: InferenceProblem, found: Decision) -> Fit | None:
     """Look for one force that explains more than what was found, or as much as several causes.
 
     Parameters
     ----------
-    bench : InferenceProblem
+    problem : InferenceProblem
         Data and model.
     found : Decision
         With one cause or more.
@@ -186,29 +186,31 @@ def find_unnamed_force(bench: InferenceProblem, found: Decision) -> Fit | None:
     Fit or None
         Of a force; None where what was found explains as much, or is one cause that has no dynamics of its own.
     """
-    causes = found.final.hypothesis.causes
-    are_dynamic = bool(causes) and all(cause.effect.has_dynamics for cause in causes)
-    kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(causes) > 1)]
+    components = found.final.hypothesis.components
+    are_dynamic = bool(components) and all(component.effect.has_dynamics for component in components)
+    kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(components) > 1)]
     if not kinds:
         return None
-    bar = bench.fit_early(causes, found.final.values).cost + FAR_BEHIND
-    fits = [fit for kind in kinds if (fit := _best_of(bench, found.null, kind, bar)) is not None]
-    needed = found.final.log_evidence + (LIMITS[bench.kind].beside_nats if len(causes) == 1 else 0.0)
+    cost_limit = problem.fit_roughly(components, found.final.values).cost + MAX_BEHIND
+    fits = [fit for kind in kinds if (fit := _best_of(problem, found.null, kind, cost_limit)) is not None]
+    needed = found.final.log_evidence + (LIMITS[problem.kind].beside_log_bayes_factor if len(components) == 1 else 0.0)
     return max((fit for fit in fits if fit.log_evidence > needed), key=lambda fit: fit.log_evidence, default=None)
 
 
-def _best_of(bench: InferenceProblem, null: Fit, kind: LocalForce, bar: float) -> Fit | None:
+def _best_of(problem: InferenceProblem, null: Fit, kind: LocalForce, cost_limit: float) -> Fit | None:
     """Fit a kind of force at its best place; none where its cost with large errors is above a bar."""
-    only = replace(bench, effects={kind.name: kind})
-    refined = refine_far(only, null, wide_search(only, null))
-    early = [only.fit_early((*known, start.cause), start.values) for known, start in _closer(only, refined)]
+    only = replace(problem, effects={kind.name: kind})
+    refined = refine_starts(only, null, scan_globally(only, null))
+    early = [
+        only.fit_roughly((*known, start.component), start.values) for known, start in _refine_halfway(only, refined)
+    ]
     best = min(early, key=lambda fit: fit.cost)
-    if best.cost > bar:
+    if best.cost > cost_limit:
         return None
-    exact = only.fit_from(best)
-    fits = {exact.hypothesis.causes[-1].key: exact}
-    climb_all(only, null, fits)
-    return ranked(only, fits.values())[0]
+    exact = only.fit_exactly(best)
+    fits = {exact.hypothesis.components[-1].key: exact}
+    search_neighbourhoods(only, null, fits)
+    return rank_fits(only, fits.values())[0]
 
 
 def describe_unnamed_force(fit: Fit) -> str:
@@ -224,10 +226,10 @@ def describe_unnamed_force(fit: Fit) -> str:
     str
         In words that follow "Something is missing that nothing in the catalogue explains: ".
     """
-    (cause,) = fit.hypothesis.causes
-    kind = cast("LocalForce", cause.effect)
-    return kind.words(where_of(fit.hypothesis.specimen, cause.place), float(fit.values[-1]))
+    (component,) = fit.hypothesis.components
+    kind = cast("LocalForce", component.effect)
+    return kind.words(describe_location(fit.hypothesis.context, component.location), float(fit.values[-1]))
 
 
-def _closer(bench: InferenceProblem, refined: Sequence[Start]) -> list[Supposed]:
-    return bring_closer(bench, [((), start) for start in refined[:FITTED]])
+def _refine_halfway(problem: InferenceProblem, refined: Sequence[Start]) -> list[StartBeside]:
+    return refine_halfway(problem, [((), start) for start in refined[:N_ROUGH]])

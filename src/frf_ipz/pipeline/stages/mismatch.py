@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
 from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
-from frf_ipz.diagnosis.effect_selection import chosen_effects
+from frf_ipz.diagnosis.effect_selection import select_effects
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -127,7 +127,7 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
         By name.
     """
     pipeline = runner.inputs.pipeline
-    return chosen_effects(pipeline.file.diagnose or DiagnoseOptions(), pipeline.path.parent)
+    return select_effects(pipeline.file.diagnose or DiagnoseOptions(), pipeline.path.parent)
 
 
 def corrections(diagnosis: Diagnosis | None) -> str:

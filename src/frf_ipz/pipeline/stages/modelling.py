@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray
 from frf_ipz.diagnosis.parameters import diagnosed_basis
-from frf_ipz.diagnosis.position_uncertainty import misplacements
+from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
@@ -180,7 +180,9 @@ def update(
             pairs,
             options,
             basis=basis,
-            misplacements=misplacements(model, reduced, modal_fit.labels, tolerance) if tolerance else (),
+            misplacements=propagate_position_tolerance(model, reduced, modal_fit.labels, tolerance)
+            if tolerance
+            else (),
             progress=progress,
         )
 

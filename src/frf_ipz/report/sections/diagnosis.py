@@ -61,7 +61,7 @@ def build(run: RunContents) -> Section | None:
         gains = [finding.log_evidence_gain for finding in (*diagnosis.findings, *diagnosis.alternatives)]
         blocks += [_ranking(diagnosis)] if max(gains) > 0 else []
         blocks.append(_findings(diagnosis))
-    blocks += law_pictures(diagnosis.at_work)
+    blocks += law_pictures(diagnosis.law_in_time)
     blocks.append(_proof(diagnosis))
     if diagnosis.curves is not None:
         blocks.append(_curves(diagnosis.curves, run.band_hz, _explained(diagnosis)))
@@ -107,13 +107,13 @@ def _map(diagnosis: Diagnosis) -> Picture:
 
 def _maps(diagnosis: Diagnosis) -> dict[str, str]:
     """Columns that are drawn, with their titles: what a law explains, no linear model shows."""
-    if diagnosis.linearised is not None:
+    if diagnosis.linearised_law is not None:
         return {"before": "as it is"}
     return {"before": "as it is", "after": _explained(diagnosis).replace("the ", "").replace("its ", "")}
 
 
 def _of_maps(diagnosis: Diagnosis) -> str:
-    if diagnosis.linearised is not None:
+    if diagnosis.linearised_law is not None:
         return " The model is linear: what the force law explains follows below."
     if diagnosis.findings:
         return ""
@@ -238,7 +238,7 @@ def _proof(diagnosis: Diagnosis) -> Picture:
         ("within its tolerances", diagnosis.updated),
         *([("with the findings", diagnosis.after)] if diagnosis.findings else []),
     ]
-    held = f"{diagnosis.held} not shown to the fit" if diagnosis.held else "held out"
+    held = f"{diagnosis.held_out_kind} not shown to the fit" if diagnosis.held_out_kind else "held out"
     rows = [
         [
             name,
@@ -277,7 +277,7 @@ def _bars(values: Sequence[tuple[str, float]], name: str, colour: str, pattern: 
 
 def _explained(diagnosis: Diagnosis) -> str:
     """Name the better of the two linear models that are compared: one that holds no force law."""
-    return "with the findings" if diagnosis.findings and diagnosis.linearised is None else "within its tolerances"
+    return "with the findings" if diagnosis.findings and diagnosis.linearised_law is None else "within its tolerances"
 
 
 def _curves(curves: Curves, band_hz: tuple[float, float], explained: str) -> Picture:
@@ -311,7 +311,7 @@ def _misfits(curves: Curves, place: int, frequency: np.ndarray, names: tuple[str
 
 
 def _data_checks(diagnosis: Diagnosis) -> list[Block]:
-    checks = [check for check in diagnosis.gates if np.isfinite(check.value)]
+    checks = [check for check in diagnosis.data_checks if np.isfinite(check.value)]
     if not checks:
         return []
     names = [check.name for check in checks]
@@ -328,7 +328,7 @@ def _data_checks(diagnosis: Diagnosis) -> list[Block]:
             "passed" if check.passed else "failed",
             typeset(check.statement),
         ]
-        for check in diagnosis.gates
+        for check in diagnosis.data_checks
     ]
     return [
         Picture(

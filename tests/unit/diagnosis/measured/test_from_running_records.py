@@ -130,7 +130,7 @@ def test_sweeps_from_rest_are_read_as_running_records_and_random_ones_are_not(ru
     noise = np.random.default_rng(6).standard_normal(n) * np.minimum(time / 0.1, 1.0)
     for force, kind in ((sweep, "running"), (noise, "random")):
         records = tuple(
-            replace(record, force=size * force, responses=respond(LIGHT, size * force, STEP_S), rested=True)
+            replace(record, force=size * force, responses=respond(LIGHT, size * force, STEP_S), starts_at_rest=True)
             for size, record in zip((1.0, 0.5, 0.3), running_test.records, strict=True)
         )
         assert split_data(replace(running_test, records=records)).kind == kind

@@ -93,7 +93,9 @@ def test_records_of_a_shaker_are_compared_too(linear):
         force = size * rng.standard_normal(8 * 4096)
         signals = impact(Structure(), n_samples=len(force), force=force)
         first_record = observations.records[0]
-        records.append(replace(first_record, name=f"r{number}", force=force, responses=signals[1:], rested=False))
+        records.append(
+            replace(first_record, name=f"r{number}", force=force, responses=signals[1:], starts_at_rest=False)
+        )
     levels = compare_levels(replace(observations, kind="random", records=tuple(records)), fit)
     assert levels.weak_N[0] < 0.3 * levels.strong_N[0]
     assert np.linalg.norm(levels.weak - levels.strong) < 1e-4 * np.linalg.norm(levels.strong)  # other forces

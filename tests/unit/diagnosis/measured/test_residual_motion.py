@@ -63,7 +63,7 @@ def test_impacts_of_several_levels_determine_dc_offsets(strike):
     restored = remove_residual_motion(disturbed)
     assert not assess_linearity(restored).is_nonlinear
     error = subtracted(disturbed, restored)[:, :, 0] - offsets[:, 0]
-    stds = np.array([record.constant_std for record in restored.records])
+    stds = np.array([record.dc_offset_std for record in restored.records])
     assert np.all(np.abs(error) < 4 * stds + 1e-4 * largest(strike())[:, 0])
     assert np.all(stds < 1e-3 * largest(strike())[:, 0])
 
@@ -90,7 +90,7 @@ def test_impacts_of_one_level_determine_no_dc_offset(strike):
     equal_levels = replace(strike(), records=tuple(records))
     offsets = OFFSET_PARTS[:, None] * largest(equal_levels)
     restored = remove_residual_motion(shifted(equal_levels, offsets))
-    stds = np.array([record.constant_std for record in restored.records])
+    stds = np.array([record.dc_offset_std for record in restored.records])
     assert np.all(stds > 0.05 * LARGEST_OFFSET * largest(equal_levels)[:, 0])
     s = np.array([2.0 + 2j * np.pi * 4.5, 2.0 + 2j * np.pi * 70.0])
     plain = estimate_transfer_functions(survey_records(equal_levels), s)
@@ -236,7 +236,7 @@ def test_records_of_a_shaker_determine_dc_offsets_though_the_structure_moves_all
     disturbed = shifted(shaken, offsets)
     restored = remove_residual_motion(disturbed)
     error = subtracted(disturbed, restored)[:, :, 0] - offsets[:, 0]
-    stds = np.array([record.constant_std for record in restored.records])
+    stds = np.array([record.dc_offset_std for record in restored.records])
     assert np.all(np.abs(error) < 4 * stds)
     assert np.all(stds < 1e-3 * largest(shaken)[:, 0])
 
@@ -250,7 +250,7 @@ def test_a_single_record_of_a_shaker_determines_no_dc_offset(shaken):
 def test_records_that_do_not_start_at_rest_are_returned_unchanged(strike, is_rested):
     observations = shifted(strike(), largest(strike()) * OFFSET_PARTS[:, None])
     unchanged = replace(
-        observations, records=tuple(replace(record, rested=is_rested) for record in observations.records)
+        observations, records=tuple(replace(record, starts_at_rest=is_rested) for record in observations.records)
     )
     assert (remove_residual_motion(unchanged) is unchanged) == (not is_rested)
     assert (remove_dc_offset(unchanged) is unchanged) == (not is_rested)

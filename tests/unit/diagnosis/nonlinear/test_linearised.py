@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import Place
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
-from frf_ipz.diagnosis.result import Diagnosis, Linearised, Misfit
+from frf_ipz.diagnosis.result import Diagnosis, LinearisedLaw, Misfit
 from frf_ipz.dofs import Dof
 from frf_ipz.runs.codec import load_result, save_result
 
@@ -33,15 +33,15 @@ def swinging(law, strength, shape=0.0):
 def test_a_cubic_spring_is_that_of_harmonic_balance():
     found = linearise(swinging(CubicStiffness(), 1e12), SimpleNamespace(places=[NODE]))
     assert_allclose(found.motion_rms_m, AMPLITUDES[::-1] / np.sqrt(2), rtol=SINE)
-    assert_allclose(found.stiffness_each, 0.75e12 * AMPLITUDES[::-1] ** 2, rtol=SINE)
-    assert np.abs(found.damping_each * OMEGA).max() < SINE * found.stiffness
-    assert found.stiffness_each[0] < found.stiffness < found.stiffness_each[1]
+    assert_allclose(found.stiffness_by_record, 0.75e12 * AMPLITUDES[::-1] ** 2, rtol=SINE)
+    assert np.abs(found.damping_by_record * OMEGA).max() < SINE * found.stiffness
+    assert found.stiffness_by_record[0] < found.stiffness < found.stiffness_by_record[1]
     assert "weakest blow, 7.07e-05 m rms" in found.statement
 
 
 def test_friction_is_the_damper_of_harmonic_balance():
     found = linearise(swinging(DryFriction(), 0.5, shape=1e-9), SimpleNamespace(places=[NODE]))
-    assert_allclose(found.damping_each, 4 * 0.5 / (np.pi * AMPLITUDES[::-1] * OMEGA), rtol=0.01)
+    assert_allclose(found.damping_by_record, 4 * 0.5 / (np.pi * AMPLITUDES[::-1] * OMEGA), rtol=0.01)
 
 
 def test_a_spring_never_gives_energy():
@@ -50,8 +50,8 @@ def test_a_spring_never_gives_energy():
     dying.motion = AMPLITUDES[:, None] * np.exp(-20.0 * time) * np.cos(OMEGA * time)
     dying.velocity = np.gradient(dying.motion, time, axis=1)
     found = linearise(dying, SimpleNamespace(places=[NODE]))
-    assert (found.damping_each >= 0).all()
-    assert (found.stiffness_each > 0).all()
+    assert (found.damping_by_record >= 0).all()
+    assert (found.stiffness_by_record > 0).all()
 
 
 def test_a_blow_that_did_not_move_the_place_says_nothing():
@@ -64,13 +64,13 @@ def test_a_blow_that_did_not_move_the_place_says_nothing():
 def test_the_model_that_goes_on_has_spring_and_damper(tmp_path, place):
     model = lumped(tmp_path)
     nothing = Misfit(training=0.0, held_out=0.0, training_noise=0.0, held_out_noise=0.0)
-    law = Linearised(
+    law = LinearisedLaw(
         ends=place.ends,
         stiffness=5e4,
         damping=3.0,
         motion_rms_m=np.array([1e-4]),
-        stiffness_each=np.array([5e4]),
-        damping_each=np.array([3.0]),
+        stiffness_by_record=np.array([5e4]),
+        damping_by_record=np.array([3.0]),
     )
     found = Diagnosis(
         verdict="explained",
@@ -82,8 +82,8 @@ def test_the_model_that_goes_on_has_spring_and_damper(tmp_path, place):
         before=nothing,
         updated=nothing,
         after=nothing,
-        held="records",
-        linearised=law,
+        held_out_kind="records",
+        linearised_law=law,
     )
     changed = apply_to_model(model, found)
     motion = dict(zip(reversed(place.ends), (1.0, -1.0), strict=False))
@@ -94,4 +94,4 @@ def test_the_model_that_goes_on_has_spring_and_damper(tmp_path, place):
     again = load_result(tmp_path / "d.npz")
     assert again.to_json()["linear_model"] == found.to_json()["linear_model"]
     assert again.to_json()["linear_model"]["between"] == [dof.name for dof in place.ends]
-    assert "linear_model" not in replace(found, linearised=None).to_json()
+    assert "linear_model" not in replace(found, linearised_law=None).to_json()

@@ -226,6 +226,6 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
         dispersion_rad=0.0,
     )
     eased = SimpleNamespace(verdict="explained", nuisance_chi2=again, is_early=early[1])
-    bench = SimpleNamespace(kind="hammer")
-    found = law_beside.search_beside_law(lambda _: bench, laws, "model", seen, lambda *_: eased)
+    problem = SimpleNamespace(kind="hammer")
+    found = law_beside.search_beside_law(lambda _: problem, laws, "model", seen, lambda *_: eased)
     assert found == ((eased, "spring") if both else None)

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import (
+    Builder,
+    Effect,
+    Location,
+    Parameter,
+    Signature,
+    list_neighbouring_nodes,
+    list_node_locations,
+)
 from frf_ipz.diagnosis.model.change import Attachment, Change
 
 if TYPE_CHECKING:
@@ -32,23 +40,23 @@ class AttachedResonator(Effect):
     imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
     has_dynamics = True
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves."""
-        return at_nodes(specimen)
+        return list_node_locations(context)
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Mass, frequency, damping ratio."""
-        del place
-        low, high = specimen.band_hz
+        del location
+        low, high = context.band_hz
         return (
-            Parameter(name="mass_kg", low=SMALLEST * specimen.mass_kg, high=LARGEST * specimen.mass_kg),
+            Parameter(name="mass_kg", low=SMALLEST * context.mass_kg, high=LARGEST * context.mass_kg),
             Parameter(name="frequency_hz", low=LOWEST * low, high=HIGHEST * high),
             Parameter(name="damping_ratio", low=RATIOS[0], high=RATIOS[1]),
         )
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = _motion(specimen, place)[:, None]
+        motion = _motion(context, location)[:, None]
 
         def change(values: np.ndarray) -> Change:
             mass, frequency_hz, ratio = values
@@ -63,29 +71,29 @@ class AttachedResonator(Effect):
 
         return change
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+    def signature(self, context: ModelContext, location: Location) -> Signature:
         """All frequencies and some damping ratios."""
-        low, high = specimen.band_hz
+        low, high = context.band_hz
         count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
         pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), TRIED_RATIOS))
         return Signature(
-            motion=_motion(specimen, place),
-            shapes=np.array([dynamic_mass(specimen.contour, frequency, ratio) for frequency, ratio in pairs]),
+            motion=_motion(context, location),
+            shapes=np.array([dynamic_mass(context.contour, frequency, ratio) for frequency, ratio in pairs]),
             values=np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
-            amplitudes=np.geomspace(3e-4, 0.3, 9) * specimen.mass_kg,
+            amplitudes=np.geomspace(3e-4, 0.3, 9) * context.mass_kg,
         )
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
-        return beside_node(specimen, place)
+        return list_neighbouring_nodes(context, location)
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Expect what swings by itself to be little damped: with much damping it is a damper with a mass behind it."""
-        del specimen, place
+        del context, location
         beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
         return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
 
-    def doubt(self, values: FloatArray) -> str:
+    def implausibility(self, values: FloatArray) -> str:
         """Doubt one that hardly swings: it can bend to what many other losses do."""
         _, frequency_hz, ratio = values
         if ratio <= MOST_RATIO:
@@ -95,11 +103,12 @@ class AttachedResonator(Effect):
             "more than what swings by itself: it rather is another way to lose energy"
         )
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say what swings where."""
         return (
-            f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at {specimen.where(int(str(place.key[0])))} and "
-            f"swings by itself at {values['frequency_hz'].value:.4g} Hz with a damping ratio of "
+            f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at "
+            f"{context.where(int(str(location.key[0])))} and swings by itself at "
+            f"{values['frequency_hz'].value:.4g} Hz with a damping ratio of "
             f"{100 * values['damping_ratio'].value:.2g} %."
         )
 
@@ -124,5 +133,5 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
     return np.asarray(s**2 * spring / (s**2 + spring))
 
 
-def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
-    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))
+def _motion(context: ModelContext, location: Location) -> np.ndarray:
+    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.beam_models import geometric_stiffness
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -29,33 +29,33 @@ class AxialLoad(Effect):
     name = "axial_load"
     imitators = ("grounded_spring", "global_stiffness", "boundary_compliance", "shear_rotary_inertia")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Return a beam that is held at both ends."""
-        source = specimen.model.source
+        source = context.model.source
         applies = isinstance(source, BeamFile) and "free" not in (source.beam.left, source.beam.right)
-        return [Place(key=())] if applies else []
+        return [Location(key=())] if applies else []
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Force, from near buckling to strong tension."""
-        del place
-        load = buckling_load(specimen)
+        del location
+        load = buckling_load(context)
         return (Parameter(name="force_N", low=-NEARLY_BUCKLED * load, high=STRONGEST * load, is_log=False),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Add geometric stiffness."""
-        del place
-        unit = geometric_stiffness(specimen.model)
+        del location
+        unit = geometric_stiffness(context.model)
         return lambda values: Change(stiffness=values[0] * unit)
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Both signs, from weak to strong."""
-        del place
-        load = buckling_load(specimen)
+        del location
+        load = buckling_load(context)
         return load * np.concatenate([-TRIED, TRIED, [1.2, 2.0, 3.5, 6.0]])[:, None]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how strong."""
-        del specimen, place
+        del context, location
         force = values["force_N"]
         kind = "tension" if force.value > 0 else "compression"
         return (
@@ -64,12 +64,12 @@ class AxialLoad(Effect):
 
 
 @lru_cache(maxsize=2)  # a search asks for it with every hypothesis
-def buckling_load(specimen: ModelContext) -> float:
+def buckling_load(context: ModelContext) -> float:
     """Find the axial compression at which the beam buckles.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         A beam.
 
     Returns
@@ -77,11 +77,11 @@ def buckling_load(specimen: ModelContext) -> float:
     float
         N; of one that has rigid-body modes, of its first bending.
     """
-    shapes = specimen.basis.modes.shapes
-    everywhere = np.zeros((len(specimen.model.all_dofs), min(shapes.shape[1], 20)))
-    everywhere[~specimen.model.fixed] = shapes[:, : everywhere.shape[1]]
-    elastic = specimen.basis.modes.eigenvalues[: everywhere.shape[1]] > 0
+    shapes = context.basis.modes.shapes
+    everywhere = np.zeros((len(context.model.all_dofs), min(shapes.shape[1], 20)))
+    everywhere[~context.model.fixed] = shapes[:, : everywhere.shape[1]]
+    elastic = context.basis.modes.eigenvalues[: everywhere.shape[1]] > 0
     everywhere = everywhere[:, elastic]
-    squares = specimen.basis.modes.eigenvalues[: len(elastic)][elastic]
-    loaded = everywhere.T @ (geometric_stiffness(specimen.model) @ everywhere)
-    return float(1 / linalg.eigh(np.asarray(loaded), np.diag(squares), eigvals_only=True)[-1])
+    squares = context.basis.modes.eigenvalues[: len(elastic)][elastic]
+    loaded_shapes = everywhere.T @ (geometric_stiffness(context.model) @ everywhere)
+    return float(1 / linalg.eigh(np.asarray(loaded_shapes), np.diag(squares), eigvals_only=True)[-1])

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, grid
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, grid
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -31,34 +31,34 @@ class BoundaryCompliance(Effect):
     name = "boundary_compliance"
     imitators = ("local_stiffness", "added_mass", "axial_load")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Each held end of a beam: its rotation, its translation, or both."""
-        source = specimen.model.source
+        source = context.model.source
         if not isinstance(source, BeamFile):
             return []
         found = []
         for end, node in (("left", 1), ("right", source.beam.elements + 1)):
             held = HELD[getattr(source.beam, end)]
             ways = [held] if len(held) < 2 else [(held[0],), (held[1],), held]
-            found += [Place(key=(end, way), location={"end": end, "nodes": [node]}) for way in ways if way]
+            found += [Location(key=(end, way), entries={"end": end, "nodes": [node]}) for way in ways if way]
         return found
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness of each spring."""
-        stiffness, length = _bending(specimen)
+        stiffness, length = _bending(context)
         scale = {"ry": stiffness / length, "z": stiffness / length**3}
         return tuple(
             Parameter(
                 name=NAMES[way], low=BOUNDS[way][0] * scale[way], high=BOUNDS[way][1] * scale[way], neutral=np.inf
             )
-            for way in _ways(place)
+            for way in _ways(location)
         )
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Release the held DOFs and put springs there."""
-        model = specimen.model
-        node = model.source.beam.elements + 1 if place.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
-        released = tuple(model.full_index(Dof(node, way)) for way in _ways(place))
+        model = context.model
+        node = model.source.beam.elements + 1 if location.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
+        released = tuple(model.full_index(Dof(node, way)) for way in _ways(location))
         size = len(model.all_dofs)
 
         def change(values: FloatArray) -> Change:
@@ -67,30 +67,32 @@ class BoundaryCompliance(Effect):
 
         return change
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Spread a grid, finer where there is one spring."""
-        parameters = self.parameters(specimen, place)
+        parameters = self.parameters(context, location)
         return grid(parameters, ONE_ALONE if len(parameters) == 1 else OF_TWO)
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Give the other ways in which that end may give way."""
-        return [other for other in self.places(specimen) if other.key[0] == place.key[0] and other.key != place.key]
+        return [
+            other for other in self.locations(context) if other.key[0] == location.key[0] and other.key != location.key
+        ]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which end gives way, and how much."""
-        del specimen
+        del context
         texts = {ROTATION: "{:.4g} N m/rad in rotation", TRANSLATION: "{:.4g} N/m in translation"}
         springs = " and ".join(texts[name].format(value.value) for name, value in values.items())
-        return f"The {place.key[0]} end is not rigidly held: its support has a stiffness of {springs}."
+        return f"The {location.key[0]} end is not rigidly held: its support has a stiffness of {springs}."
 
 
-def _ways(place: Place) -> tuple[str, ...]:
-    ways = place.key[1]
+def _ways(location: Location) -> tuple[str, ...]:
+    ways = location.key[1]
     return ways if isinstance(ways, tuple) else ()
 
 
-def _bending(specimen: ModelContext) -> tuple[float, float]:
-    source = specimen.model.source
+def _bending(context: ModelContext) -> tuple[float, float]:
+    source = context.model.source
     if not isinstance(source, BeamFile):
         raise TypeError("only a beam has ends")
     beam = source.beam

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
 from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
 from frf_ipz.diagnosis.model.change import Change
 
@@ -30,93 +30,93 @@ class CouplingSpring(Effect):
     name = "coupling_spring"
     imitators = ("grounded_spring", "local_stiffness", "axial_load")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """All pairs of nodes that are apart and not joined by a spring already."""
-        dofs = specimen.moving_dofs
+        dofs = context.moving_dofs
         return [
-            _place(first.node, second.node, first.direction)
-            for first, second in combinations(dofs[:: _stride(specimen)], 2)
-            if first.direction == second.direction and _is_new(specimen, first.node, second.node)
+            _make_location(first.node, second.node, first.direction)
+            for first, second in combinations(dofs[:: _stride(context)], 2)
+            if first.direction == second.direction and _is_new(context, first.node, second.node)
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness."""
-        own = specimen.stiffness_against(_motion(specimen, place))
+        own = context.stiffness_against(_motion(context, location))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the matrix."""
-        motion = sparse.csr_array(_motion(specimen, place)[:, None])
+        motion = sparse.csr_array(_motion(context, location)[:, None])
         unit = sparse.csr_array(motion @ motion.T)
-        floats = is_floating(place)
+        floats = is_floating(location)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Share what a pair is worth among those that stand behind it where not all are listed."""
-        del place, values
-        return -2 * float(np.log(_stride(specimen)))
+        del location, values
+        return -2 * float(np.log(_stride(context)))
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+    def signature(self, context: ModelContext, location: Location) -> Signature:
         """Draw a constant."""
         return Signature(
-            motion=_motion(specimen, place),
-            shapes=np.ones((1, len(specimen.contour)), complex),
+            motion=_motion(context, location),
+            shapes=np.ones((1, len(context.contour)), complex),
             values=np.ones((1, 1)),
         )
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """One of the ends at a node beside; in a row also both, for what one end loses the other makes up."""
-        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
-        pairs = [(near, second) for near in specimen.nodes_near(first, direction)]
-        pairs += [(first, near) for near in specimen.nodes_near(second, direction)]
-        if specimen.model.kind in ("beam", "lumped"):
-            nodes = {dof.node for dof in specimen.moving_dofs if dof.direction == direction}
+        first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
+        pairs = [(near, second) for near in context.nodes_near(first, direction)]
+        pairs += [(first, near) for near in context.nodes_near(second, direction)]
+        if context.model.kind in ("beam", "lumped"):
+            nodes = {dof.node for dof in context.moving_dofs if dof.direction == direction}
             both = [(first + step, second + other) for step, other in product((-1, 1), repeat=2)]
             pairs += [pair for pair in both if nodes.issuperset(pair)]
-        found = _places(specimen, place, pairs)
-        return [*found, *([floating(place)] if specimen.basis.modes.n_rigid and not is_floating(place) else [])]
+        found = _make_locations(context, location, pairs)
+        return [*found, *([floating(location)] if context.basis.modes.n_rigid and not is_floating(location) else [])]
 
-    def around(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def surroundings(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Both ends at any nodes near: along a line of such pairs, each is nearly as good as the next."""
-        first, second, direction = int(str(place.key[0])), int(str(place.key[1])), str(place.key[2])
-        near, far = ([node, *specimen.nodes_near(node, direction, FURTHEST)] for node in (first, second))
-        return _places(specimen, place, [pair for pair in product(near, far) if pair != (first, second)])
+        first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
+        near, far = ([node, *context.nodes_near(node, direction, FURTHEST)] for node in (first, second))
+        return _make_locations(context, location, [pair for pair in product(near, far) if pair != (first, second)])
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and between what."""
         stiffness = values["stiffness_N_m"]
-        first, second = (specimen.where(int(str(node))) for node in place.key[:2])
+        first, second = (context.where(int(str(node))) for node in location.key[:2])
         return (
             f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
             "the model lacks it."
         )
 
 
-def _stride(specimen: ModelContext) -> int:
+def _stride(context: ModelContext) -> int:
     """One of how many nodes is listed."""
-    most = MOST_IN_A_ROW if specimen.model.kind == "beam" else MOST_NODES
-    return -(-len(specimen.moving_dofs) // most)
+    most = MOST_IN_A_ROW if context.model.kind == "beam" else MOST_NODES
+    return -(-len(context.moving_dofs) // most)
 
 
-def _place(first: int, second: int, direction: str) -> Place:
+def _make_location(first: int, second: int, direction: str) -> Location:
     low, high = sorted((first, second))
-    return Place(key=(low, high, direction), location={"nodes": [low, high]})
+    return Location(key=(low, high, direction), entries={"nodes": [low, high]})
 
 
-def _places(specimen: ModelContext, like: Place, pairs: Sequence[tuple[int, int]]) -> list[Place]:
+def _make_locations(context: ModelContext, like: Location, pairs: Sequence[tuple[int, int]]) -> list[Location]:
     """Make places of pairs of nodes, hanging or not as another."""
-    found = [_place(a, b, str(like.key[2])) for a, b in pairs if a != b and _is_new(specimen, a, b)]
+    found = [_make_location(a, b, str(like.key[2])) for a, b in pairs if a != b and _is_new(context, a, b)]
     return [floating(other) for other in found] if is_floating(like) else found
 
 
-def _is_new(specimen: ModelContext, first: int, second: int) -> bool:
-    model = specimen.model
+def _is_new(context: ModelContext, first: int, second: int) -> bool:
+    model = context.model
     if model.kind == "beam":
         return abs(first - second) > NEXT_TO
     return not any(part.kind == "spring" and {first, second} == set(part.nodes) for part in model.parts)
 
 
-def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
-    first, second, direction = place.key[:3]
-    ends = {dof.node: dof for dof in specimen.moving_dofs if dof.direction == direction}
-    return specimen.unit(ends[int(str(second))]) - specimen.unit(ends[int(str(first))])
+def _motion(context: ModelContext, location: Location) -> np.ndarray:
+    first, second, direction = location.key[:3]
+    ends = {dof.node: dof for dof in context.moving_dofs if dof.direction == direction}
+    return context.unit(ends[int(str(second))]) - context.unit(ends[int(str(first))])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
-from frf_ipz.diagnosis.model.change import NOTHING, Change
-from frf_ipz.diagnosis.model.modes import LEAST_RATIO, modify
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.model.change import NO_CHANGE, Change
+from frf_ipz.diagnosis.model.modes import MIN_RATIO, modify_structure
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -27,50 +27,50 @@ class DampingLevel(Effect):
     name = "damping_level"
     imitators = ("structural_damping", "local_damper")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""
-        del specimen
-        return [Place(key=())]
+        del context
+        return [Location(key=())]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Damping ratio."""
-        del place
-        stated = _stated(specimen)
+        del location
+        stated = _stated(context)
         return (
             Parameter(
                 name="modal_ratio",
                 low=BOUNDS[0],
                 high=BOUNDS[1],
                 neutral=stated,
-                tolerance=specimen.options.damping_tolerance * stated,
+                tolerance=context.options.damping_tolerance * stated,
             ),
         )
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Give it to all modes."""
-        del specimen, place
+        del context, location
         return lambda values: Change(modal_ratio=float(values[0]))
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Less and more than stated."""
-        del place
-        return np.clip(_stated(specimen) * TRIED, *BOUNDS)[:, None]
+        del location
+        return np.clip(_stated(context) * TRIED, *BOUNDS)[:, None]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much."""
-        del place
+        del location
         ratio = values["modal_ratio"]
         return (
             f"All modes have a damping ratio of about {100 * ratio.value:.3g} % (+- {100 * ratio.std:.2g} %), not the "
-            f"{100 * _stated(specimen):.3g} % of the model."
+            f"{100 * _stated(context):.3g} % of the model."
         )
 
 
-def _stated(specimen: ModelContext) -> float:
+def _stated(context: ModelContext) -> float:
     """Typical damping ratio of the nominal modes of the band, whichever way the model states it."""
-    basis, low_high = specimen.basis, 2 * np.pi * np.array(specimen.band_hz)
-    modified = modify(basis, NOTHING)
+    basis, low_high = context.basis, 2 * np.pi * np.array(context.band_hz)
+    modified = modify_structure(basis, NO_CHANGE)
     omega, n_rigid = np.sqrt(np.abs(modified.squares)), basis.modes.n_rigid
     inside = (omega >= low_high[0]) & (omega <= low_high[1]) & (np.arange(len(omega)) >= n_rigid)
     stated = modified.stated_ratio[inside if inside.any() else slice(n_rigid, n_rigid + 1)]
-    return float(np.median(stated)) if stated.size and np.median(stated) > LEAST_RATIO else UNSTATED
+    return float(np.median(stated)) if stated.size and np.median(stated) > MIN_RATIO else UNSTATED

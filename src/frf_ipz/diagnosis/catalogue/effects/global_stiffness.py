@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -25,31 +25,31 @@ class GlobalStiffness(Effect):
     name = "global_stiffness"
     imitators = ("viscoelastic_joint", "axial_load", "shear_rotary_inertia")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""
-        del specimen
-        return [Place(key=())]
+        del context
+        return [Location(key=())]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Real stiffness over the model's."""
-        del place
-        tolerance = specimen.options.stiffness_tolerance
+        del location
+        tolerance = context.options.stiffness_tolerance
         return (Parameter(name="stiffness_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=1.0, tolerance=tolerance),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Scale the matrix."""
-        del place
-        whole = specimen.model.stiffness_all
+        del location
+        whole = context.model.stiffness_all
         return lambda values: Change(stiffness=(values[0] - 1) * whole)
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""
-        del specimen, place
+        del context, location
         return np.concatenate([TRIED, 1 / TRIED])[:, None]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say by how much."""
-        del specimen, place
+        del context, location
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
         return (

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import (
+    Builder,
+    Effect,
+    Location,
+    Parameter,
+    Signature,
+    list_neighbouring_nodes,
+    list_node_locations,
+)
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -25,56 +33,60 @@ class GroundedSpring(Effect):
     name = "grounded_spring"
     imitators = ("coupling_spring", "axial_load", "viscoelastic_joint", "boundary_compliance")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves; not where a lumped model has such a spring already, which is then stiffer."""
-        springs = [part for part in specimen.model.parts if part.kind == "spring"]
+        springs = [part for part in context.model.parts if part.kind == "spring"]
         taken = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        return [place for place in at_nodes(specimen) if place.key[0] not in taken]
+        return [location for location in list_node_locations(context) if location.key[0] not in taken]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness."""
-        own = specimen.stiffness_against(_motion(specimen, place))
+        own = context.stiffness_against(_motion(context, location))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the diagonal."""
-        unit = sparse.csr_array(sparse.diags_array(_motion(specimen, place)))
-        floats = is_floating(place)
+        unit = sparse.csr_array(sparse.diags_array(_motion(context, location)))
+        floats = is_floating(location)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
+    def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Draw a constant."""
         return Signature(
-            motion=_motion(specimen, place),
-            shapes=np.ones((1, len(specimen.contour)), complex),
+            motion=_motion(context, location),
+            shapes=np.ones((1, len(context.contour)), complex),
             values=np.ones((1, 1)),
         )
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside; what a free structure touches may also hang as softly as the structure does."""
-        if is_floating(place):
+        if is_floating(location):
             return [
-                floating(other) for other in beside_node(specimen, Place(key=place.key[:2], location=place.location))
+                floating(other)
+                for other in list_neighbouring_nodes(context, Location(key=location.key[:2], entries=location.entries))
             ]
-        return [*beside_node(specimen, place), *([floating(place)] if specimen.basis.modes.n_rigid else [])]
+        return [
+            *list_neighbouring_nodes(context, location),
+            *([floating(location)] if context.basis.modes.n_rigid else []),
+        ]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and where."""
         stiffness = values["stiffness_N_m"]
-        where = specimen.where(int(str(place.key[0])))
+        where = context.where(int(str(location.key[0])))
         return (
             f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) holds {where} "
-            f"to {'something that hangs as softly as the structure' if is_floating(place) else 'the ground'}; "
+            f"to {'something that hangs as softly as the structure' if is_floating(location) else 'the ground'}; "
             "the model lacks it."
         )
 
 
-def floating(place: Place) -> Place:
+def floating(location: Location) -> Location:
     """Make a place one at which what is added hangs as softly as the structure.
 
     Parameters
     ----------
-    place : Place
+    location : Place
         A place on a free structure.
 
     Returns
@@ -82,15 +94,15 @@ def floating(place: Place) -> Place:
     Place
         The same, hanging.
     """
-    return Place(key=(*place.key, FLOATING), location=place.location)
+    return Location(key=(*location.key, FLOATING), entries=location.entries)
 
 
-def is_floating(place: Place) -> bool:
+def is_floating(location: Location) -> bool:
     """Tell whether what is added at a place hangs as softly as the structure.
 
     Parameters
     ----------
-    place : Place
+    location : Place
         The place.
 
     Returns
@@ -98,8 +110,8 @@ def is_floating(place: Place) -> bool:
     bool
         True for one that `floating` made.
     """
-    return FLOATING in place.key
+    return FLOATING in location.key
 
 
-def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
-    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key[:2]))
+def _motion(context: ModelContext, location: Location) -> np.ndarray:
+    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[:2]))

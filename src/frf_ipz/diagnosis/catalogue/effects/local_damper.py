@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import (
+    Builder,
+    Effect,
+    Location,
+    Parameter,
+    Signature,
+    list_neighbouring_nodes,
+    list_node_locations,
+)
 from frf_ipz.diagnosis.model.change import Attachment, Change
 
 if TYPE_CHECKING:
@@ -25,18 +33,18 @@ class LocalDamper(Effect):
     imitators = ("attached_resonator", "viscoelastic_joint", "damping_level")
     has_dynamics = True
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves."""
-        return at_nodes(specimen)
+        return list_node_locations(context)
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Damping constant."""
-        scale = specimen.stiffness_against(_motion(specimen, place)) / (2 * np.pi * specimen.band_hz[0])
+        scale = context.stiffness_against(_motion(context, location)) / (2 * np.pi * context.band_hz[0])
         return (Parameter(name="damping_Ns_m", low=WEAKEST * scale, high=STRONGEST * scale),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach it."""
-        motion = _motion(specimen, place)[:, None]
+        motion = _motion(context, location)[:, None]
         none = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:
@@ -47,22 +55,22 @@ class LocalDamper(Effect):
 
         return change
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+    def signature(self, context: ModelContext, location: Location) -> Signature:
         """Proportional to s."""
-        return Signature(motion=_motion(specimen, place), shapes=specimen.contour[None], values=np.ones((1, 1)))
+        return Signature(motion=_motion(context, location), shapes=context.contour[None], values=np.ones((1, 1)))
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
-        return beside_node(specimen, place)
+        return list_neighbouring_nodes(context, location)
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much, and where."""
         damping = values["damping_Ns_m"]
         return (
             f"A damper of {damping.value:.4g} N s/m (+- {damping.std:.2g}) acts between "
-            f"{specimen.where(int(str(place.key[0])))} and the ground."
+            f"{context.where(int(str(location.key[0])))} and the ground."
         )
 
 
-def _motion(specimen: ModelContext, place: Place) -> np.ndarray:
-    return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key))
+def _motion(context: ModelContext, location: Location) -> np.ndarray:
+    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import part_matrices
@@ -33,11 +33,11 @@ class LocalStiffness(Effect):
     name = "local_stiffness"
     imitators = ("boundary_compliance", "added_mass", "coupling_spring")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Stretches of some lengths; every spring; every group."""
-        parts = [part for part in specimen.model.parts if part.kind in KEYS and _has_stiffness(part)]
+        parts = [part for part in context.model.parts if part.kind in KEYS and _has_stiffness(part)]
         elements = [part for part in parts if part.kind == "element"]
-        found = [Place(key=(part.kind, part.name), location={KEYS[part.kind]: [part.name]}) for part in parts]
+        found = [Location(key=(part.kind, part.name), entries={KEYS[part.kind]: [part.name]}) for part in parts]
         if not elements:
             return found
         return [
@@ -47,63 +47,63 @@ class LocalStiffness(Effect):
             for first in range(1, len(elements) - length + 2, max(length // 4, 1))
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Real stiffness over the model's."""
-        del place
-        tolerance = specimen.options.stiffness_tolerance
+        del location
+        tolerance = context.options.stiffness_tolerance
         return (Parameter(name="stiffness_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=1.0, tolerance=tolerance),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Scale the parts' share of the matrix."""
-        _, stiffness = part_matrices(specimen.model, str(place.key[0]), _names(place))
+        _, stiffness = part_matrices(context.model, str(location.key[0]), _names(location))
         return lambda values: Change(stiffness=(values[0] - 1) * stiffness)
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""
-        del specimen, place
+        del context, location
         return TRIED[:, None]
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature | None:
+    def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Bend a stretch with constant curvature, draw out a spring; a group has no such single motion."""
-        kind = place.key[0]
+        kind = location.key[0]
         if kind == "group":
             return None
-        motion, stiffness = (_curvature if kind == "element" else _extension)(specimen, place)
+        motion, stiffness = (_curvature if kind == "element" else _extension)(context, location)
         changes = (TRIED - 1) * stiffness
-        shapes = np.repeat(changes[:, None] + 0j, len(specimen.contour), 1)
+        shapes = np.repeat(changes[:, None] + 0j, len(context.contour), 1)
         return Signature(motion=motion, shapes=shapes, values=TRIED[:, None], amplitudes=np.ones(1))
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Stretches that begin or end an element earlier or later; all other springs or groups are searched anyway."""
-        if place.key[0] != "element":
+        if location.key[0] != "element":
             return []
-        first, last = int(str(place.key[1])), int(str(place.key[2]))
-        total = sum(part.kind == "element" for part in specimen.model.parts)
+        first, last = int(str(location.key[1])), int(str(location.key[2]))
+        total = sum(part.kind == "element" for part in context.model.parts)
         wide = max((last - first + 1) // 3, 2)
         moves = {(a, b) for step in (1, wide) for a in (-step, 0, step) for b in (-step, 0, step)} - {(0, 0)}
         tried = [(first + a, last + b) for a, b in sorted(moves)]
         return [_stretch(a, b) for a, b in tried if 1 <= a <= b <= total and b - a < max(total // LONGEST, 1)]
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Expect some length, and the size of the change in flexibility to be known by its logarithm only.
 
         A short stretch that changes much and a longer one that changes little look alike. Without this the short one
         is preferred, whose change has the larger uncertainty.
         """
         by_size = -float(np.log(max(abs(values[0] - 1), LEAST_CHANGE)))
-        if place.key[0] != "element":
+        if location.key[0] != "element":
             return by_size
-        usual = max(USUAL_LENGTH * sum(part.kind == "element" for part in specimen.model.parts), 1.0)
-        length = int(str(place.key[2])) - int(str(place.key[1])) + 1
+        usual = max(USUAL_LENGTH * sum(part.kind == "element" for part in context.model.parts), 1.0)
+        length = int(str(location.key[2])) - int(str(location.key[1])) + 1
         return by_size - 0.5 * float(np.log(length / usual) / np.log(WITHIN)) ** 2
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which part, and by how much."""
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
         return (
-            f"{_called(specimen, place)} {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} than in "
-            "the model."
+            f"{_called(context, location)} {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} than "
+            "in the model."
         )
 
 
@@ -111,41 +111,41 @@ def _has_stiffness(part: Part) -> bool:
     return bool(part.stiffness.size if isinstance(part.stiffness, np.ndarray) else part.stiffness.nnz)
 
 
-def _stretch(first: int, last: int) -> Place:
-    return Place(key=("element", first, last), location={"elements": [first, last]})
+def _stretch(first: int, last: int) -> Location:
+    return Location(key=("element", first, last), entries={"elements": [first, last]})
 
 
-def _names(place: Place) -> list[str]:
-    if place.key[0] != "element":
-        return [str(place.key[1])]
-    return [str(number) for number in range(int(str(place.key[1])), int(str(place.key[2])) + 1)]
+def _names(location: Location) -> list[str]:
+    if location.key[0] != "element":
+        return [str(location.key[1])]
+    return [str(number) for number in range(int(str(location.key[1])), int(str(location.key[2])) + 1)]
 
 
-def _called(specimen: ModelContext, place: Place) -> str:
-    if place.key[0] != "element":
-        return f"The {place.key[0]} '{place.key[1]}' is"
-    first, last = int(str(place.key[1])), int(str(place.key[2]))
-    ends = [float(specimen.positions[node][0]) for node in (first, last + 1)]
+def _called(context: ModelContext, location: Location) -> str:
+    if location.key[0] != "element":
+        return f"The {location.key[0]} '{location.key[1]}' is"
+    first, last = int(str(location.key[1])), int(str(location.key[2]))
+    ends = [float(context.positions[node][0]) for node in (first, last + 1)]
     what = f"Element {first} is" if first == last else f"The elements {first} to {last} are"
     return f"{what[:-3] if first == last else what[:-4]} (x = {ends[0]:.3f} to {ends[1]:.3f} m) {what.split()[-1]}"
 
 
-def _curvature(specimen: ModelContext, place: Place) -> tuple[FloatArray, float]:
+def _curvature(context: ModelContext, location: Location) -> tuple[FloatArray, float]:
     """Rotation of a stretch's right end against its left one, and the bending stiffness against that."""
-    first, last = int(str(place.key[1])), int(str(place.key[2]))
-    model = specimen.model
+    first, last = int(str(location.key[1])), int(str(location.key[2]))
+    model = context.model
     motion = np.zeros(len(model.all_dofs))
     motion[model.full_indices[Dof(last + 1, "ry")]], motion[model.full_indices[Dof(first, "ry")]] = 1.0, -1.0
     parts = {part.name: part for part in model.parts if part.kind == "element"}
     flexibility = 0.0
-    for name in _names(place):
+    for name in _names(location):
         bent = np.array([0.0, -0.5, 0.0, 0.5])
         flexibility += 1 / float(bent @ parts[name].stiffness @ bent)
     return motion, 1 / flexibility
 
 
-def _extension(specimen: ModelContext, place: Place) -> tuple[FloatArray, float]:
-    part = next(part for part in specimen.model.parts if part.kind == "spring" and part.name == place.key[1])
-    motion = np.zeros(len(specimen.model.all_dofs))
+def _extension(context: ModelContext, location: Location) -> tuple[FloatArray, float]:
+    part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
+    motion = np.zeros(len(context.model.all_dofs))
     motion[part.indices] = (-1.0, 1.0)
     return motion, float(part.stiffness[1, 1])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -26,40 +26,40 @@ class SensorDynamics(Effect):
     name = "sensor_dynamics"
     imitators = ("time_delay", "sensor_gain")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with a high-pass or a low-pass."""
         return [
-            Place(key=(channel, kind), location={"channels": [channel]}, text={"kind": kind})
-            for channel in specimen.layout.channels
+            Location(key=(channel, kind), entries={"channels": [channel]}, text={"kind": kind})
+            for channel in context.layout.channels
             for kind in (HIGHPASS, LOWPASS)
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Corner."""
-        low, high = (bound * _edge(specimen, place) for bound in BOUNDS[str(place.key[1])])
-        neutral = 0.0 if place.key[1] == HIGHPASS else np.inf
+        low, high = (bound * _edge(context, location) for bound in BOUNDS[str(location.key[1])])
+        neutral = 0.0 if location.key[1] == HIGHPASS else np.inf
         return (Parameter(name="corner_hz", low=low, high=high, neutral=neutral),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Filter the channel."""
-        del specimen
-        return self.chain(place)
+        del context
+        return self.chain(location)
 
-    def chain(self, place: Place) -> Builder:
+    def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channel, kind = str(place.key[0]), str(place.key[1])
+        channel, kind = str(location.key[0]), str(location.key[1])
         return lambda values: Change(channels={channel: lambda s: first_order(s, kind, values[0])})
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From outside the band to within."""
-        return TRIED[str(place.key[1])][:, None] * _edge(specimen, place)
+        return TRIED[str(location.key[1])][:, None] * _edge(context, location)
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, which filter."""
-        del specimen
+        del context
         corner = values["corner_hz"]
         return (
-            f"The channel '{place.key[0]}' has a {place.key[1]} with its corner at {corner.value:.4g} Hz "
+            f"The channel '{location.key[0]}' has a {location.key[1]} with its corner at {corner.value:.4g} Hz "
             f"(+- {corner.std:.2g} Hz)."
         )
 
@@ -85,5 +85,5 @@ def first_order(s: ComplexArray, kind: str, corner_hz: float) -> ComplexArray:
     return np.asarray((s if kind == HIGHPASS else corner) / (s + corner))
 
 
-def _edge(specimen: ModelContext, place: Place) -> float:
-    return specimen.band_hz[0] if place.key[1] == HIGHPASS else specimen.band_hz[1]
+def _edge(context: ModelContext, location: Location) -> float:
+    return context.band_hz[0] if location.key[1] == HIGHPASS else context.band_hz[1]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -27,44 +27,44 @@ class SensorGain(Effect):
     name = "sensor_gain"
     imitators = ("global_stiffness",)
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with either sign."""
         return [
-            Place(key=(channel, sign), location={"channels": [channel]})
-            for channel in specimen.layout.channels
+            Location(key=(channel, sign), entries={"channels": [channel]})
+            for channel in context.layout.channels
             for sign in (1, -1)
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Give the size of the ratio."""
-        neutral = 1.0 if place.key[1] == 1 else 0.0
-        tolerance = specimen.options.gain_tolerance
+        neutral = 1.0 if location.key[1] == 1 else 0.0
+        tolerance = context.options.gain_tolerance
         return (Parameter(name="gain_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=neutral, tolerance=tolerance),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Multiply the channel."""
-        del specimen
-        return self.chain(place)
+        del context
+        return self.chain(location)
 
-    def chain(self, place: Place) -> Builder:
+    def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channel, sign = str(place.key[0]), float(str(place.key[1]))
+        channel, sign = str(location.key[0]), float(str(location.key[1]))
         return lambda values: Change(channels={channel: lambda s: np.full(len(s), sign * values[0] + 0j)})
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From much less to much more."""
-        del specimen, place
+        del context, location
         return TRIED[:, None]
 
-    def reported(self, place: Place, name: str, value: float) -> float:
+    def report_value(self, location: Location, name: str, value: float) -> float:
         """Give the ratio its sign."""
         del name
-        return value * float(str(place.key[1]))
+        return value * float(str(location.key[1]))
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
-        del specimen
+        del context
         ratio = values["gain_ratio"]
         sign = " and has the wrong sign" if ratio.value < 0 else ""
         size = f"{abs(ratio.value):.4g} (+- {ratio.std:.2g})"
-        return f"The channel '{place.key[0]}' shows {size} times the true signal{sign}."
+        return f"The channel '{location.key[0]}' shows {size} times the true signal{sign}."

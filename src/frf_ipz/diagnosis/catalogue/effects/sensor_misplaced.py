@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -19,45 +19,47 @@ class SensorMisplaced(Effect):
     name = "sensor_misplaced"
     imitators = ("sensor_gain",)
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every other node for every channel that stays at one node."""
-        channels = [channel for channel, _ in specimen.layout.outputs]
+        channels = [channel for channel, _ in context.layout.outputs]
         return [
-            _place(channel, other.node)
-            for channel, dof in specimen.layout.outputs
+            _make_location(channel, other.node)
+            for channel, dof in context.layout.outputs
             if channels.count(channel) == 1
-            for other in specimen.moving_dofs
+            for other in context.moving_dofs
             if other.direction == dof.direction and other.node != dof.node
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """None: the node says it all."""
-        del specimen, place
+        del context, location
         return ()
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Move the sensor."""
-        del specimen
-        return self.chain(place)
+        del context
+        return self.chain(location)
 
-    def chain(self, place: Place) -> Builder:
+    def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        change = Change(moved={str(place.key[0]): int(str(place.key[1]))})
+        change = Change(moved={str(location.key[0]): int(str(location.key[1]))})
         return lambda _: change
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
-        channel, node = str(place.key[0]), int(str(place.key[1]))
-        dof = next(dof for name, dof in specimen.layout.outputs if name == channel)
-        return [_place(channel, other) for other in specimen.nodes_near(node, dof.direction) if other != dof.node]
+        channel, node = str(location.key[0]), int(str(location.key[1]))
+        dof = next(dof for name, dof in context.layout.outputs if name == channel)
+        return [
+            _make_location(channel, other) for other in context.nodes_near(node, dof.direction) if other != dof.node
+        ]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which sensor, and where it is."""
         del values
-        channel, node = str(place.key[0]), int(str(place.key[1]))
-        dof = next(dof for name, dof in specimen.layout.outputs if name == channel)
-        return f"The sensor of '{channel}' sits at {specimen.where(node)}, not at node {dof.node}."
+        channel, node = str(location.key[0]), int(str(location.key[1]))
+        dof = next(dof for name, dof in context.layout.outputs if name == channel)
+        return f"The sensor of '{channel}' sits at {context.where(node)}, not at node {dof.node}."
 
 
-def _place(channel: str, node: int) -> Place:
-    return Place(key=(channel, node), location={"channels": [channel], "nodes": [node]})
+def _make_location(channel: str, node: int) -> Location:
+    return Location(key=(channel, node), entries={"channels": [channel], "nodes": [node]})

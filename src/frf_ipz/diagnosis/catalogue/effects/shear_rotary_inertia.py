@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -23,26 +23,26 @@ class ShearRotaryInertia(Effect):
     name = "shear_rotary_inertia"
     imitators = ("global_stiffness", "axial_load", "added_mass")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Return a beam that was modelled by Euler-Bernoulli."""
-        source = specimen.model.source
+        source = context.model.source
         applies = isinstance(source, BeamFile) and source.beam.formulation == "euler-bernoulli"
-        return [Place(key=())] if applies else []
+        return [Location(key=())] if applies else []
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """None: dimensions and material are known."""
-        del specimen, place
+        del context, location
         return ()
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Exchange the elements."""
-        del place
-        change = Change(model=_exchanged(specimen.model))
+        del location
+        change = Change(model=_exchanged(context.model))
         return lambda _: change
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say what the model lacks."""
-        del specimen, place, values
+        del context, location, values
         return (
             "The beam is too thick for the Euler-Bernoulli theory of the model: it lacks shear flexibility and rotary "
             'inertia (formulation = "timoshenko").'

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -33,38 +33,38 @@ class StructuralDamping(Effect):
     name = "structural_damping"
     imitators = ("damping_level", "viscoelastic_joint", "local_damper")
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere, in four forms."""
-        del specimen
-        return [Place(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
+        del context
+        return [Location(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Loss factor."""
-        del specimen, place
+        del context, location
         return (Parameter(name="loss_factor", low=BOUNDS[0], high=BOUNDS[1]),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Give it to the stiffness, or half of it to the ratio of each mode."""
-        if place.key == (OF_MODES,):
+        if location.key == (OF_MODES,):
             return lambda values: Change(added_ratio=float(values[0]) / 2)
-        if place.key == (KEEPING_MODES,):
+        if location.key == (KEEPING_MODES,):
             return lambda values: Change(loss_factor=float(values[0]), keeps_modes=True)
-        middle = 2 * np.pi * float(np.sqrt(specimen.band_hz[0] * specimen.band_hz[1])) if place.key else 0.0
+        middle = 2 * np.pi * float(np.sqrt(context.band_hz[0] * context.band_hz[1])) if location.key else 0.0
         return lambda values: Change(loss_factor=float(values[0]), reference_rad_s=middle)
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From little to much."""
-        del specimen, place
+        del context, location
         return TRIED[:, None]
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""
-        del specimen, values
-        return LESS_LIKELY if place.key == (OF_MODES,) else 0.0
+        del context, values
+        return LESS_LIKELY if location.key == (OF_MODES,) else 0.0
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much."""
-        del specimen, place
+        del context, location
         loss = values["loss_factor"]
         return (
             f"The material loses energy by itself: a loss factor of {loss.value:.3g} (+- {loss.std:.2g}) of the whole "

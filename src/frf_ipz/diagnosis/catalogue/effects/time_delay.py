@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -25,44 +25,44 @@ class TimeDelay(Effect):
     name = "time_delay"
     imitators = ("sensor_dynamics",)
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, and all sensors together."""
-        sensors = tuple(dict.fromkeys(channel for channel, _ in specimen.layout.outputs))
-        late = [(channel,) for channel in specimen.layout.channels]
+        sensors = tuple(dict.fromkeys(channel for channel, _ in context.layout.outputs))
+        late = [(channel,) for channel in context.layout.channels]
         return [
-            Place(key=channels, location={"channels": list(channels)}) for channels in dict.fromkeys([*late, sensors])
+            Location(key=channels, entries={"channels": list(channels)}) for channels in dict.fromkeys([*late, sensors])
         ]
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Delay."""
-        del place
-        period = 1 / specimen.band_hz[1]
+        del location
+        period = 1 / context.band_hz[1]
         return (Parameter(name="delay_s", low=SHORTEST * period, high=LONGEST * period),)
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Turn the phase."""
-        del specimen
-        return self.chain(place)
+        del context
+        return self.chain(location)
 
-    def chain(self, place: Place) -> Builder:
+    def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channels = [str(channel) for channel in place.key]
+        channels = [str(channel) for channel in location.key]
 
         def change(values: FloatArray) -> Change:
             return Change(channels=dict.fromkeys(channels, lambda s: np.exp(-s * values[0])))
 
         return change
 
-    def starts(self, specimen: ModelContext, place: Place) -> FloatArray:
+    def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From little to much."""
-        del place
-        return TRIED[:, None] / specimen.band_hz[1]
+        del location
+        return TRIED[:, None] / context.band_hz[1]
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
-        del specimen
+        del context
         delay = values["delay_s"]
         late = f"late by {1e6 * delay.value:.4g} us (+- {1e6 * delay.std:.2g} us)"
-        if len(place.key) == 1:
-            return f"The channel '{place.key[0]}' is {late}."
+        if len(location.key) == 1:
+            return f"The channel '{location.key[0]}' is {late}."
         return f"All sensors together are {late}."

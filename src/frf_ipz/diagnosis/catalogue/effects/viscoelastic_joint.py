@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Place, Signature, at_nodes, beside_node
+from frf_ipz.diagnosis.catalogue.effect import (
+    Builder,
+    Effect,
+    Location,
+    Parameter,
+    Signature,
+    list_neighbouring_nodes,
+    list_node_locations,
+)
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -30,29 +38,31 @@ class ViscoelasticJoint(Effect):
     imitators = ("local_damper", "grounded_spring", "attached_resonator", "global_stiffness")
     has_dynamics = True
 
-    def places(self, specimen: ModelContext) -> Sequence[Place]:
+    def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves, every spring, the rotation of every pinned end."""
-        found = [Place(key=("node", *place.key), location=place.location) for place in at_nodes(specimen)]
-        springs = [part for part in specimen.model.parts if part.kind == "spring"]
+        found = [
+            Location(key=("node", *location.key), entries=location.entries) for location in list_node_locations(context)
+        ]
+        springs = [part for part in context.model.parts if part.kind == "spring"]
         to_ground = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        found = [place for place in found if place.key[1] not in to_ground]
-        found += [Place(key=("spring", part.name), location={"springs": [part.name]}) for part in springs]
-        return found + _ends(specimen)
+        found = [location for location in found if location.key[1] not in to_ground]
+        found += [Location(key=("spring", part.name), entries={"springs": [part.name]}) for part in springs]
+        return found + _ends(context)
 
-    def parameters(self, specimen: ModelContext, place: Place) -> tuple[Parameter, ...]:
+    def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
-        own = specimen.stiffness_against(motion_at(specimen, place))
-        low, high = (2 * np.pi * edge for edge in specimen.band_hz)
-        name = "rotational_stiffness_Nm_rad" if place.key[0] == "end" else "stiffness_N_m"
+        own = context.stiffness_against(motion_at(context, location))
+        low, high = (2 * np.pi * edge for edge in context.band_hz)
+        name = "rotational_stiffness_Nm_rad" if location.key[0] == "end" else "stiffness_N_m"
         return (
             Parameter(name=name, low=SOFTEST * own, high=STIFFEST * own),
             Parameter(name="relaxation_time_s", low=1 / (FASTEST * high), high=1 / (SLOWEST * low)),
         )
 
-    def build(self, specimen: ModelContext, place: Place) -> Builder:
+    def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = motion_at(specimen, place)[:, None]
-        light = 1 / (LIGHT * 2 * np.pi * specimen.band_hz[1]) ** 2
+        motion = motion_at(context, location)[:, None]
+        light = 1 / (LIGHT * 2 * np.pi * context.band_hz[1]) ** 2
 
         def change(values: FloatArray) -> Change:
             stiffness, time = values
@@ -70,36 +80,41 @@ class ViscoelasticJoint(Effect):
 
         return change
 
-    def sketch(self, specimen: ModelContext, place: Place) -> Signature:
+    def signature(self, context: ModelContext, location: Location) -> Signature:
         """Draw some relaxation times."""
-        low, high = (2 * np.pi * edge for edge in specimen.band_hz)
+        low, high = (2 * np.pi * edge for edge in context.band_hz)
         times = np.geomspace(1 / (2 * high), 1 / (0.5 * low), N_TIMES)
         return Signature(
-            motion=motion_at(specimen, place),
-            shapes=np.array([relaxing(specimen.contour, time) for time in times]),
+            motion=motion_at(context, location),
+            shapes=np.array([relaxing(context.contour, time) for time in times]),
             values=np.stack([np.ones(N_TIMES), times], 1),
         )
 
-    def neighbours(self, specimen: ModelContext, place: Place) -> Sequence[Place]:
+    def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside, and ends, which look like the nodes beside them; for others nothing."""
-        if place.key[0] != "node":
+        if location.key[0] != "node":
             return []
-        inner = Place(key=place.key[1:], location=place.location)
-        beside = [Place(key=("node", *other.key), location=other.location) for other in beside_node(specimen, inner)]
-        return beside + _ends(specimen)
+        inner = Location(key=location.key[1:], entries=location.entries)
+        beside = [
+            Location(key=("node", *other.key), entries=other.entries)
+            for other in list_neighbouring_nodes(context, inner)
+        ]
+        return beside + _ends(context)
 
-    def log_prior(self, specimen: ModelContext, place: Place, values: FloatArray) -> float:
+    def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Joints sit at ends: one of them is as likely as one at any node between."""
         del values
-        return float(np.log(len(at_nodes(specimen)) / len(_ends(specimen)))) if place.key[0] == "end" else 0.0
+        return (
+            float(np.log(len(list_node_locations(context)) / len(_ends(context)))) if location.key[0] == "end" else 0.0
+        )
 
-    def statement(self, specimen: ModelContext, place: Place, values: Mapping[str, Estimate]) -> str:
+    def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, how fast, where."""
         where = {
-            "node": lambda: f"between {specimen.where(int(str(place.key[1])))} and the ground",
-            "spring": lambda: f"across the spring '{place.key[1]}'",
-            "end": lambda: f"at the {place.key[1]} end, against its rotation,",
-        }[str(place.key[0])]()
+            "node": lambda: f"between {context.where(int(str(location.key[1])))} and the ground",
+            "spring": lambda: f"across the spring '{location.key[1]}'",
+            "end": lambda: f"at the {location.key[1]} end, against its rotation,",
+        }[str(location.key[0])]()
         name, stiffness = next(iter(values.items()))
         unit = "N m/rad" if name.startswith("rot") else "N/m"
         return (
@@ -126,26 +141,26 @@ def relaxing(s: ComplexArray, time_s: float) -> ComplexArray:
     return np.asarray(s * time_s / (1 + s * time_s))
 
 
-def _ends(specimen: ModelContext) -> list[Place]:
+def _ends(context: ModelContext) -> list[Location]:
     """Pinned ends of a beam."""
-    source = specimen.model.source
+    source = context.model.source
     if not isinstance(source, BeamFile):
         return []
     return [
-        Place(key=("end", end, node), location={"end": end, "nodes": [node]})
+        Location(key=("end", end, node), entries={"end": end, "nodes": [node]})
         for end, node in (("left", 1), ("right", source.beam.elements + 1))
         if getattr(source.beam, end) == "pinned"
     ]
 
 
-def motion_at(specimen: ModelContext, place: Place) -> FloatArray:
+def motion_at(context: ModelContext, location: Location) -> FloatArray:
     """Weights of all DOFs in what a joint sees.
 
     Parameters
     ----------
-    specimen : ModelContext
+    context : ModelContext
         What is tested.
-    place : Place
+    location : Place
         A node, a spring, or a pinned end.
 
     Returns
@@ -153,12 +168,12 @@ def motion_at(specimen: ModelContext, place: Place) -> FloatArray:
     (n_all,) array
         The motion of a node, the stretch of a spring, the rotation of an end.
     """
-    kind = place.key[0]
+    kind = location.key[0]
     if kind == "node":
-        return specimen.unit(next(d for d in specimen.moving_dofs if (d.node, d.direction) == place.key[1:]))
+        return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[1:]))
     if kind == "end":
-        return specimen.unit(Dof(int(str(place.key[2])), "ry"))
-    part = next(part for part in specimen.model.parts if part.kind == "spring" and part.name == place.key[1])
-    motion = np.zeros(len(specimen.model.all_dofs))
+        return context.unit(Dof(int(str(location.key[2])), "ry"))
+    part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
+    motion = np.zeros(len(context.model.all_dofs))
     motion[part.indices] = (-1.0, 1.0)
     return motion

@@ -35,7 +35,7 @@ def remove_dc_offset(observations: Observations) -> Observations:
     Observations
         The same without dc offsets.
     """
-    if not observations.are_from_rest:
+    if not observations.start_at_rest:
         return observations
     is_hammer = observations.kind == "hammer"
     return replace(

@@ -66,7 +66,7 @@ class _Group:
 
     def n_terms(self, record: ObservedRecord) -> int:
         """Count the terms of the residual motion in a record."""
-        return 1 + FIRST_SAMPLES + (2 * len(self.poles) if record.follows else 0)
+        return 1 + FIRST_SAMPLES + (2 * len(self.poles) if record.has_predecessor else 0)
 
     def unit_spectra(self, record: ObservedRecord) -> ComplexArray:
         """Transform terms of amplitude 1, (n_lines / FINER, n_terms)."""
@@ -77,7 +77,7 @@ class _Group:
             return np.asarray(step * (1 - turn**n) / (1 - turn))
 
         first = np.hstack([transformed(np.zeros(1, complex)), step * np.exp(-s * step * np.arange(FIRST_SAMPLES))])
-        if not record.follows:
+        if not record.has_predecessor:
             return first
         up, down = transformed(self.poles), transformed(self.poles.conj())
         return np.hstack([first, (up + down) / 2, (up - down) / 2j])
@@ -85,7 +85,7 @@ class _Group:
     def unit_signals(self, record: ObservedRecord) -> FloatArray:
         """Terms of amplitude 1 in time, (n_terms, n_samples); 0 for first samples, which FRFs allow for."""
         first = np.vstack([np.ones(record.n_samples), np.zeros((FIRST_SAMPLES, record.n_samples))])
-        if not record.follows:
+        if not record.has_predecessor:
             return first
         turning = np.exp(np.outer(self.poles, record.step_s * np.arange(record.n_samples)))
         return np.concatenate([first, turning.real, turning.imag])
@@ -98,7 +98,7 @@ class _Group:
         tuple of (n_poles,) complex array and (n_poles,) array, or None
             States and their standard deviations; None if nothing came before, or one of the forces is unknown.
         """
-        if not record.follows:
+        if not record.has_predecessor:
             return None
         earlier = [
             (previous, pulse.record.force)
@@ -145,7 +145,7 @@ def remove_residual_motion(observations: Observations) -> Observations:
     Observations
         The same without residual motion, and with the uncertainty of their offsets.
     """
-    if not observations.are_from_rest:
+    if not observations.start_at_rest:
         return observations
     record_groups = group_records(observations)
     if observations.kind != "hammer" and min(len(records) for records in record_groups) < MIN_RECORDS:
@@ -171,8 +171,8 @@ def _prepare_group(records: tuple[ObservedRecord, ...], observations: Observatio
     lines = transform_group(transformed, observations.band_hz, decay)
     poles: list[LocalPole] = []
     residues = np.zeros((0, len(records[0].sensors)))
-    if any(record.follows for record in records):
-        from_rest = tuple(record for record in transformed if not record.follows)
+    if any(record.has_predecessor for record in records):
+        from_rest = tuple(record for record in transformed if not record.has_predecessor)
         lines_from_rest = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
         poles = _find_poles(lines_from_rest, decay)
         peaks = [int(np.argmin(np.abs(lines_from_rest.s - pole.pole))) for pole in poles]
@@ -202,7 +202,7 @@ def _gate_from_start(record: ObservedRecord) -> Pulse:
 
 def _subtract(record: ObservedRecord, residual: dict[tuple[str, str], tuple[FloatArray, float]]) -> ObservedRecord:
     signals, stds = zip(*(residual[record.name, sensor.channel] for sensor in record.sensors), strict=True)
-    return replace(record, responses=record.responses - np.array(signals), constant_std=np.array(stds))
+    return replace(record, responses=record.responses - np.array(signals), dc_offset_std=np.array(stds))
 
 
 def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
@@ -327,7 +327,7 @@ def _prior_of_record(
     The latter, (n_terms, 2 n_poles), is shared with the other records of the group.
     """
     n = len(residues)
-    if not record.follows:
+    if not record.has_predecessor:
         return np.array([0.0, *[missing] * FIRST_SAMPLES]), np.zeros((1 + FIRST_SAMPLES, 2 * n))
     if state is None:
         stds = np.array([motion, *[missing] * FIRST_SAMPLES, *[motion] * 2 * n])

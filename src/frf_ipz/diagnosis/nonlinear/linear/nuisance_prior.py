@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.model.nuisance import UNIFORM
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 from frf_ipz.diagnosis.nonlinear.linear.modal_model import (
     ModalModel,
     ModalResponse,
@@ -326,7 +326,7 @@ def make_nuisance_prior(
     """
     modes = np.arange(np.searchsorted(modal_model.omega_rad_s, 2 * np.pi * BEYOND * top_hz))
     rigid = modes < modal_model.n_rigid
-    frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM
+    frequency = np.hypot(options.frequency_tolerance, options.stiffness_tolerance / 2) * UNIFORM_STD
     moving = np.flatnonzero(stretches.moving)
     starts = np.zeros((len(moving), len(modes)))
     if len(moving):
@@ -340,7 +340,7 @@ def make_nuisance_prior(
         modal_model=modal_model,
         modes=modes,
         frequency=np.where(rigid, CORD_SPREAD, frequency),
-        damping=np.where(rigid, CORD_SPREAD, options.damping_tolerance * UNIFORM),
+        damping=np.where(rigid, CORD_SPREAD, options.damping_tolerance * UNIFORM_STD),
         sensors=_shape_spread(modal_model, tuple(s.dof for s in modal_model.sensors), modes, options),
         inputs=_shape_spread(modal_model, modal_model.inputs, modes, options),
         places=_uneven(modal_model, modes, options),
@@ -372,9 +372,9 @@ def _shape_spread(
         slope = _slope(modal_model, dof, known[dof.unsigned], modes)
         size = np.abs(known[dof.unsigned])
         parts = (
-            options.gain_tolerance * UNIFORM * size,
+            options.gain_tolerance * UNIFORM_STD * size,
             UNEVEN * options.stiffness_tolerance * largest,
-            options.position_tolerance_m_per_m * UNIFORM * slope,
+            options.position_tolerance_m_per_m * UNIFORM_STD * slope,
         )
         spread.append(np.sqrt(np.sum(np.square(parts), 0)))
     return np.array(spread)

@@ -190,7 +190,7 @@ def transform(observations: Observations, modal_model: ModalModel, noise: Channe
     variance = np.where(present[..., None], noisy + floor**2 * size, np.inf)
     return SegmentSet(
         s=s,
-        used=np.flatnonzero(observations.looks_at(frequency, sigma / (2 * np.pi)))[::THIN],
+        used=np.flatnonzero(observations.mask_band(frequency, sigma / (2 * np.pi)))[::THIN],
         step_s=step,
         n_samples=n,
         force=force,
@@ -244,7 +244,7 @@ def _cuts(observations: Observations, window: Window, step: float, modal_model: 
         starts = [max(int(np.argmax(np.abs(pulse.record.force) > 0)) - BEFORE, 0) for pulse in pulses]
         n = min(wanted, *(record.n_samples - start for record, start in zip(records, starts, strict=True)))
         pauses = [
-            record.duration_s if record.follows and _is_left(modal_model, record.duration_s) else 0.0
+            record.duration_s if record.has_predecessor and _is_left(modal_model, record.duration_s) else 0.0
             for record in records
         ]
         return [
