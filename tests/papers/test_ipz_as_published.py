@@ -92,5 +92,5 @@ def test_section_5_reaches_table_5():
     assert_allclose(found, read_table(5)["updated_imag"], rtol=TABLE_5)
 
 
-def test_the_blow_of_section_5_was_half_a_centimetre_from_where_the_text_says():
+def test_the_impact_of_section_5_was_half_a_centimetre_from_where_the_text_says():
     assert 43.4 < fit_impact_location_cm() < 43.6  # text: 44

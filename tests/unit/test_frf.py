@@ -39,7 +39,7 @@ def test_shapes_that_disagree_are_refused(name):
         frf_set(**{name: np.zeros((4, 3))})
 
 
-def test_values_that_are_not_finite_are_refused_with_their_place():
+def test_values_that_are_not_finite_are_refused_with_their_index():
     values = np.zeros((5, 3), complex)
     values[2, 1] = np.nan
     with pytest.raises(ShapeError, match=r"\(2, 1\)"):
@@ -56,7 +56,7 @@ def test_the_matrix_has_holes_where_nothing_was_measured():
     assert not matrix[:, 1, 1].any()
 
 
-def test_lines_and_frfs_can_be_picked():
+def test_lines_and_frfs_can_be_selected():
     frfs = frf_set().select_lines(FREQUENCY > 2).select_frfs([2, 0])
     assert frfs.n_lines == 3
     assert [label.input_dof.node for label in frfs.labels] == [9, 8]

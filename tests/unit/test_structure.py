@@ -34,7 +34,7 @@ def test_held_dofs_stay_in_the_matrices_of_all_dofs():
     assert_allclose(model.stiffness.toarray(), model.stiffness_all.toarray()[np.ix_([2, 3, 4, 5, 7], [2, 3, 4, 5, 7])])
 
 
-def test_places_count_all_dofs_and_indices_the_free_ones():
+def test_full_indices_count_all_dofs_and_indices_the_free_ones():
     model = beam(elements=3, left="clamped", right="pinned")
     assert model.full_index(Dof(4, "ry", -1)) == 7
     assert model.index(Dof(4, "ry", -1)) == 4
@@ -49,7 +49,7 @@ def test_places_count_all_dofs_and_indices_the_free_ones():
         (Dof(1, "z"), ["1:z is held", "use another DOF"]),
     ],
 )
-def test_a_dof_that_cannot_move_is_said(dof, fragments):
+def test_a_dof_that_cannot_move_is_refused(dof, fragments):
     with pytest.raises(InputError) as caught:
         beam(elements=3, left="clamped").index(dof)
     assert all(fragment in str(caught.value) for fragment in fragments)

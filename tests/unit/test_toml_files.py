@@ -66,13 +66,13 @@ def test_what_does_not_fit_is_named(tmp_path, text, where, problem):
     assert "\n" not in message
 
 
-def test_a_missing_section_and_a_missing_file_are_said(tmp_path):
+def test_a_missing_section_and_a_missing_file_are_reported(tmp_path):
     with pytest.raises(FileFormatError, match=r"no section \[pipeline\]"):
         read(tmp_path, "[fit]", required="pipeline")
     with pytest.raises(FileFormatError, match="no such file"):
         read_toml(tmp_path / "none.toml", File)
 
 
-def test_a_folder_in_the_place_of_a_file_is_said(tmp_path):
+def test_a_folder_instead_of_a_file_is_reported(tmp_path):
     with pytest.raises(FileFormatError, match="is a folder, but a file is expected"):
         read_text(tmp_path)

@@ -113,5 +113,5 @@ def _modal(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
     squares = np.maximum(poles.values.real, 0.0)
     n_rigid = int(np.count_nonzero(squares < RIGID * squares.max()))
     ratios, omega = stated_damping_ratios(model.modal_damping, len(squares), n_rigid), np.sqrt(squares)
-    shapes = reduced.mass @ poles.right.real
+    shapes = reduced.mass @ poles.right_vectors.real
     return np.asarray((shapes * (2 * ratios * omega)) @ shapes.T)

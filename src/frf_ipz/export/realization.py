@@ -66,7 +66,7 @@ def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatAr
     SecondOrder
         Modes by ascending frequency.
     """
-    shapes = undamped_poles(model.mass, (model.stiffness + model.stiffness.T) / 2).right.real
+    shapes = undamped_poles(model.mass, (model.stiffness + model.stiffness.T) / 2).right_vectors.real
     return SecondOrder(
         damping=shapes.T @ model.damping @ shapes,
         stiffness=shapes.T @ model.stiffness @ shapes,

@@ -35,7 +35,7 @@ def multiply(matrix: Matrix, vectors: FloatArray) -> FloatArray:
 
 
 def assemble(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int) -> Matrix:
-    """Add up the shares of parts in a matrix.
+    """Assemble a matrix from the shares of parts.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def assemble(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int)
 
 
 def assemble_mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matrix]:
-    """Add up what parts contribute to mass and stiffness.
+    """Assemble mass and stiffness from parts.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def assemble_mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matr
     mass, stiffness : (n_all, n_all) sparse array
         kg and N/m (and their rotational counterparts).
     """
-    several = tuple(parts)
-    mass = assemble(((part.indices, part.mass) for part in several), n_all)
-    return mass, assemble(((part.indices, part.stiffness) for part in several), n_all)
+    parts = tuple(parts)
+    mass = assemble(((part.indices, part.mass) for part in parts), n_all)
+    return mass, assemble(((part.indices, part.stiffness) for part in parts), n_all)
 
 
 def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matrix) -> tuple[FloatArray, Matrix]:
@@ -87,7 +87,7 @@ def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matr
     Parameters
     ----------
     section : DampingSection, optional
-        What the file says.
+        ``[damping]`` of the file.
     mass, stiffness : (n_all, n_all) sparse array
         Matrices of all DOFs.
 
@@ -98,9 +98,9 @@ def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matr
     damping : (n_all, n_all) sparse array
         alpha M + beta K, N s/m; empty without Rayleigh damping.
     """
-    nothing = sparse.csr_array(mass.shape, dtype=np.float64)
+    no_damping = sparse.csr_array(mass.shape, dtype=np.float64)
     if section is None:
-        return np.zeros(0), nothing
+        return np.zeros(0), no_damping
     if section.rayleigh is None:
-        return np.array(section.modal_ratio), nothing
+        return np.array(section.modal_ratio), no_damping
     return np.zeros(0), sparse.csr_array(section.rayleigh.alpha_1_s * mass + section.rayleigh.beta_s * stiffness)

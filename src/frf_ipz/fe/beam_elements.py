@@ -3,7 +3,7 @@
 The deflection w is a cubic and the rotation of the cross-section a quadratic polynomial that satisfy equilibrium
 without load along the element, so the stiffness is exact and nothing locks, however slender the beam [Davis1972]. All
 depends on the shear parameter Phi = 12 E I / (kappa G A L^2), which is 0 for Euler-Bernoulli. The mass matrix is
-consistent with w and, for Timoshenko, with the rotation, and has what these shapes leave out of order h^2 besides: the
+consistent with w and, for Timoshenko, with the rotation, with a correction of order h^2 for what these shapes lack: the
 frequencies of uniform and stepped beams converge with the fourth power of the element length h, with shear as without.
 
 Element DOFs are ``w, ry`` of the left and of the right node. ry is the rotation about y, so that dw/dx = -ry without
@@ -80,11 +80,11 @@ def deflection_polynomials(length: FloatArray, shear_parameter: FloatArray) -> F
     (n, 4, 4) array
         Coefficients of 1, xi, xi^2, xi^3 (last axis), xi = x / L, for each DOF (axis before), m/m and m/rad.
     """
-    phi, zero, one = shear_parameter, np.zeros_like(length), np.ones_like(length)
+    phi, zero, unit = shear_parameter, np.zeros_like(length), np.ones_like(length)
     rows = [
-        [1 + phi, -phi, -3 * one, 2 * one],
+        [1 + phi, -phi, -3 * unit, 2 * unit],
         [zero, length * (1 + phi / 2), -length * (2 + phi / 2), length],
-        [zero, phi, 3 * one, -2 * one],
+        [zero, phi, 3 * unit, -2 * unit],
         [zero, -length * phi / 2, -length * (1 - phi / 2), length],
     ]
     return _per_element(rows, phi)
@@ -128,21 +128,26 @@ def stiffness_matrices(elements: BeamElements) -> FloatArray:
     """
     length, phi = elements.length, elements.shear_parameter
     twelve, six = np.full_like(length, 12.0), 6 * length
-    near, far = (4 + phi) * length**2, (2 - phi) * length**2
-    rows = [[twelve, six, -twelve, six], [six, near, -six, far], [-twelve, -six, twelve, -six], [six, far, -six, near]]
+    same_end, other_end = (4 + phi) * length**2, (2 - phi) * length**2
+    rows = [
+        [twelve, six, -twelve, six],
+        [six, same_end, -six, other_end],
+        [-twelve, -six, twelve, -six],
+        [six, other_end, -six, same_end],
+    ]
     scale = elements.bending_stiffness / (length**3 * (1 + phi))
     return np.moveaxis(np.array(rows), -1, 0) * np.outer(SIGNS, SIGNS) * scale[:, None, None]
 
 
 def mass_matrices(elements: BeamElements) -> FloatArray:
-    """Mass of deflection and rotation, with what inertia adds to the static shapes to the second order.
+    """Mass of deflection and rotation, with the second-order effect of inertia on the static shapes.
 
     Inertia within an element of length h bends its ends' static shapes by a bubble that z = omega^2 drives. To leading
     order its work is h^2 / 12 times the integral of (z rho A w)^2 / (kappa G A) plus that of
     (z rho I theta)^2 Phi / (E I (1 + Phi)). The mode's own balance, z rho A w = -V' and z rho I theta = -(M' + V), and
     integration by parts over the beam turn one z of each into strains: w' gamma, and theta'^2 and theta gamma. The
     terms at the ends vanish at clamped, pinned, sliding and free ends; at point masses and springs an error of second
-    order is left, as it is in modal masses. Without shear nothing is added.
+    order remains, as in modal masses. Without shear nothing is added.
 
     The matrices are positive definite for isotropic materials, of which E / (kappa G) is 3.5 at most.
 
@@ -164,9 +169,9 @@ def mass_matrices(elements: BeamElements) -> FloatArray:
     turn = elements.length[:, None] * (rotation / np.arange(1.0, rotation.shape[-1] + 1)).sum(-1)
     sheared = rise - turn  # h gamma, which is constant
     bent = _integral(rotation[..., 1:] * np.arange(1.0, rotation.shape[-1]))
-    further = phi[:, None, None] / 12 * bent - _symmetric(turn, sheared) / elements.length[:, None, None] ** 2
+    correction = phi[:, None, None] / 12 * bent - _symmetric(turn, sheared) / elements.length[:, None, None] ** 2
     translational = _integral(deflection) + _symmetric(rise, sheared) / 12
-    rotary = _integral(rotation) + further / (1 + phi)[:, None, None]
+    rotary = _integral(rotation) + correction / (1 + phi)[:, None, None]
     return mass[:, None, None] * translational + inertia[:, None, None] * rotary
 
 

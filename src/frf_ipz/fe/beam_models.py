@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def with_formulation(model: StructuralModel, formulation: Formulation) -> StructuralModel:
-    """Build the elements of a beam anew by another theory; everything else stays.
+    """Build the elements of a beam by another theory; everything else stays.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
     Returns
     -------
     StructuralModel
-        The beam with other elements. Elements that were scaled lose it: scale after this.
+        The beam with new elements. Scaling of elements is lost: scale afterwards.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
     file = _beam_file(model)
     beam = replace(file.beam, formulation=formulation)
     elements = element_parts(beam)
-    others = [part for part in model.parts if part.kind != "element"]
+    point_parts = [part for part in model.parts if part.kind != "element"]
     old_mass, old_stiffness = assemble_mass_and_stiffness(
         [part for part in model.parts if part.kind == "element"], _order(model)
     )
@@ -52,8 +52,8 @@ def with_formulation(model: StructuralModel, formulation: Formulation) -> Struct
         model,
         mass_all=sparse.csr_array(model.mass_all + (mass - old_mass)),
         stiffness_all=sparse.csr_array(model.stiffness_all + (stiffness - old_stiffness)),
-        parts=(*elements, *others),
-        source=replace(file, beam=beam),  # who interpolates between nodes asks it for the theory
+        parts=(*elements, *point_parts),
+        source=replace(file, beam=beam),  # interpolation between nodes takes the theory from it
     )
 
 
@@ -80,7 +80,7 @@ def with_axial_force(model: StructuralModel, force_N: float) -> StructuralModel:
     return replace(model, stiffness_all=sparse.csr_array(model.stiffness_all + force_N * geometric_stiffness(model)))
 
 
-@lru_cache(maxsize=2)  # a search for an axial load asks for the same one again and again
+@lru_cache(maxsize=2)  # a search for an axial load needs the same one many times
 def geometric_stiffness(model: StructuralModel) -> Matrix:
     """Stiffness that an axial tension of 1 N adds to a beam.
 
@@ -126,7 +126,7 @@ def beam_options(model: StructuralModel) -> BeamOptions:
 
 
 def deflection_row(model: StructuralModel, x_m: float) -> FloatArray:
-    """Deflection at any place of a beam for unit motions of its DOFs.
+    """Deflection at any position on a beam for unit motions of its DOFs.
 
     Parameters
     ----------
@@ -143,13 +143,13 @@ def deflection_row(model: StructuralModel, x_m: float) -> FloatArray:
     Raises
     ------
     InputError
-        If the model is no beam, or the place is not on it.
+        If the model is no beam, or the position is not on it.
     """
-    return _row(model, x_m, derivative=0)
+    return _polynomial_row(model, x_m, derivative=0)
 
 
 def slope_row(model: StructuralModel, x_m: float) -> FloatArray:
-    """Slope dw/dx at any place of a beam for unit motions of its DOFs: how deflection changes with the place.
+    """Slope dw/dx at any position on a beam for unit motions of its DOFs.
 
     Parameters
     ----------
@@ -166,13 +166,13 @@ def slope_row(model: StructuralModel, x_m: float) -> FloatArray:
     Raises
     ------
     InputError
-        If the model is no beam, or the place is not on it.
+        If the model is no beam, or the position is not on it.
     """
-    return _row(model, x_m, derivative=1)
+    return _polynomial_row(model, x_m, derivative=1)
 
 
 def shear_slope_at(model: StructuralModel, x_m: float) -> float:
-    """Slope by shear on each side of a force: half of what jumps there.
+    """Slope by shear on each side of a force: half of the jump of the slope there.
 
     Parameters
     ----------
@@ -184,31 +184,31 @@ def shear_slope_at(model: StructuralModel, x_m: float) -> float:
     Returns
     -------
     float
-        1/N: 1 / (2 kappa G A). Next to the force the deflection falls by it with every metre.
+        1/N: 1 / (2 kappa G A), the change of deflection with distance from the force, per newton.
 
     Raises
     ------
     InputError
-        If the model is no beam, or the place is not on it.
+        If the model is no beam, or the position is not on it.
     """
     beam = replace(beam_options(model), formulation="timoshenko")
-    elements, place = beam_elements(beam), _element_at(model, x_m)
-    softness = elements.shear_parameter * elements.length**2 / (12 * elements.bending_stiffness)
-    return float(softness[place] / 2)
+    elements, index = beam_elements(beam), _element_index(model, x_m)
+    shear_flexibility = elements.shear_parameter * elements.length**2 / (12 * elements.bending_stiffness)
+    return float(shear_flexibility[index] / 2)
 
 
-def _row(model: StructuralModel, x_m: float, derivative: int) -> FloatArray:
-    elements, place = beam_elements(beam_options(model)), _element_at(model, x_m)
-    length = elements.length[place : place + 1]
-    polynomials = deflection_polynomials(length, elements.shear_parameter[place : place + 1])[0]
-    xi = float(np.clip(x_m / length[0] - place, 0.0, 1.0))
+def _polynomial_row(model: StructuralModel, x_m: float, derivative: int) -> FloatArray:
+    elements, index = beam_elements(beam_options(model)), _element_index(model, x_m)
+    length = elements.length[index : index + 1]
+    polynomials = deflection_polynomials(length, elements.shear_parameter[index : index + 1])[0]
+    xi = float(np.clip(x_m / length[0] - index, 0.0, 1.0))
     powers = np.array([1.0, xi, xi**2, xi**3]) if derivative == 0 else np.array([0.0, 1.0, 2 * xi, 3 * xi**2]) / length
     row = np.zeros(len(model.all_dofs))
-    row[2 * place : 2 * place + 4] = polynomials @ powers
+    row[2 * index : 2 * index + 4] = polynomials @ powers
     return row
 
 
-def _element_at(model: StructuralModel, x_m: float) -> int:
+def _element_index(model: StructuralModel, x_m: float) -> int:
     beam = beam_options(model)
     if not 0 <= x_m <= beam.length_m:
         raise InputError(f"x = {x_m:g} m is not on the beam '{model.name}', which goes from 0 to {beam.length_m:g} m")
@@ -217,7 +217,9 @@ def _element_at(model: StructuralModel, x_m: float) -> int:
 
 def _beam_file(model: StructuralModel) -> BeamFile:
     if not isinstance(model.source, BeamFile):
-        raise InputError(f"the model '{model.name}' is of kind '{model.kind}'; only a beam can be built anew")
+        raise InputError(
+            f"the model '{model.name}' is of kind '{model.kind}'; only a beam has elements that can be rebuilt"
+        )
     return model.source
 
 

@@ -1,4 +1,4 @@
-"""A model, changed: masses and springs added, parts scaled, supports released. What is not named stays as it was."""
+"""Changed copies of a model: masses and springs added, parts scaled, supports released."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ TRANSLATIONS = ("x", "y", "z")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SupportBlocks:
-    """How held DOFs are joined to the free ones.
+    """Blocks of the matrices that join held DOFs to the free ones.
 
     Parameters
     ----------
     stiffness_across, mass_across : (n_free, n_held) array
         Columns of K and M from the held DOFs to the free ones.
-    stiffness_own, mass_own : (n_held, n_held) array
-        Their own blocks.
+    stiffness_held, mass_held : (n_held, n_held) array
+        Blocks of the held DOFs.
     """
 
     stiffness_across: FloatArray
     mass_across: FloatArray
-    stiffness_own: FloatArray
-    mass_own: FloatArray
+    stiffness_held: FloatArray
+    mass_held: FloatArray
 
 
 def with_default_damping(model: StructuralModel, ratio: float | None) -> StructuralModel:
@@ -75,7 +75,7 @@ def with_point_masses(model: StructuralModel, masses_kg: Mapping[int, float]) ->
     model : StructuralModel
         The model.
     masses_kg : mapping of int to float
-        Node and mass, kg: a sensor that sits there, for one.
+        Node and mass, kg: that of a sensor, for example.
 
     Returns
     -------
@@ -112,8 +112,8 @@ def with_springs(model: StructuralModel, stiffness: Mapping[Dof, float]) -> Stru
     InputError
         If the model lacks a DOF.
     """
-    places = np.array([model.full_index(dof) for dof in stiffness], dtype=np.int64)
-    added = assemble([(places, np.diag(list(stiffness.values())))], len(model.all_dofs))
+    indices = np.array([model.full_index(dof) for dof in stiffness], dtype=np.int64)
+    added = assemble([(indices, np.diag(list(stiffness.values())))], len(model.all_dofs))
     return replace(model, stiffness_all=model.stiffness_all + added)
 
 
@@ -138,12 +138,12 @@ def with_released_supports(model: StructuralModel, stiffness: Mapping[Dof, float
         If the model lacks a DOF, or does not hold it.
     """
     fixed = model.fixed.copy()
-    fixed[_held_places(model, list(stiffness))] = False
+    fixed[_held_indices(model, list(stiffness))] = False
     return replace(with_springs(model, stiffness), fixed=fixed)
 
 
 def support_blocks(model: StructuralModel, dofs: Sequence[Dof]) -> SupportBlocks:
-    """Take out the blocks that join held DOFs to the structure, to release them as a change of low rank.
+    """Extract the blocks that join held DOFs to the structure, to release them as a change of low rank.
 
     Parameters
     ----------
@@ -162,18 +162,18 @@ def support_blocks(model: StructuralModel, dofs: Sequence[Dof]) -> SupportBlocks
     InputError
         If the model lacks a DOF, or does not hold it.
     """
-    held, free = _held_places(model, dofs), np.flatnonzero(~model.fixed)
+    held, free = _held_indices(model, dofs), np.flatnonzero(~model.fixed)
     stiffness, mass = model.stiffness_all[:, held], model.mass_all[:, held]
     return SupportBlocks(
         stiffness_across=stiffness[free].toarray(),
         mass_across=mass[free].toarray(),
-        stiffness_own=stiffness[held].toarray(),
-        mass_own=mass[held].toarray(),
+        stiffness_held=stiffness[held].toarray(),
+        mass_held=mass[held].toarray(),
     )
 
 
 def part_matrices(model: StructuralModel, kind: str, names: Sequence[str]) -> tuple[Matrix, Matrix]:
-    """Add up what some parts contribute to the matrices of all DOFs.
+    """Assemble the matrices of some parts, for all DOFs.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def part_matrices(model: StructuralModel, kind: str, names: Sequence[str]) -> tu
     kind : str
         ``element``, ``spring``, ``group`` or ``point``.
     names : sequence of str
-        Which ones.
+        Names of the parts.
 
     Returns
     -------
@@ -247,8 +247,8 @@ def _parts(model: StructuralModel, kind: str, names: Sequence[str]) -> list[Part
 def _point_mass(model: StructuralModel, node: int, mass_kg: float) -> Part:
     if mass_kg < 0:
         raise InputError(f"the mass at node {node} is {mass_kg:g} kg; give 0 or more")
-    places = [place for dof, place in model.full_indices.items() if dof.node == node and dof.direction in TRANSLATIONS]
-    if not places:
+    indices = [index for dof, index in model.full_indices.items() if dof.node == node and dof.direction in TRANSLATIONS]
+    if not indices:
         nodes = model.geometry.nodes
         raise InputError(
             f"a mass is to be added at node {node}, which the model '{model.name}' does not have or which cannot move; "
@@ -258,15 +258,15 @@ def _point_mass(model: StructuralModel, node: int, mass_kg: float) -> Part:
         kind="point",
         name=f"added mass at node {node}",
         nodes=(node,),
-        indices=np.array(places),
-        stiffness=np.zeros((len(places), len(places))),
-        mass=mass_kg * np.eye(len(places)),
+        indices=np.array(indices),
+        stiffness=np.zeros((len(indices), len(indices))),
+        mass=mass_kg * np.eye(len(indices)),
     )
 
 
-def _held_places(model: StructuralModel, dofs: Sequence[Dof]) -> IntArray:
-    places = np.array([model.full_index(dof) for dof in dofs], dtype=np.int64)
-    for dof, place in zip(dofs, places, strict=True):
-        if not model.fixed[place]:
+def _held_indices(model: StructuralModel, dofs: Sequence[Dof]) -> IntArray:
+    indices = np.array([model.full_index(dof) for dof in dofs], dtype=np.int64)
+    for dof, index in zip(dofs, indices, strict=True):
+        if not model.fixed[index]:
             raise InputError(f"the DOF {dof.name} of the model '{model.name}' is not held, so it cannot be released")
-    return places
+    return indices

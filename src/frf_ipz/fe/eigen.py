@@ -1,4 +1,4 @@
-"""Undamped modes of an FE model, and the flexibility of the modes that are left out.
+"""Undamped modes of an FE model, and the flexibility of the modes beyond them.
 
 ``K phi = omega^2 M phi`` is solved by shift and inversion, ``(K + tau M)^-1 M``, with tau near the square of 0.4 times
 the first elastic mode: the low modes then keep their digits however fine the mesh, and a free structure stays positive
@@ -28,10 +28,10 @@ EPS = float(np.finfo(float).eps)
 SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding
 HELD_SHIFT = 0.01  # of the estimate, for a structure that is held: its stiffness needs no shift to be factored
 USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are lost; above, ARPACK crawls
-NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below cannot be told from none
-MAX_ROUNDING = 1e-9  # what a stiffness matrix printed with few digits may lack
-MOST_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
-DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is none of its own
+NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below is indistinguishable from zero
+MAX_ROUNDING = 1e-9  # of a stiffness matrix printed with few digits
+FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
+DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
 MANY_MODES = 4  # a larger share of all modes than one in so many is found faster by LAPACK
 FIRST_MODES = 24  # ARPACK's first guess at how many modes lie below a frequency
 FLEXIBILITY_STEPS = 60
@@ -40,7 +40,7 @@ FLEXIBILITY_TOLERANCE = 1e-12  # change of a step, relative: the limit of double
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalBasis:
-    """The lowest modes of a model, and the means to find what the others contribute.
+    """The lowest modes of a model, and the factors from which the contribution of all others follows.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ class ModalBasis:
         return np.sqrt(self.eigenvalues) / (2 * np.pi)
 
     def first(self, n_modes: int) -> ModalBasis:
-        """Keep the lowest modes.
+        """Select the lowest modes.
 
         Parameters
         ----------
         n_modes : int
-            How many.
+            Number of modes.
 
         Returns
         -------
@@ -95,11 +95,11 @@ class ModalBasis:
         )
 
     def residual_flexibility(self, loads: FloatArray) -> FloatArray:
-        """Find the static deflection under loads, without what the modes of the basis contribute.
+        """Find the static deflection under loads without the contribution of the modes of the basis.
 
         The part of the loads that excites none of the modes is in balance, also on a free structure, and its deflection
-        is found by correcting that of K + tau M. Each step takes off the factor ``tau / (omega^2 + tau)`` of the
-        first mode left out.
+        is found by correcting that of K + tau M. Each step reduces the error by the factor ``tau / (omega^2 + tau)``
+        of the first mode beyond.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class ModalBasis:
         Returns
         -------
         (n, n_loads) array
-            m; a sum over the modes left out of ``phi phi^T / omega^2`` times the loads.
+            m; the sum over all further modes of ``phi phi^T / omega^2`` times the loads.
         """
         loads = loads - multiply(self.mass, self.shapes @ (self.shapes.T @ loads))
         deflection = self._without_modes(self.factor.solve(loads))
@@ -132,7 +132,7 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     model : StructuralModel
         The FE model.
     n_modes : int, optional
-        How many modes, rigid-body modes included; at most as many as free DOFs.
+        Number of modes, rigid-body modes included; at most as many as free DOFs.
     up_to_hz : float, optional
         Only modes up to this frequency, Hz. With neither of the two, all modes of a model of fewer than 600 DOFs.
 
@@ -140,7 +140,7 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     -------
     ModeSet
         By ascending frequency, at the free DOFs, mass-normalised; rigid-body modes have the frequency 0. The damping
-        ratios are those that the model states, and what its viscous damping adds to each mode by itself.
+        ratios are those that the model states, plus the diagonal of its viscous damping in each mode.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
 
 
 def damping_ratios(model: StructuralModel, basis: ModalBasis) -> FloatArray:
-    """Damping ratio of each mode: what is stated for modes, and the viscous matrix's diagonal term.
+    """Damping ratio of each mode: the stated one, and the diagonal term of the viscous matrix.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def stated_damping_ratios(modal_damping: FloatArray, n_modes: int, n_rigid: int)
 
 
 def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz: float | None = None) -> ModalBasis:
-    """Find the lowest modes of a model, and keep the factor for static solves.
+    """Find the lowest modes of a model, with the factor for static solves.
 
     Parameters
     ----------
@@ -228,9 +228,9 @@ def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     if order == 0:
         raise InputError(f"every DOF of the model '{model.name}' is held: it has no modes")
     if n_modes is not None and not 0 < n_modes <= order:
-        raise InputError(f"{n_modes} modes are asked for; the model '{model.name}' has {order} free DOFs")
+        raise InputError(f"{n_modes} modes are requested; the model '{model.name}' has {order} free DOFs")
     if up_to_hz is not None and not up_to_hz > 0:
-        raise InputError(f"modes up to {up_to_hz:g} Hz are asked for; give a frequency above 0")
+        raise InputError(f"modes up to {up_to_hz:g} Hz are requested; give a frequency above 0")
     if order < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
         basis = _solve_dense(model, n_modes or order, up_to_hz)
     elif n_modes is None and up_to_hz is None:
@@ -255,27 +255,27 @@ def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -
     elastic = rough[rough > order * EPS * abs(rough[-1])]
     shift = SHIFT**2 * float(elastic[0]) if elastic.size else 1.0
     if rough[0] <= -shift:
-        raise _indefinite(model, float(rough[0]))
-    places = [order - min(n_modes, order), order - 1]
-    inverses, shapes = linalg.eigh(full_mass, full_stiffness + shift * full_mass, subset_by_index=places)
+        raise _indefinite_error(model, float(rough[0]))
+    indices = [order - min(n_modes, order), order - 1]
+    inverses, shapes = linalg.eigh(full_mass, full_stiffness + shift * full_mass, subset_by_index=indices)
     shapes = shapes[:, ::-1] / np.sqrt(inverses[::-1])
-    return _cleaned(model, stiffness, mass, shapes, factorize(stiffness + shift * mass, _nodes(model)), shift)
+    return _orthonormalised(model, stiffness, mass, shapes, factorize(stiffness + shift * mass, _nodes(model)), shift)
 
 
 def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
     stiffness, mass = model.stiffness, model.mass
     frequency_hz = _first_shift_hz(model, stiffness, mass, up_to_hz)
     try:
-        basis = _at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
-    except ConvergenceError:  # parts of a held structure may be loose all the same: lift them farther from 0
-        return _at_shift(model, stiffness, mass, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
+        basis = _solve_at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
+    except ConvergenceError:  # parts of a held structure may be loose all the same: shift them farther from 0
+        return _solve_at_shift(model, stiffness, mass, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
     elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
     if elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]:
-        basis = _at_shift(model, stiffness, mass, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
+        basis = _solve_at_shift(model, stiffness, mass, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
     return basis
 
 
-def _at_shift(
+def _solve_at_shift(
     model: StructuralModel,
     stiffness: Matrix,
     mass: Matrix,
@@ -283,31 +283,31 @@ def _at_shift(
     n_modes: int | None,
     up_to_hz: float | None,
 ) -> ModalBasis:
-    """Find modes with one factorization; more and more of them until the highest lies above the limit."""
+    """Find modes with one factorization; twice as many each time until the highest lies above the limit."""
     shift = (2 * np.pi * frequency_hz) ** 2
     order = mass.shape[0]
     factor = factorize(stiffness + shift * mass, _nodes(model))
-    wanted = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
+    count = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
     while True:
-        shapes = _lanczos(stiffness, mass, factor, shift, wanted)
-        basis = _cleaned(model, stiffness, mass, shapes, factor, shift)
-        most = min(n_modes or order - 1, order - 1)
-        if up_to_hz is None or wanted == most or basis.natural_frequency_hz[-1] > up_to_hz:
+        shapes = _lanczos(stiffness, mass, factor, shift, count)
+        basis = _orthonormalised(model, stiffness, mass, shapes, factor, shift)
+        max_count = min(n_modes or order - 1, order - 1)
+        if up_to_hz is None or count == max_count or basis.natural_frequency_hz[-1] > up_to_hz:
             return basis
-        wanted = min(2 * wanted, most)
+        count = min(2 * count, max_count)
 
 
 def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: float, n_modes: int) -> FloatArray:
     order = mass.shape[0]
     inverse = sparse_linalg.LinearOperator((order, order), matvec=factor.solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(order)  # ARPACK's own start differs from run to run
+    start = np.random.default_rng(0).standard_normal(order)  # the start vector of ARPACK differs from run to run
     try:
         eigenvalues, shapes = sparse_linalg.eigsh(
             stiffness, n_modes, M=mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
         )
     except sparse_linalg.ArpackNoConvergence as error:
         raise ConvergenceError(
-            f"the eigensolver found {len(error.eigenvalues)} of {n_modes} modes; ask for fewer modes or a lower band"
+            f"the eigensolver found {len(error.eigenvalues)} of {n_modes} modes; request fewer modes or a lower band"
         ) from None
     return np.asarray(shapes[:, np.argsort(eigenvalues)])
 
@@ -316,7 +316,7 @@ def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_
     """Guess a good shift before anything is factored, from slow bending of the whole structure."""
     dofs = model.dofs
     rigid, energies = _ritz(stiffness, mass, rigid_body_motions(dofs, model.geometry))
-    n_rigid = int(np.count_nonzero(energies <= _unknown_energy(model, stiffness, rigid)))
+    n_rigid = int(np.count_nonzero(energies <= _energy_uncertainty(model, stiffness, rigid)))
     _, energies = _ritz(stiffness, mass, bending_motions(dofs, model.geometry))
     elastic = np.sort(np.abs(energies))[n_rigid:]
     estimate = float(np.sqrt(elastic[0])) / (2 * np.pi) if elastic.size else np.inf
@@ -327,20 +327,20 @@ def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_
 def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal, and their omega^2."""
     weights, axes = linalg.eigh(motions.T @ multiply(mass, motions))
-    kept = weights > DEPENDENT * weights[-1]
-    motions = motions @ (axes[:, kept] / np.sqrt(weights[kept]))
+    independent = weights > DEPENDENT * weights[-1]
+    motions = motions @ (axes[:, independent] / np.sqrt(weights[independent]))
     _, axes = linalg.eigh(motions.T @ multiply(stiffness, motions))
     motions = motions @ axes
     return motions, np.sum(motions * multiply(stiffness, motions), 0)
 
 
-def _unknown_energy(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
-    """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or make up."""
+def _energy_uncertainty(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
+    """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or feign."""
     sizes = np.sum(np.abs(shapes) * multiply(abs(stiffness), np.abs(shapes)), 0)
-    return np.asarray(NO_ENERGY * _rounding(model, stiffness) * sizes)
+    return np.asarray(NO_ENERGY * _relative_rounding(model, stiffness) * sizes)
 
 
-def _cleaned(
+def _orthonormalised(
     model: StructuralModel,
     stiffness: Matrix,
     mass: Matrix,
@@ -349,14 +349,14 @@ def _cleaned(
     shift: float,
 ) -> ModalBasis:
     """Make shapes exactly orthonormal, their frequencies exact to second order, and rigid-body modes rigid."""
-    for _ in range(2):  # the second time takes off what rounding left in the first
+    for _ in range(2):  # the second time removes the rounding errors of the first
         lower = linalg.cholesky(shapes.T @ multiply(mass, shapes), lower=True)
         shapes = linalg.solve_triangular(lower, shapes.T, lower=True).T
     eigenvalues = np.sum(shapes * multiply(stiffness, shapes), 0)
-    unknown = _unknown_energy(model, stiffness, shapes)
-    if (eigenvalues < -unknown).any():
-        raise _indefinite(model, float(eigenvalues.min()))
-    rigid = eigenvalues <= unknown
+    uncertainty = _energy_uncertainty(model, stiffness, shapes)
+    if (eigenvalues < -uncertainty).any():
+        raise _indefinite_error(model, float(eigenvalues.min()))
+    rigid = eigenvalues <= uncertainty
     eigenvalues = np.where(rigid, 0.0, eigenvalues)
     ascending = np.argsort(eigenvalues, kind="stable")
     shapes = shapes[:, ascending]
@@ -372,21 +372,21 @@ def _cleaned(
     )
 
 
-def _rounding(model: StructuralModel, stiffness: Matrix) -> float:
-    """Relative rounding of the stiffness matrix: what a translation, which strains nothing inside, leaves in most rows.
+def _relative_rounding(model: StructuralModel, stiffness: Matrix) -> float:
+    """Relative rounding of the stiffness matrix: force on most rows under a translation, which strains nothing.
 
     It is that of double precision for a model built here, and that of the printed digits for one that was exported.
     """
-    found = [EPS]
+    roundings = [EPS]
     for translation in rigid_body_motions(model.dofs, model.geometry)[:, :3].T:
         sizes = multiply(abs(stiffness), np.abs(translation))
         if sizes.any():
-            left = np.abs(multiply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
-            found.append(float(np.quantile(left, MOST_ROWS)))
-    return max(rounding for rounding in found if rounding <= MAX_ROUNDING)
+            forces = np.abs(multiply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
+            roundings.append(float(np.quantile(forces, FREE_ROWS)))
+    return max(rounding for rounding in roundings if rounding <= MAX_ROUNDING)
 
 
-def _indefinite(model: StructuralModel, eigenvalue: float) -> IllConditionedError:
+def _indefinite_error(model: StructuralModel, eigenvalue: float) -> IllConditionedError:
     return IllConditionedError(
         f"the stiffness matrix of the model '{model.name}' is indefinite: a mode has omega^2 = {eigenvalue:.4g}; "
         "check its springs, loads and units"

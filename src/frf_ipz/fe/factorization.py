@@ -28,7 +28,7 @@ SYMMETRIC_MODE = {"SymmetricMode": True}
 
 
 class Factorization(Protocol):
-    """A matrix that can be divided by."""
+    """Factors of a matrix, to solve linear systems with."""
 
     def solve(self, loads: FloatArray) -> FloatArray:
         """Solve for several right-hand sides at once.
@@ -46,7 +46,7 @@ class Factorization(Protocol):
 
 
 def factorize(matrix: Matrix, nodes: IntArray) -> Factorization:
-    """Factor a symmetric positive definite matrix by the best means there is.
+    """Factor a symmetric positive definite matrix by the fastest installed package.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def factorize(matrix: Matrix, nodes: IntArray) -> Factorization:
     """
     if matrix.shape[0] < DENSE_ORDER:
         return _dense(matrix)
-    cholmod, pardiso = _installed("sksparse.cholmod"), _installed("pypardiso")
+    cholmod, pardiso = _import_optional("sksparse.cholmod"), _import_optional("pypardiso")
     if cholmod is not None and hasattr(cholmod, "cholesky"):
         factor = cholmod.cholesky(sparse.csc_matrix(matrix))
         if callable(factor):  # as in scikit-sparse 0.4
@@ -78,7 +78,7 @@ def factorize(matrix: Matrix, nodes: IntArray) -> Factorization:
 
 
 def is_positive_definite(matrix: Matrix, nodes: IntArray) -> bool:
-    """Tell whether a symmetric matrix is positive definite, by the signs of its pivots (Sylvester's law of inertia).
+    """Test whether a symmetric matrix is positive definite, by the signs of its pivots (Sylvester's law of inertia).
 
     Parameters
     ----------
@@ -96,15 +96,15 @@ def is_positive_definite(matrix: Matrix, nodes: IntArray) -> bool:
         factor = _superlu(matrix, nodes).factor
     except IllConditionedError:
         return False
-    stayed_on_the_diagonal = bool((factor.perm_r == factor.perm_c).all())
-    return stayed_on_the_diagonal and bool((factor.U.diagonal() > 0).all())
+    has_diagonal_pivots = bool((factor.perm_r == factor.perm_c).all())
+    return has_diagonal_pivots and bool((factor.U.diagonal() > 0).all())
 
 
 def _dense(matrix: Matrix) -> _Dense:
     try:
         return _Dense(linalg.cho_factor(matrix.toarray(), lower=True))
     except linalg.LinAlgError:
-        raise _singular(matrix) from None
+        raise _singular_error(matrix) from None
 
 
 def _superlu(matrix: Matrix, nodes: IntArray) -> _SuperLu:
@@ -119,13 +119,13 @@ def _superlu(matrix: Matrix, nodes: IntArray) -> _SuperLu:
             options=SYMMETRIC_MODE,
         )
     except RuntimeError:  # SuperLU met a pivot that is exactly 0
-        raise _singular(matrix) from None
+        raise _singular_error(matrix) from None
     return _SuperLu(factor, np.arange(matrix.shape[0]) if order is None else order)
 
 
 def _nested_dissection(matrix: Matrix, nodes: IntArray) -> IntArray | None:
     """Put nodes in an order that keeps factors sparse; None without METIS (there is no wheel for Windows)."""
-    pymetis = _installed("pymetis")
+    pymetis = _import_optional("pymetis")
     if pymetis is None:
         return None
     order = matrix.shape[0]
@@ -136,20 +136,20 @@ def _nested_dissection(matrix: Matrix, nodes: IntArray) -> IntArray | None:
     graph.setdiag(0)
     graph.eliminate_zeros()
     rank = np.empty(graph.shape[0], np.int64)
-    first = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))[0]
-    rank[np.asarray(first)] = np.arange(graph.shape[0])
+    permutation = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))[0]
+    rank[np.asarray(permutation)] = np.arange(graph.shape[0])
     return np.argsort(rank[group], kind="stable")
 
 
-def _installed(name: str) -> Any:  # noqa: ANN401 - a module
-    """Look for a package that need not be there; here, because it may be slow to load and is only for large models."""
+def _import_optional(name: str) -> Any:  # noqa: ANN401 - a module
+    """Import an optional package; late, because it may be slow to load and is only for large models."""
     try:
         return import_module(name)
     except ImportError:
         return None
 
 
-def _singular(matrix: Matrix) -> IllConditionedError:
+def _singular_error(matrix: Matrix) -> IllConditionedError:
     return IllConditionedError(
         f"a matrix of order {matrix.shape[0]} is singular or indefinite and cannot be solved with; "
         "check the model's mass and stiffness matrices"
@@ -194,7 +194,9 @@ class _Pardiso:
         triangle = sparse.csr_matrix(sparse.triu(matrix))
         solver.factorize(triangle)
         factorization = cls(solver, triangle)
-        weakref.finalize(factorization, solver.free_memory, everything=True)  # MKL keeps the factors until told
+        weakref.finalize(
+            factorization, solver.free_memory, everything=True
+        )  # MKL holds the factors until told to free them
         return factorization
 
     def solve(self, loads: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""``model.toml`` into a structural model. Each kind of model is a module of `fe.kinds`, found by itself."""
+"""``model.toml`` into a structural model. Each kind of model is a module of `fe.kinds`, found by its file name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Kind(Protocol):
-    """What a module of `fe.kinds` has to offer.
+    """Interface of a module of `fe.kinds`.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Kind(Protocol):
         Parameters
         ----------
         file : FILE
-            What ``model.toml`` says.
+            Content of ``model.toml``.
         path : Path
-            Where it is.
+            Its path.
 
         Returns
         -------
@@ -55,9 +55,9 @@ class Kind(Protocol):
         Parameters
         ----------
         file : FILE
-            What ``model.toml`` says.
+            Content of ``model.toml``.
         path : Path
-            Where it is.
+            Its path.
 
         Returns
         -------
@@ -68,7 +68,7 @@ class Kind(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Head:
-    """The part of the file that says how the rest is to be read."""
+    """The part of the file that determines how the rest is read."""
 
     __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012 - pydantic's own attribute
 
@@ -128,7 +128,8 @@ def model_kinds() -> Mapping[str, Kind]:
         Modules of `fe.kinds` by the name of their kind.
     """
     modules = [
-        cast("Kind", import_module(f"{kinds.__name__}.{found.name}")) for found in pkgutil.iter_modules(kinds.__path__)
+        cast("Kind", import_module(f"{kinds.__name__}.{module.name}"))
+        for module in pkgutil.iter_modules(kinds.__path__)
     ]
     return {module.KIND: module for module in modules}
 

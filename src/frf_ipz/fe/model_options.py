@@ -1,4 +1,4 @@
-"""What every ``model.toml`` may say, whatever kind of model it describes; and the numbers that may stand in it."""
+"""Keys that every ``model.toml`` has, whatever its kind of model; and the types of numbers in it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(min_length=1)]
 
 
-def _as_list(value: Any) -> Any:  # noqa: ANN401 - whatever the file holds; the type behind it checks
+def _as_list(value: Any) -> Any:  # noqa: ANN401 - any content of the file; the type behind it checks
     return value if isinstance(value, list | tuple) else [value]
 
 
@@ -33,7 +33,7 @@ class ModelSection:
     Parameters
     ----------
     kind : str
-        Which kind of model; the module of that name in `fe.kinds` reads the rest of the file.
+        Kind of model; the module of that name in `fe.kinds` reads the rest of the file.
     name : str
         As the user calls it.
     """
@@ -68,7 +68,7 @@ class DampingSection:
     ----------
     modal_ratio : tuple of float
         Damping ratios of the modes that are no rigid-body motion, by ascending frequency; the last one holds for all
-        further modes, so that one number is one ratio for all. Empty where it is not given.
+        further modes, so that one number is one ratio for all. May be empty.
     rayleigh : RayleighDamping, optional
         Damping matrix made of mass and stiffness.
 

@@ -1,7 +1,7 @@
 """FRFs and poles of a model, full or reduced, at any complex frequency.
 
-A full model is taken in its modes. A small one in all of them; of a large one those up to three times the highest
-frequency, and the others as a series in s^2 whose first term is their exact static flexibility.
+A full model is expressed in its modes: a small one in all of them, a large one in those up to three times the highest
+frequency, with the rest as a series in s^2 whose first term is their exact static flexibility.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
 
 MODES_BEYOND = 3.0  # times the highest frequency: modes above follow in the series
-SERIES_TERMS = 5  # the last one is off by (1/3)^10 of the first mode left out
-COUPLED_ORDER = 100  # modes that viscous damping may couple; with more DOFs, those up to MODES_BEYOND are taken
+SERIES_TERMS = 5  # the last one is off by (1/3)^10 of the first mode beyond
+COUPLED_ORDER = 100  # modes that viscous damping may couple; with more DOFs, only those up to MODES_BEYOND
 COUPLING = 1e-9  # of the geometric mean of the diagonal terms: damping below couples no modes
-LINES_AT_ONCE = 256  # keeps stacks of small matrices within some MB
-BESIDE_ZERO = 1e-6  # of the lowest other frequency, or rad/s: where 0 Hz is evaluated
-NO_STIFFNESS = 64.0  # roundings of the largest omega^2, times the condition of the mass: no stiffness to be seen
+LINES_AT_ONCE = 256  # so that stacks of small matrices take some MB
+NEAR_ZERO = 1e-6  # of the lowest other frequency, or rad/s: where 0 Hz is evaluated
+NO_STIFFNESS = 64.0  # roundings of the largest omega^2, times the condition of the mass: no stiffness
 REAL_POLE = 1e-12  # of the modulus: imaginary part of a pole that is real
 
 
@@ -57,8 +57,8 @@ def model_frfs(model: StructuralModel | ReducedModel, labels: Sequence[FrfLabel]
     InputError
         If the model lacks a DOF or holds it.
     """
-    others = np.abs(s[s != 0])
-    s = np.where(s == 0, BESIDE_ZERO * (others.min() if others.size else 1.0), s).astype(np.complex128)
+    moduli = np.abs(s[s != 0])
+    s = np.where(s == 0, NEAR_ZERO * (moduli.min() if moduli.size else 1.0), s).astype(np.complex128)
     if isinstance(model, ReducedModel):
         receptance = _reduced_receptances(model, labels, s)
     else:
@@ -80,8 +80,8 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
     Returns
     -------
     (n_poles,) complex array
-        rad/s, by ascending modulus; of a conjugate pair the one with the positive imaginary part. A real pole stands
-        for itself: an undamped rigid-body mode has two of them, at 0.
+        rad/s, by ascending modulus; of a conjugate pair the one with the positive imaginary part. Real poles are listed
+        one by one: an undamped rigid-body mode has two of them, at 0.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ends:
-    """Which DOFs FRFs begin and end at, each once, and the product of the signs."""
+    """Output and input DOFs of FRFs, each once, and the products of the signs."""
 
     outputs: list[Dof]
     inputs: list[Dof]
@@ -113,7 +113,7 @@ class _Ends:
     sign: FloatArray
 
     @classmethod
-    def of(cls, labels: Sequence[FrfLabel]) -> _Ends:
+    def of_labels(cls, labels: Sequence[FrfLabel]) -> _Ends:
         outputs = list(dict.fromkeys(label.output_dof.unsigned for label in labels))
         inputs = list(dict.fromkeys(label.input_dof.unsigned for label in labels))
         return cls(
@@ -126,33 +126,33 @@ class _Ends:
 
 
 def _reduced_receptances(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
-    ends = _Ends.of(labels)
+    ends = _Ends.of_labels(labels)
     outputs = np.array([model.row(dof) for dof in ends.outputs])
     inputs = np.array([model.row(dof) for dof in ends.inputs])
-    found = _solved(s, (model.mass, model.damping, model.stiffness), outputs, inputs)
-    return np.asarray(found[:, ends.output_of, ends.input_of] * ends.sign)
+    receptance = _solve_receptances(s, (model.mass, model.damping, model.stiffness), outputs, inputs)
+    return np.asarray(receptance[:, ends.output_of, ends.input_of] * ends.sign)
 
 
 def _modal_receptances(model: StructuralModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
-    ends = _Ends.of(labels)
+    ends = _Ends.of_labels(labels)
     output_rows = [model.index(dof) for dof in ends.outputs]
     input_rows = [model.index(dof) for dof in ends.inputs]
-    basis = _basis_for(model, s)
+    basis = _basis_up_to(model, s)
     outputs, inputs = basis.shapes[output_rows], basis.shapes[input_rows]
     damping = _modal_damping(model, basis)
     if damping.ndim == 1:
         resonance = 1 / (s[:, None] ** 2 + s[:, None] * damping + basis.eigenvalues)
-        found = resonance @ (outputs[ends.output_of] * inputs[ends.input_of]).T
+        receptance = resonance @ (outputs[ends.output_of] * inputs[ends.input_of]).T
     else:
         matrices = (np.eye(len(damping)), damping, np.diag(basis.eigenvalues))
-        found = _solved(s, matrices, outputs, inputs)[:, ends.output_of, ends.input_of]
+        receptance = _solve_receptances(s, matrices, outputs, inputs)[:, ends.output_of, ends.input_of]
     if len(basis.eigenvalues) < len(basis.shapes):
-        terms = _series(basis, output_rows, input_rows)[:, ends.output_of, ends.input_of]
-        found = found + sum(term * (-(s[:, None] ** 2)) ** power for power, term in enumerate(terms))
-    return np.asarray(found * ends.sign)
+        terms = _flexibility_series(basis, output_rows, input_rows)[:, ends.output_of, ends.input_of]
+        receptance = receptance + sum(term * (-(s[:, None] ** 2)) ** power for power, term in enumerate(terms))
+    return np.asarray(receptance * ends.sign)
 
 
-def _basis_for(model: StructuralModel, s: ComplexArray) -> ModalBasis:
+def _basis_up_to(model: StructuralModel, s: ComplexArray) -> ModalBasis:
     order = int(np.count_nonzero(~model.fixed))
     if order <= (COUPLED_ORDER if model.damping_all.count_nonzero() else DENSE_ORDER - 1):
         return solve_basis(model)
@@ -167,28 +167,28 @@ def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     if not model.damping_all.count_nonzero():
         return stated
     viscous = np.asarray(basis.shapes.T @ multiply(model.damping, basis.shapes))
-    own = np.diag(viscous)
-    across = np.abs(viscous - np.diag(own))
-    if (across <= COUPLING * np.sqrt(np.outer(np.abs(own), np.abs(own)))).all():
-        return stated + own
+    diagonal = np.diag(viscous)
+    coupling = np.abs(viscous - np.diag(diagonal))
+    if (coupling <= COUPLING * np.sqrt(np.outer(np.abs(diagonal), np.abs(diagonal)))).all():
+        return stated + diagonal
     return viscous + np.diag(stated)
 
 
-def _series(basis: ModalBasis, output_rows: list[int], input_rows: list[int]) -> FloatArray:
-    """Sum phi phi^T / omega^2, / omega^4, ... over the modes left out, (n_terms, n_outputs, n_inputs)."""
+def _flexibility_series(basis: ModalBasis, output_rows: list[int], input_rows: list[int]) -> FloatArray:
+    """Sum phi phi^T / omega^2, / omega^4, ... over the modes beyond, (n_terms, n_outputs, n_inputs)."""
     # flexibility is symmetric: load the side that has fewer DOFs
-    loaded, read = (input_rows, output_rows) if len(input_rows) <= len(output_rows) else (output_rows, input_rows)
+    loaded, observed = (input_rows, output_rows) if len(input_rows) <= len(output_rows) else (output_rows, input_rows)
     loads = np.zeros((len(basis.shapes), len(loaded)))
     loads[loaded, np.arange(len(loaded))] = 1.0
     terms = []
     for _ in range(SERIES_TERMS):
         deflection = basis.residual_flexibility(loads)
-        terms.append(deflection[read] if loaded is input_rows else deflection[read].T)
+        terms.append(deflection[observed] if loaded is input_rows else deflection[observed].T)
         loads = np.asarray(multiply(basis.mass, deflection))
     return np.array(terms)
 
 
-def _solved(
+def _solve_receptances(
     s: ComplexArray, matrices: tuple[FloatArray, FloatArray, FloatArray], outputs: FloatArray, inputs: FloatArray
 ) -> ComplexArray:
     """Receptances of small matrices (mass, damping, stiffness), (n_lines, n_outputs, n_inputs)."""
@@ -202,16 +202,16 @@ def _solved(
 
 
 def _pencil_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> ComplexArray:
-    """All poles of small matrices; rounding spreads the double pole of a rigid-body motion, which is put back to 0."""
+    """All poles of small matrices; the double pole of a rigid-body motion, which rounding spreads, is set to 0."""
     poles = damped_poles(mass, damping, stiffness).values
     scale = 1 / np.sqrt(np.diag(mass))
     condition = float(np.linalg.cond(mass * np.outer(scale, scale)))
     largest = np.abs(poles).max(initial=0.0)
-    unseen = largest * np.sqrt(NO_STIFFNESS * float(np.finfo(float).eps) * condition)
-    return np.asarray(np.where(np.abs(poles) <= unseen, 0.0, poles), np.complex128)
+    rounding = largest * np.sqrt(NO_STIFFNESS * float(np.finfo(float).eps) * condition)
+    return np.asarray(np.where(np.abs(poles) <= rounding, 0.0, poles), np.complex128)
 
 
 def _upper_half(poles: ComplexArray) -> ComplexArray:
     poles = np.where(np.abs(poles.imag) <= REAL_POLE * np.abs(poles), poles.real + 0j, poles)
-    kept = poles[poles.imag >= 0]
-    return np.asarray(kept[np.argsort(np.abs(kept), kind="stable")], np.complex128)
+    upper = poles[poles.imag >= 0]
+    return np.asarray(upper[np.argsort(np.abs(upper), kind="stable")], np.complex128)

@@ -43,14 +43,14 @@ def solve_scaled_columns(columns: Columns, right: Columns, cut: float | None = N
     columns : (n_data, n) array
         Real or complex.
     right : (n_data,) array
-        What they shall add up to.
+        What the columns have to add up to.
     cut : float, optional
         Singular values below that part of the largest one count as zero; by default those below rounding.
 
     Returns
     -------
     (n,) array
-        Of the columns as they were given.
+        Coefficients of the columns before scaling.
     """
     scaled, sizes = scale_columns(columns)
     return np.asarray(np.linalg.lstsq(scaled, right, rcond=cut)[0] / sizes, dtype=columns.dtype)
@@ -62,7 +62,7 @@ def cholesky_with_prior(rows: FloatArray) -> FloatArray:
     Parameters
     ----------
     rows : (n, n_data) array
-        Derivatives by unknowns with a prior of 1.
+        Derivatives by parameters whose prior is a unit normal distribution.
 
     Returns
     -------

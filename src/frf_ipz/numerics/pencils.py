@@ -34,33 +34,36 @@ class Roots:
     ----------
     values : (n,) complex array
         rad/s, or (rad/s)^2 for an undamped pencil.
-    right, left : (r, n) complex array
+    right_vectors, left_vectors : (r, n) complex array
         ``P(s) x = 0`` and ``y^T P(s) = 0`` on the complements, in the coordinates of the matrices.
     slope : (n,) complex array
         ``y^T P'(s) x``.
     """
 
     values: ComplexArray
-    right: ComplexArray
-    left: ComplexArray
+    right_vectors: ComplexArray
+    left_vectors: ComplexArray
     slope: ComplexArray
 
-    def take(self, chosen: object) -> Roots:
-        """Keep some roots.
+    def take(self, indices: object) -> Roots:
+        """Select roots.
 
         Parameters
         ----------
-        chosen : index array
-            Which, in the order wanted.
+        indices : index array
+            Indices of the roots, in the order of the result.
 
         Returns
         -------
         Roots
-            Those.
+            The selected ones.
         """
-        index = np.asarray(chosen)
+        index = np.asarray(indices)
         return Roots(
-            values=self.values[index], right=self.right[:, index], left=self.left[:, index], slope=self.slope[index]
+            values=self.values[index],
+            right_vectors=self.right_vectors[:, index],
+            left_vectors=self.left_vectors[:, index],
+            slope=self.slope[index],
         )
 
 
@@ -83,12 +86,12 @@ def complement(row: FloatArray) -> FloatArray:
     array([[1.],
            [0.]])
     """
-    place = int(np.argmax(np.abs(row)))
+    pivot = int(np.argmax(np.abs(row)))
     unit = row / np.linalg.norm(row)
     reflected = unit.copy()
-    reflected[place] += np.copysign(1.0, unit[place])
-    basis = np.eye(len(row)) - np.outer(reflected, reflected) / (1.0 + abs(unit[place]))
-    return np.asarray(np.delete(basis, place, axis=1))
+    reflected[pivot] += np.copysign(1.0, unit[pivot])
+    basis = np.eye(len(row)) - np.outer(reflected, reflected) / (1.0 + abs(unit[pivot]))
+    return np.asarray(np.delete(basis, pivot, axis=1))
 
 
 def damped_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> Roots:
@@ -104,7 +107,7 @@ def damped_poles(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -
     Roots
         All 2 r of them, conjugates included, rad/s.
     """
-    return _quadratic(mass, damping, stiffness, None, None)
+    return _quadratic_roots(mass, damping, stiffness, None, None)
 
 
 def damped_zeros(
@@ -117,14 +120,14 @@ def damped_zeros(
     mass, damping, stiffness : (r, r) array
         They need not be symmetric.
     output_row, input_row : (r,) array
-        Motion of the sensor's and of the struck DOF for unit motions of the coordinates.
+        Motion of the sensor's and of the excited DOF for unit motions of the coordinates.
 
     Returns
     -------
     Roots
-        At most 2 r - 2, conjugates included, rad/s; those at infinity are left out.
+        At most 2 r - 2, conjugates included, rad/s; without those at infinity.
     """
-    return _quadratic(mass, damping, stiffness, complement(input_row), complement(output_row))
+    return _quadratic_roots(mass, damping, stiffness, complement(input_row), complement(output_row))
 
 
 def generalised_eigh(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -147,8 +150,8 @@ def generalised_eigh(first: FloatArray, second: FloatArray) -> tuple[FloatArray,
     LinAlgError
         If the second matrix is not positive definite.
     """
-    values, vectors, failed = lapack.dsygvd(first, second)
-    if failed:
+    values, vectors, info = lapack.dsygvd(first, second)
+    if info:
         raise np.linalg.LinAlgError
     return values, vectors
 
@@ -177,7 +180,9 @@ def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
         message = "the mass matrix of the reduced model is not positive definite: check masses and units"
         raise NumericalError(message) from None
     shapes = vectors.astype(complex)
-    return Roots(values=values.astype(complex), right=shapes, left=shapes, slope=np.ones(len(values), complex))
+    return Roots(
+        values=values.astype(complex), right_vectors=shapes, left_vectors=shapes, slope=np.ones(len(values), complex)
+    )
 
 
 def undamped_zeros(mass: FloatArray, stiffness: FloatArray, output_row: FloatArray, input_row: FloatArray) -> Roots:
@@ -198,9 +203,9 @@ def undamped_zeros(mass: FloatArray, stiffness: FloatArray, output_row: FloatArr
     """
     rows, columns = complement(input_row), complement(output_row)
     small_mass = rows.T @ mass @ columns
-    values, left, right = _generalised(rows.T @ stiffness @ columns, small_mass)
-    slope = np.einsum("ik,ij,jk->k", left, small_mass, right)
-    return Roots(values=values, right=columns @ right, left=rows @ left, slope=slope)
+    values, y, x = _generalised_eig(rows.T @ stiffness @ columns, small_mass)
+    slope = np.einsum("ik,ij,jk->k", y, small_mass, x)
+    return Roots(values=values, right_vectors=columns @ x, left_vectors=rows @ y, slope=slope)
 
 
 def damped_sensitivity(
@@ -217,7 +222,7 @@ def damped_sensitivity(
     roots : Roots
         Of `damped_poles` or `damped_zeros`.
     mass, damping, stiffness : (p, r, r) array, optional
-        Derivatives of the matrices by the parameters; those that do not depend on any are left out.
+        Derivatives of the matrices by the parameters; without those that depend on none.
 
     Returns
     -------
@@ -225,8 +230,12 @@ def damped_sensitivity(
         Derivatives of the roots, rad/s per unit of the parameter.
     """
     powers = ((2, mass), (1, damping), (0, stiffness))
-    moved = sum(roots.values[:, None] ** power * _forms(roots, given) for power, given in powers if given is not None)
-    return np.asarray(-moved / roots.slope[:, None])
+    change = sum(
+        roots.values[:, None] ** power * _bilinear_forms(roots, derivative)
+        for power, derivative in powers
+        if derivative is not None
+    )
+    return np.asarray(-change / roots.slope[:, None])
 
 
 def undamped_sensitivity(roots: Roots, stiffness: FloatArray, mass: FloatArray | None = None) -> ComplexArray:
@@ -246,10 +255,10 @@ def undamped_sensitivity(roots: Roots, stiffness: FloatArray, mass: FloatArray |
     (n, p) complex array
         Derivatives of the squared roots, (rad/s)^2 per unit of the parameter.
     """
-    moved = _forms(roots, stiffness)
+    change = _bilinear_forms(roots, stiffness)
     if mass is not None:
-        moved = moved - roots.values[:, None] * _forms(roots, mass)
-    return np.asarray(moved / roots.slope[:, None])
+        change = change - roots.values[:, None] * _bilinear_forms(roots, mass)
+    return np.asarray(change / roots.slope[:, None])
 
 
 def unpack_vectors(imaginary: FloatArray, packed: FloatArray) -> ComplexArray:
@@ -274,10 +283,10 @@ def unpack_vectors(imaginary: FloatArray, packed: FloatArray) -> ComplexArray:
     return vectors
 
 
-def _forms(roots: Roots, matrices: FloatArray) -> ComplexArray:
+def _bilinear_forms(roots: Roots, matrices: FloatArray) -> ComplexArray:
     """y^T A x of every root and matrix."""
-    size = roots.right.shape[0] ** 2
-    products = (roots.left.T[:, :, None] * roots.right.T[:, None, :]).reshape(-1, size)
+    size = roots.right_vectors.shape[0] ** 2
+    products = (roots.left_vectors.T[:, :, None] * roots.right_vectors.T[:, None, :]).reshape(-1, size)
     flat = matrices.reshape(-1, size).T
     # real and imaginary parts apart: a product with a complex factor would first make the matrices complex
     result = np.zeros((len(products), flat.shape[1]), complex)
@@ -287,31 +296,31 @@ def _forms(roots: Roots, matrices: FloatArray) -> ComplexArray:
     return result
 
 
-def _quadratic(
+def _quadratic_roots(
     mass: FloatArray, damping: FloatArray, stiffness: FloatArray, rows: FloatArray | None, columns: FloatArray | None
 ) -> Roots:
     if rows is not None and columns is not None:
         mass, damping, stiffness = (rows.T @ matrix @ columns for matrix in (mass, damping, stiffness))
     order = len(mass)
     # time is scaled so that mass and stiffness are of one size: QZ is accurate relative to the norm of the whole pencil
-    norm = np.linalg.norm(stiffness) or np.linalg.norm(mass)  # what is free to move has no stiffness
+    norm = np.linalg.norm(stiffness) or np.linalg.norm(mass)  # a free rigid body has no stiffness
     scale = np.sqrt(norm / np.linalg.norm(mass))
     first, second = np.zeros((2, 2 * order, 2 * order))
     first[:order, order:] = second[:order, :order] = np.eye(order)
     first[order:, :order] = stiffness / -norm
     first[order:, order:] = damping * (-scale / norm)
     second[order:, order:] = mass * (scale**2 / norm)
-    values, left, right = _generalised(first, second)
-    values, left, right = values * scale, left[order:], right[:order]
-    slope = 2 * values * np.einsum("ik,ij,jk->k", left, mass, right) + np.einsum("ik,ij,jk->k", left, damping, right)
+    values, y, x = _generalised_eig(first, second)
+    values, y, x = values * scale, y[order:], x[:order]
+    slope = 2 * values * np.einsum("ik,ij,jk->k", y, mass, x) + np.einsum("ik,ij,jk->k", y, damping, x)
     if rows is not None and columns is not None:
-        left, right = rows @ left, columns @ right
-    return Roots(values=values, right=right, left=left, slope=slope)
+        y, x = rows @ y, columns @ x
+    return Roots(values=values, right_vectors=x, left_vectors=y, slope=slope)
 
 
-def _generalised(first: FloatArray, second: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def _generalised_eig(first: FloatArray, second: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Finite roots of first x = s second x with left vectors (of y^T, not y^H) and right ones."""
-    real, imaginary, beta, left, right, _, info = lapack.dggev(first, second)
+    real, imaginary, beta, y, x, _, info = lapack.dggev(first, second)
     if info:
         raise NumericalError(
             "the reduced model's eigenvalues cannot be computed: its matrices hold values far too large or not finite"
@@ -321,6 +330,6 @@ def _generalised(first: FloatArray, second: FloatArray) -> tuple[ComplexArray, C
     values = alpha[finite] / beta[finite]
     return (
         values,
-        unpack_vectors(imaginary, left)[:, finite].conj(),
-        unpack_vectors(imaginary, right)[:, finite],
+        unpack_vectors(imaginary, y)[:, finite].conj(),
+        unpack_vectors(imaginary, x)[:, finite],
     )

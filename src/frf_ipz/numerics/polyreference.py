@@ -1,8 +1,8 @@
 """Poles by the polyreference least-squares complex frequency method, for all model orders at once.
 
 A right matrix fraction ``H(z) = N(z) D(z)^-1`` in the powers of ``z = exp(-i theta)`` is fitted to ``N - H D = 0``
-[Peeters2004]. The numerators are eliminated; the leading blocks of what remains belong to the lower orders. With the
-highest coefficient of D fixed to the identity, the poles that stand for noise come out unstable [Cauberghe2005].
+[Peeters2004]. The numerators are eliminated; the leading blocks of the reduced matrix belong to the lower orders. With
+the highest coefficient of D fixed to the identity, the poles that stand for noise come out unstable [Cauberghe2005].
 
 [Peeters2004] B. Peeters, H. Van der Auweraer, P. Guillaume, J. Leuridan, The PolyMAX frequency-domain method, Shock and
 Vibration 11, 2004, 395-409, doi:10.1155/2004/523692.
@@ -30,7 +30,7 @@ def reduced_normal_matrix(theta: FloatArray, H: ComplexArray, order: int, *, rea
     theta : (n_lines,) array
         Angle of each frequency line on the circle.
     H : (n_lines, n_rows, n_references) complex array
-        FRFs; rows that are alike in noise.
+        FRFs; rows of equal noise.
     order : int
         Highest order n.
     real : bool
@@ -73,9 +73,9 @@ def denominator(M: ComplexArray, n_ref: int, order: int) -> ComplexArray:
         D_0 to D_(m-1); D_m is the identity.
     """
     size = order * n_ref
-    left = _bounded(M[:size, :size])
-    low = linalg.solve(left, -M[:size, size : size + n_ref], assume_a="her", check_finite=False)
-    return np.asarray(low.reshape(order, n_ref, n_ref))
+    normal = _with_ridge(M[:size, :size])
+    coefficients = linalg.solve(normal, -M[:size, size : size + n_ref], assume_a="her", check_finite=False)
+    return np.asarray(coefficients.reshape(order, n_ref, n_ref))
 
 
 def denominator_roots(D: ComplexArray) -> ComplexArray:
@@ -106,7 +106,7 @@ def participation(D: ComplexArray, z: ComplexArray) -> ComplexArray:
     D : (m, n_ref, n_ref) complex array
         From `denominator`.
     z : (n_poles,) complex array
-        Some of its roots.
+        Roots of det D.
 
     Returns
     -------
@@ -128,20 +128,21 @@ def _moments(theta: FloatArray, columns: ComplexArray, order: int, *, real: bool
     if real:
         return np.concatenate([(even - odd)[:0:-1], even + odd])
     even_imag, odd_imag = cosine @ columns.imag, sine @ columns.real
-    later = even + odd + 1j * (even_imag - odd_imag)
-    earlier = even - odd + 1j * (even_imag + odd_imag)
-    return np.asarray(np.concatenate([earlier[:0:-1], later]))
+    positive = even + odd + 1j * (even_imag - odd_imag)
+    negative = even - odd + 1j * (even_imag + odd_imag)
+    return np.asarray(np.concatenate([negative[:0:-1], positive]))
 
 
-def _bounded(matrix: ComplexArray) -> ComplexArray:
+def _with_ridge(matrix: ComplexArray) -> ComplexArray:
     """Bound the condition of a normal matrix: where lines are missing, high orders are nearly dependent."""
     return np.asarray(matrix + RIDGE * np.trace(matrix).real / len(matrix) * np.eye(len(matrix)))
 
 
 def _cholesky(R: ComplexArray) -> ComplexArray:
     try:
-        return np.asarray(linalg.cholesky(_bounded(R), lower=True))
+        return np.asarray(linalg.cholesky(_with_ridge(R), lower=True))
     except linalg.LinAlgError:
         raise IllConditionedError(
-            f"the start's model order {len(R) - 1} is too high for the lines of the band; set a lower [fit] max_order"
+            f"the model order {len(R) - 1} of the stabilisation diagram is too high for the lines of the band; "
+            "set a lower [fit] max_order"
         ) from None

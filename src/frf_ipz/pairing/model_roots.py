@@ -75,7 +75,7 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     roots = roots.take(chosen)
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    products = (outputs @ roots.right) * (inputs @ roots.left)
+    products = (outputs @ roots.right_vectors) * (inputs @ roots.left_vectors)
     # a rigid-body mode is a double root: it has no residue, and no measured mode is one
     is_simple = np.abs(roots.slope) > RIGID * np.abs(roots.slope).max()
     residues = np.where(is_simple, products / np.where(is_simple, roots.slope, 1.0), 0.0)
@@ -144,6 +144,6 @@ def _slope_sign(model: ReducedModel, zeros: Roots, output: FloatArray, force: Fl
     H' = -c P^-1 P' P^-1 b = -(y^T P' x) / (a h), which needs no inverse of a P that may be singular.
     """
     powers = ((2, model.mass), (1, model.damping), (0, model.stiffness))
-    driven = sum(zeros.values**power * (force @ matrix @ zeros.right) for power, matrix in powers)
-    held = sum(zeros.values**power * (output @ matrix.T @ zeros.left) for power, matrix in powers)
+    driven = sum(zeros.values**power * (force @ matrix @ zeros.right_vectors) for power, matrix in powers)
+    held = sum(zeros.values**power * (output @ matrix.T @ zeros.left_vectors) for power, matrix in powers)
     return np.asarray(np.sign((-1j * zeros.slope * np.conj(driven * held)).real))

@@ -194,7 +194,7 @@ def _models(run: RunContents, number: int) -> dict[str, tuple[ReducedModel, comp
 def _closest_mode(model: ReducedModel, pole: complex) -> tuple[complex, ComplexArray]:
     roots = damped_poles(model.mass, model.damping, model.stiffness)
     place = int(np.argmin(np.abs(roots.values - pole)))
-    return complex(roots.values[place]), roots.right[:, place]
+    return complex(roots.values[place]), roots.right_vectors[:, place]
 
 
 def _scaled_onto(motion: Motion, measured: Motion, hertz: float) -> Motion:

@@ -143,7 +143,7 @@ def _change(updated: UpdatedModel) -> FloatArray:
 def _relative(model: ReducedModel, matrices: FloatArray) -> FloatArray:
     """Upper triangles of changes, relative to ``omega_i omega_j`` in the model's modes: (n, k)."""
     poles = undamped_poles(model.mass, model.stiffness)
-    shapes, squares = poles.right.real, np.maximum(poles.values.real, 0.0)
+    shapes, squares = poles.right_vectors.real, np.maximum(poles.values.real, 0.0)
     moving = squares > 1e-9 * squares.max()  # rigid-body modes have no stiffness to be relative to
     scaled = shapes[:, moving] / np.sqrt(squares[moving])
     inside = scaled.T @ matrices @ scaled

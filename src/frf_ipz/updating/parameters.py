@@ -158,7 +158,7 @@ def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = 
     """
     poles = undamped_poles(model.mass, model.stiffness)
     omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:MAX_FREE_MODES]
-    shares = omega * (model.mass @ poles.right.real)[:, :MAX_FREE_MODES]
+    shares = omega * (model.mass @ poles.right_vectors.real)[:, :MAX_FREE_MODES]
     first, second = np.triu_indices(len(omega))
     products = np.einsum("ak,bk->kab", shares[:, first], shares[:, second])
     diagonal = first == second

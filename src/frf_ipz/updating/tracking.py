@@ -171,8 +171,8 @@ def with_damping(
 
 
 def _overlap(old: Roots, new: Roots, mass: FloatArray, norm: ComplexArray) -> FloatArray:
-    forward = old.left.T @ mass @ new.right
-    backward = new.left.T @ mass @ old.right
+    forward = old.left_vectors.T @ mass @ new.right_vectors
+    backward = new.left_vectors.T @ mass @ old.right_vectors
     return np.asarray(np.abs(forward * backward.T) / np.abs(np.outer(old.slope, norm)))
 
 

@@ -38,7 +38,7 @@ def test_rigid_body_motion_strains_nothing():
             assert np.abs(matrix @ motion).max() <= ROUNDING * np.abs(matrix).max()
 
 
-def test_a_unit_motion_of_a_dof_is_one_there_and_nought_at_the_others():
+def test_a_unit_motion_of_a_dof_is_one_there_and_zero_at_the_other_dofs():
     deflection, rotation = deflection_polynomials(LENGTH, PHI), rotation_polynomials(LENGTH, PHI)
     for place in range(2):
         at_ends = np.stack(

@@ -96,13 +96,13 @@ def test_sections_masses_and_springs_agree_with_the_exact_frequencies():
         point_spring=(BeamPointSpring(node=46, stiffness_N_m=2e6, rotational_stiffness_Nm_rad=5e4),),
     )
     plain = (WIDTH, THICK, MODULUS, DENSITY, POISSON)
-    stretches = [
+    segments = [
         rectangle(0.2, *plain, end_mass=0.4, end_rotary_inertia=3e-4),
         rectangle(0.1, 0.02, 0.08, MODULUS, DENSITY, POISSON),
         rectangle(0.15, *plain, end_spring=2e6, end_rotational_spring=5e4),
         rectangle(0.15, *plain),
     ]
-    exact = exact_frequencies_hz(stretches, "clamped", "free", COUNT, 40.0, 3e4)
+    exact = exact_frequencies_hz(segments, "clamped", "free", COUNT, 40.0, 3e4)
     assert_allclose(
         elastic_hz(model, COUNT), exact, rtol=2e-5
     )  # 60 elements: what the point mass leaves is of second order

@@ -50,10 +50,10 @@ def test_at_the_critical_load_the_stiffness_is_gone():
 def test_tension_agrees_with_the_exact_frequencies(formulation):
     plain = beam(elements=120, thickness_m=0.03, formulation=formulation, left="clamped", right="clamped")
     poisson = ALUMINIUM["poisson_ratio"] if formulation == "timoshenko" else None
-    stretch = rectangle(LENGTH, 25.33e-3, 0.03, 69e9, 2690.0, poisson, tension=2e5)
-    exact = exact_frequencies_hz([stretch], "clamped", "clamped", 3, 100.0, 2e4)
-    found = solve_basis(with_axial_force(plain, 2e5), n_modes=3).natural_frequency_hz
-    assert_allclose(found, exact, rtol=1e-3 if formulation == "timoshenko" else 1e-6)
+    segment = rectangle(LENGTH, 25.33e-3, 0.03, 69e9, 2690.0, poisson, tension=2e5)
+    exact = exact_frequencies_hz([segment], "clamped", "clamped", 3, 100.0, 2e4)
+    natural_hz = solve_basis(with_axial_force(plain, 2e5), n_modes=3).natural_frequency_hz
+    assert_allclose(natural_hz, exact, rtol=1e-3 if formulation == "timoshenko" else 1e-6)
 
 
 def test_geometric_stiffness_is_the_derivative_of_stiffness_by_force():
@@ -63,22 +63,22 @@ def test_geometric_stiffness_is_the_derivative_of_stiffness_by_force():
 
 
 @pytest.mark.parametrize("to", ["euler-bernoulli", "timoshenko"])
-def test_another_theory_is_the_beam_built_anew(to):
-    other = {"euler-bernoulli": "timoshenko", "timoshenko": "euler-bernoulli"}[to]
-    changed = with_formulation(beam(formulation=other, left="clamped"), to)
-    anew = beam(formulation=to, left="clamped")
+def test_another_theory_equals_a_rebuilt_beam(to):
+    initial = {"euler-bernoulli": "timoshenko", "timoshenko": "euler-bernoulli"}[to]
+    changed = with_formulation(beam(formulation=initial, left="clamped"), to)
+    rebuilt = beam(formulation=to, left="clamped")
     for name in ("mass_all", "stiffness_all"):
-        expected = getattr(anew, name).toarray()
+        expected = getattr(rebuilt, name).toarray()
         assert_allclose(getattr(changed, name).toarray(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-    assert_allclose(changed.parts[2].stiffness, anew.parts[2].stiffness, rtol=1e-12)
+    assert_allclose(changed.parts[2].stiffness, rebuilt.parts[2].stiffness, rtol=1e-12)
 
 
 @pytest.mark.parametrize("to", ["euler-bernoulli", "timoshenko"])
 def test_another_theory_is_the_one_that_holds_between_nodes(to):
-    other = {"euler-bernoulli": "timoshenko", "timoshenko": "euler-bernoulli"}[to]
-    anew = beam(formulation=to, thickness_m=0.05)
-    changed = with_formulation(beam(formulation=other, thickness_m=0.05), to)
-    assert_allclose(slope_row(changed, 0.111), slope_row(anew, 0.111), rtol=1e-12)
+    initial = {"euler-bernoulli": "timoshenko", "timoshenko": "euler-bernoulli"}[to]
+    rebuilt = beam(formulation=to, thickness_m=0.05)
+    changed = with_formulation(beam(formulation=initial, thickness_m=0.05), to)
+    assert_allclose(slope_row(changed, 0.111), slope_row(rebuilt, 0.111), rtol=1e-12)
 
 
 def test_a_force_bends_a_corner_into_a_stocky_beam():
@@ -95,13 +95,13 @@ def test_a_force_bends_a_corner_into_a_stocky_beam():
 def test_another_theory_keeps_what_was_added():
     model = with_released_supports(with_point_masses(beam(left="clamped"), {21: 0.01}), {Dof(1, "ry"): 50.0})
     changed = with_formulation(model, "euler-bernoulli")
-    anew = beam(left="clamped", formulation="euler-bernoulli")
-    anew = with_released_supports(with_point_masses(anew, {21: 0.01}), {Dof(1, "ry"): 50.0})
-    assert_allclose(first_omega_squared(changed, 3), first_omega_squared(anew, 3), rtol=1e-9)
-    assert [part.name for part in changed.parts] == [part.name for part in anew.parts]
+    rebuilt = beam(left="clamped", formulation="euler-bernoulli")
+    rebuilt = with_released_supports(with_point_masses(rebuilt, {21: 0.01}), {Dof(1, "ry"): 50.0})
+    assert_allclose(first_omega_squared(changed, 3), first_omega_squared(rebuilt, 3), rtol=1e-9)
+    assert [part.name for part in changed.parts] == [part.name for part in rebuilt.parts]
 
 
-def test_only_a_beam_can_be_built_anew(tmp_path):
+def test_only_a_beam_can_be_rebuilt(tmp_path):
     model = read_text_model(tmp_path, LUMPED_TEXT)
     for change in (lambda: with_formulation(model, "timoshenko"), lambda: deflection_row(model, 0.1)):
         with pytest.raises(InputError, match="kind 'lumped'"):
@@ -109,7 +109,7 @@ def test_only_a_beam_can_be_built_anew(tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["euler-bernoulli", "timoshenko"])
-def test_at_nodes_the_deflection_is_the_nodes_own(formulation):
+def test_at_nodes_the_deflection_is_that_of_the_node(formulation):
     model = beam(elements=7, formulation=formulation)
     for node, x in zip(model.geometry.nodes, model.geometry.coordinates_m[:, 0], strict=True):
         expected = np.zeros(16)
@@ -166,6 +166,6 @@ def test_a_mode_between_nodes_converges_with_the_fourth_power_of_the_step():
 
 
 @pytest.mark.parametrize("at", [-1e-3, 0.6, np.nan])
-def test_a_place_off_the_beam_is_refused(at):
+def test_a_position_off_the_beam_is_refused(at):
     with pytest.raises(InputError, match="not on the beam"):
         deflection_row(beam(), at)

@@ -83,12 +83,14 @@ def test_large_models_have_the_modes_of_small_ones(free_plate, monkeypatch):
 
 
 def test_a_loose_part_of_a_held_structure_is_found(free_plate):
-    both = [sparse.block_diag([matrix] * 2, format="csr") for matrix in (free_plate.mass_all, free_plate.stiffness_all)]
+    matrices = [
+        sparse.block_diag([matrix] * 2, format="csr") for matrix in (free_plate.mass_all, free_plate.stiffness_all)
+    ]
     corners = free_plate.geometry.coordinates_m
     above = np.vstack([corners, corners + np.array([0, 0, 0.1])])
     dofs = [Dof(node + 1, axis) for node in range(len(above)) for axis in "xyz"]
     fixed = np.concatenate([np.repeat(corners[:, 0] < 1e-9, 3), np.zeros(3 * len(corners), bool)])
-    model = structural_model(*both, dofs, coordinates_m=above, fixed=fixed)
+    model = structural_model(*matrices, dofs, coordinates_m=above, fixed=fixed)
     basis = solve_basis(model, n_modes=9)
     assert basis.n_rigid == 6
     require_modes(model, basis)
@@ -102,7 +104,7 @@ def test_a_long_chain_of_masses_has_the_frequencies_of_the_formula():
     assert_allclose(solve_modes(model, n_modes=5).natural_frequency_hz, exact, rtol=1e-9)
 
 
-def test_a_solve_that_does_not_converge_is_tried_farther_from_nought(free_plate, monkeypatch):
+def test_a_solve_that_does_not_converge_is_repeated_farther_from_zero(free_plate, monkeypatch):
     real, shifts = eigen._lanczos, []
 
     def reluctant(stiffness, mass, factor, shift, n_modes):
@@ -116,7 +118,7 @@ def test_a_solve_that_does_not_converge_is_tried_farther_from_nought(free_plate,
     assert_allclose(np.sqrt(shifts[1] / shifts[0]), eigen.SHIFT / eigen.HELD_SHIFT, rtol=ROUNDING)
 
 
-def test_no_convergence_is_said(free_plate, monkeypatch):
+def test_no_convergence_is_reported(free_plate, monkeypatch):
     def never(*_, **__):
         raise sparse_linalg.ArpackNoConvergence("none", np.zeros(2), np.zeros((3, 2)))
 
@@ -128,7 +130,7 @@ def test_no_convergence_is_said(free_plate, monkeypatch):
 def test_double_modes_are_both_found(free_plate):
     frequency = solve_modes(free_plate, n_modes=12).natural_frequency_hz[6:]
     twins = np.flatnonzero(np.abs(np.diff(frequency)) < 1e-6 * frequency[:-1])
-    assert len(twins) >= 1, "a square plate has two modes alike"
+    assert len(twins) >= 1, "a square plate has two equal modes"
 
 
 def test_one_factorization_serves_a_free_and_a_held_structure(free_plate, monkeypatch):
@@ -143,7 +145,7 @@ def test_one_factorization_serves_a_free_and_a_held_structure(free_plate, monkey
     require_modes(plate(held=True), held)
 
 
-def test_a_bad_guess_of_the_shift_is_mended(free_plate, monkeypatch):
+def test_a_bad_guess_of_the_shift_is_corrected(free_plate, monkeypatch):
     good = solve_basis(free_plate, n_modes=10)
     monkeypatch.setattr(eigen, "_first_shift_hz", lambda *_: 1e-3)
     mended = solve_basis(free_plate, n_modes=10)
@@ -159,8 +161,8 @@ def test_modes_up_to_a_frequency(large, free_plate, monkeypatch):
     for count in (7, 20, 26):
         apart = known[count] > 1.001 * known[count - 1]
         limit = (known[count - 1] + known[count]) / 2 if apart else known[count] * 1.0005
-        found = solve_modes(model, up_to_hz=limit).natural_frequency_hz
-        assert_allclose(found, known[known <= limit], rtol=EIGENVALUE, atol=1e-9 * limit)
+        natural_hz = solve_modes(model, up_to_hz=limit).natural_frequency_hz
+        assert_allclose(natural_hz, known[known <= limit], rtol=EIGENVALUE, atol=1e-9 * limit)
     assert len(solve_modes(model, up_to_hz=limit, n_modes=9).natural_frequency_hz) == 9
 
 
@@ -178,8 +180,8 @@ def test_all_modes_of_a_small_model_are_orthonormal():
 
 
 def test_a_single_dof_and_masses_without_springs():
-    one = structural_model([[2.0]], [[8.0]], [Dof(1, "x")])
-    assert_allclose(solve_modes(one).natural_frequency_hz, [2 / (2 * np.pi)], rtol=ROUNDING)
+    oscillator = structural_model([[2.0]], [[8.0]], [Dof(1, "x")])
+    assert_allclose(solve_modes(oscillator).natural_frequency_hz, [2 / (2 * np.pi)], rtol=ROUNDING)
     loose = structural_model(np.diag([2.0, 3.0]), np.zeros((2, 2)), [Dof(1, "x"), Dof(2, "x")])
     assert solve_basis(loose).n_rigid == 2
 
@@ -190,20 +192,20 @@ def test_disconnected_bodies_have_a_rigid_body_mode_each():
     assert solve_basis(model).n_rigid == 2
 
 
-def test_residual_flexibility_is_what_the_modes_leave_out(free_plate):
+def test_residual_flexibility_is_that_of_the_further_modes(free_plate):
     rng = np.random.default_rng(0)
     for model in (beam(elements=30), beam(elements=30, left="clamped")):
         everything = solve_basis(model)
         elastic = slice(everything.n_rigid, None)
         loads = rng.standard_normal((len(everything.shapes), 3))
-        for kept in (everything.n_rigid, 4, 9):
-            rest = slice(max(kept, elastic.start), None)
-            participation = (everything.shapes[:, rest].T @ loads) / everything.eigenvalues[rest, None]
-            expected = everything.shapes[:, rest] @ participation
-            if kept == 0:
+        for n_modes in (everything.n_rigid, 4, 9):
+            further = slice(max(n_modes, elastic.start), None)
+            participation = (everything.shapes[:, further].T @ loads) / everything.eigenvalues[further, None]
+            expected = everything.shapes[:, further] @ participation
+            if n_modes == 0:
                 continue
-            found = solve_basis(model, n_modes=kept).residual_flexibility(loads)
-            assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+            flexibility = solve_basis(model, n_modes=n_modes).residual_flexibility(loads)
+            assert_allclose(flexibility, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
     basis = solve_basis(free_plate, n_modes=8)
     load = np.zeros((len(basis.shapes), 1))
     load[200] = 1.0
@@ -229,8 +231,8 @@ def test_the_same_model_gives_the_same_digits(free_plate):
     assert (first.shapes == second.shapes).all()
 
 
-def test_what_makes_no_sense_is_refused(free_plate):
-    with pytest.raises(InputError, match="7 modes are asked for; the model 'plain' has 3 free DOFs"):
+def test_invalid_limits_are_refused(free_plate):
+    with pytest.raises(InputError, match="7 modes are requested; the model 'plain' has 3 free DOFs"):
         solve_modes(structural_model(np.eye(3), np.eye(3), DOFS_3), n_modes=7)
     with pytest.raises(InputError, match="above 0"):
         solve_modes(free_plate, up_to_hz=-1.0)

@@ -21,8 +21,8 @@ def grid(shift=0.1):
     """Stiffness of a grid of springs, with two DOFs a node that are coupled a little."""
     across, along = (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1) for n in (NODES_ACROSS, NODES_ALONG))
     plane = sparse.kron(along, np.eye(NODES_ACROSS)) + sparse.kron(np.eye(NODES_ALONG), across)
-    both = sparse.kron(plane + shift * sparse.eye_array(plane.shape[0]), [[1.0, 0.2], [0.2, 1.5]])
-    return sparse.csr_array(both)
+    stiffness = sparse.kron(plane + shift * sparse.eye_array(plane.shape[0]), [[1.0, 0.2], [0.2, 1.5]])
+    return sparse.csr_array(stiffness)
 
 
 def nodes():
@@ -34,7 +34,7 @@ def only(monkeypatch):
     """Let only some of the optional packages be found."""
 
     def allow(**packages):
-        monkeypatch.setattr(factorization, "_installed", lambda name: packages.get(name.replace(".", "_")))
+        monkeypatch.setattr(factorization, "_import_optional", lambda name: packages.get(name.replace(".", "_")))
 
     return allow
 
@@ -74,21 +74,21 @@ def test_one_node_need_not_be_in_one_piece(only):
 
 
 def test_cholmod_is_used_where_it_is_installed(only):
-    asked = []
+    formats = []
 
     class Cholmod:
         @staticmethod
         def cholesky(matrix):
-            asked.append(matrix.format)
+            formats.append(matrix.format)
             lower = linalg.cho_factor(matrix.toarray(), lower=True)
             return lambda loads: linalg.cho_solve(lower, loads)
 
     only(sksparse_cholmod=Cholmod)
     require_solves()
-    assert asked == ["csc"]
+    assert formats == ["csc"]
 
 
-def test_a_cholmod_of_another_kind_is_left_alone(only):
+def test_another_interface_of_cholmod_is_not_used(only):
     class Newer:
         @staticmethod
         def cholesky(matrix):
@@ -146,7 +146,7 @@ def test_a_singular_matrix_is_refused(order, only):
 
 
 @pytest.mark.parametrize(("shift", "answer"), [(0.1, True), (-0.1, False), (-5.0, False)])
-def test_definiteness_is_told_by_the_pivots(shift, answer):
+def test_definiteness_follows_from_the_pivots(shift, answer):
     assert is_positive_definite(grid(shift), nodes()) is answer
 
 

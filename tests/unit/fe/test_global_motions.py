@@ -23,8 +23,8 @@ def plate(counts=(9, 7, 2)):
 @pytest.mark.parametrize("model", [plate(), beam(elements=9)], ids=["plate", "beam"])
 def test_rigid_bodies_strain_nothing(model):
     motions = rigid_body_motions(model.dofs, model.geometry)
-    left = np.abs(model.stiffness @ motions)
-    assert (left <= UNSTRAINED * (abs(model.stiffness) @ np.abs(motions)).max()).all()
+    forces = np.abs(model.stiffness @ motions)
+    assert (forces <= UNSTRAINED * (abs(model.stiffness) @ np.abs(motions)).max()).all()
     assert np.linalg.matrix_rank(motions) == (6 if model.kind == "matrices" else 2)
 
 

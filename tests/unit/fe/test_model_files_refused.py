@@ -1,4 +1,4 @@
-"""What is wrong in a model's files is said: which file, where, and what to do."""
+"""Errors in the files of a model are reported: which file, where, and what to do."""
 
 import numpy as np
 import pytest
@@ -259,5 +259,5 @@ def test_matrices_that_cannot_be(tmp_path, change, name, fragments):
         assert fragment in message
 
 
-def test_a_model_file_that_is_not_there(tmp_path):
+def test_a_missing_model_file(tmp_path):
     assert "no such file" in refused(tmp_path / "model.toml")

@@ -33,8 +33,8 @@ spring = [
 """
 
 
-def label(output, blow, quantity=FrfQuantity.RECEPTANCE):
-    return FrfLabel(parse_dof(output), parse_dof(blow), quantity)
+def label(output, excited, quantity=FrfQuantity.RECEPTANCE):
+    return FrfLabel(parse_dof(output), parse_dof(excited), quantity)
 
 
 def modal_damping_matrix(model):
@@ -56,16 +56,16 @@ def direct(model, labels, s, damping=None):
     values = np.zeros((len(s), len(labels)), complex)
     for line, value in enumerate(s):
         dynamic = value**2 * model.mass.toarray() + value * damping + model.stiffness.toarray()
-        for column, one in enumerate(labels):
+        for column, frf_label in enumerate(labels):
             load = np.zeros(len(dynamic))
-            load[model.index(one.input_dof)] = 1.0
-            receptance = np.linalg.solve(dynamic, load)[model.index(one.output_dof)]
-            values[line, column] = one.sign * receptance * value**one.quantity.power
+            load[model.index(frf_label.input_dof)] = 1.0
+            receptance = np.linalg.solve(dynamic, load)[model.index(frf_label.output_dof)]
+            values[line, column] = frf_label.sign * receptance * value**frf_label.quantity.power
     return values
 
 
-def require_same(found, expected, tolerance=DIRECT):
-    assert_allclose(found / np.abs(expected).max(0), expected / np.abs(expected).max(0), rtol=0, atol=tolerance)
+def require_same(computed, expected, tolerance=DIRECT):
+    assert_allclose(computed / np.abs(expected).max(0), expected / np.abs(expected).max(0), rtol=0, atol=tolerance)
 
 
 LABELS = [label("21:z", "9:z"), label("4:-z", "9:z"), label("9:+z", "21:-z"), label("13:ry", "21:z")]
@@ -120,17 +120,17 @@ def test_a_large_model_keeps_the_static_part_of_modes_left_out(monkeypatch):
     model = beam(left="clamped", elements=20, modal_ratio=1e-6)
     everything = model_frfs(model, LABELS, S)
     monkeypatch.setattr(response, "DENSE_ORDER", 10)
-    kept = []
+    bases = []
     real = response.solve_basis
-    monkeypatch.setattr(response, "solve_basis", lambda *args, **how: kept.append(real(*args, **how)) or kept[-1])
-    require_same(model_frfs(model, LABELS, S), everything, tolerance=1e-5)  # (1/3)^10 of the first mode left out
-    assert len(kept[0].eigenvalues) < 10
+    monkeypatch.setattr(response, "solve_basis", lambda *args, **how: bases.append(real(*args, **how)) or bases[-1])
+    require_same(model_frfs(model, LABELS, S), everything, tolerance=1e-5)  # (1/3)^10 of the first mode beyond
+    assert len(bases[0].eigenvalues) < 10
 
 
-def test_the_series_reads_either_side(monkeypatch):
+def test_the_series_loads_either_side(monkeypatch):
     model = beam(left="free", elements=20, modal_ratio=1e-6)
     labels = [label(f"{node}:z", "3:z") for node in (1, 5, 9)] + [label("7:z", "3:z")]
-    mirrored = [label(str(one.input_dof), str(one.output_dof)) for one in labels]
+    mirrored = [label(str(pair.input_dof), str(pair.output_dof)) for pair in labels]
     everything = model_frfs(model, labels, S)
     monkeypatch.setattr(response, "DENSE_ORDER", 10)
     require_same(model_frfs(model, labels, S), everything, tolerance=1e-5)
@@ -147,11 +147,11 @@ def test_coupled_damping_of_a_large_model(monkeypatch):
     exact = direct(plain, LABELS, S, modal_damping_matrix(plain))
     require_same(model_frfs(plain, LABELS, S), exact)
     monkeypatch.setattr(response, "COUPLED_ORDER", 10)
-    require_same(model_frfs(plain, LABELS, S), exact, tolerance=5e-3)  # the modes left out are not coupled
+    require_same(model_frfs(plain, LABELS, S), exact, tolerance=5e-3)  # the modes beyond are not coupled
 
 
 @pytest.mark.parametrize("quantity", list(FrfQuantity))
-def test_at_rest_the_frf_just_beside_is_given(quantity):
+def test_at_zero_frequency_the_frf_next_to_it_is_given(quantity):
     held, free = (beam(left=left, modal_ratio=0.01) for left in ("clamped", "free"))
     frequency = np.array([0.0, 5.0])
     still = model_frfs(held, [label("21:z", "21:z", quantity)], 2j * np.pi * frequency)
@@ -184,21 +184,21 @@ def reduced(mass, damping, stiffness):
 def test_a_reduced_model_is_solved_directly_also_where_it_is_not_symmetric():
     mass, damping = np.array([[2.0, 0.3], [0.3, 1.0]]), np.array([[3.0, 1.0], [0.5, 2.0]])
     stiffness = np.array([[5e5, -1e5], [-1.01e5, 2e5]])
-    found = model_frfs(reduced(mass, damping, stiffness), [label("9:-x", "2:x"), label("1:x", "9:x")], S)
+    computed = model_frfs(reduced(mass, damping, stiffness), [label("9:-x", "2:x"), label("1:x", "9:x")], S)
     for line, s in enumerate(S):
         inverse = np.linalg.inv(s**2 * mass + s * damping + stiffness)
-        assert_allclose(found[line], [-0.5 * inverse[:, 1].sum(), 0.5 * inverse[0].sum()], rtol=1e-12)
+        assert_allclose(computed[line], [-0.5 * inverse[:, 1].sum(), 0.5 * inverse[0].sum()], rtol=1e-12)
 
 
-def test_many_lines_are_solved_in_pieces():
+def test_many_lines_are_solved_in_blocks():
     model = reduced(np.eye(2), 0.1 * np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]))
     s = 1j * np.linspace(0.1, 3.0, 3 * response.LINES_AT_ONCE + 7)
-    found = model_frfs(model, [label("1:x", "1:x")], s)[:, 0]
+    computed = model_frfs(model, [label("1:x", "1:x")], s)[:, 0]
     expected = 0.5 / (s**2 + 0.1 * s + 1) + 0.5 / (s**2 + 0.1 * s + 3)
-    assert_allclose(found, expected, rtol=1e-12)
+    assert_allclose(computed, expected, rtol=1e-12)
 
 
-def test_an_unknown_or_held_dof_is_said():
+def test_an_unknown_or_held_dof_is_refused():
     model = beam(left="clamped")
     with pytest.raises(InputError, match="no node 99"):
         model_frfs(model, [label("99:z", "4:z")], S)
@@ -214,7 +214,7 @@ def test_poles_of_modes_with_damping_ratios():
     assert len(model_poles(model, up_to_hz=omega[2] / (2 * np.pi) * 1.01)) == 3
 
 
-def test_poles_of_rigid_body_modes_are_nought_and_stand_for_themselves():
+def test_poles_of_rigid_body_modes_are_zero_and_listed_one_by_one():
     assert model_poles(beam(elements=6))[:5].tolist()[:4] == [0, 0, 0, 0]
     assert model_poles(beam(elements=6))[4].imag > 0
     free = reduced(np.eye(2), np.zeros((2, 2)), np.array([[1.0, -1.0], [-1.0, 1.0]]))

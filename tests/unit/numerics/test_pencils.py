@@ -52,7 +52,9 @@ def test_poles_make_the_dynamic_stiffness_singular(matrices):
 
 def test_vectors_belong_to_their_poles_from_both_sides(matrices):
     roots = damped_poles(*matrices)
-    for value, right, left, slope in zip(roots.values, roots.right.T, roots.left.T, roots.slope, strict=True):
+    for value, right, left, slope in zip(
+        roots.values, roots.right_vectors.T, roots.left_vectors.T, roots.slope, strict=True
+    ):
         whole = dynamic(matrices, value)
         assert np.linalg.norm(whole @ right) < VANISHES * np.linalg.norm(whole) * np.linalg.norm(right)
         assert np.linalg.norm(left @ whole) < VANISHES * np.linalg.norm(whole) * np.linalg.norm(left)
@@ -63,16 +65,16 @@ def test_the_frf_vanishes_at_its_zeros_and_nowhere_else(matrices, rows):
     zeros = damped_zeros(*matrices, *rows).values
     assert len(zeros) == 2 * ORDER - 2
     for zero in zeros:
-        beside = abs(receptance(matrices, rows, zero * 1.1))
-        assert abs(receptance(matrices, rows, zero)) < VANISHES * beside
+        nearby = abs(receptance(matrices, rows, zero * 1.1))
+        assert abs(receptance(matrices, rows, zero)) < VANISHES * nearby
     s = 0.3 + 2j
     gain = receptance(matrices, rows, s) * np.prod(s - damped_poles(*matrices).values) / np.prod(s - zeros)
-    other = -1 + 9j
-    expected = gain * np.prod(other - zeros) / np.prod(other - damped_poles(*matrices).values)
-    assert_allclose(receptance(matrices, rows, other), expected, rtol=1e-9)
+    test_s = -1 + 9j
+    expected = gain * np.prod(test_s - zeros) / np.prod(test_s - damped_poles(*matrices).values)
+    assert_allclose(receptance(matrices, rows, test_s), expected, rtol=1e-9)
 
 
-def test_zeros_at_infinity_are_left_out():
+def test_zeros_at_infinity_are_omitted():
     mass, damping, stiffness = np.diag([1.0, 2.0, 3.0]), np.zeros((3, 3)), np.diag([3.0, 4.0, 2.0])
     stiffness[[0, 1, 1, 2], [1, 0, 2, 1]] = -1.0
     # from one end of a chain of three to the other nothing cancels: the FRF is 1 over a polynomial
@@ -92,7 +94,7 @@ def test_undamped_roots_are_the_squares_of_damped_ones_without_damping(rows):
 
 def test_undamped_shapes_are_mass_normalised():
     mass, _, stiffness = random_matrices(np.random.default_rng(6), ORDER)
-    shapes = undamped_poles(mass, stiffness).right.real
+    shapes = undamped_poles(mass, stiffness).right_vectors.real
     assert_allclose(shapes.T @ mass @ shapes, np.eye(ORDER), rtol=0, atol=1e-12)
 
 
@@ -115,9 +117,9 @@ def test_damped_sensitivities_against_differences(matrices, rows, part, what):
     compute = {"poles": lambda m: damped_poles(*m), "zeros": lambda m: damped_zeros(*m, *rows)}[what]
     direction = np.random.default_rng(7).standard_normal((1, ORDER, ORDER))
     keyword = ("mass", "damping", "stiffness")[part]
-    found = damped_sensitivity(compute(list(matrices)), **{keyword: direction})[:, 0]
+    sensitivity = damped_sensitivity(compute(list(matrices)), **{keyword: direction})[:, 0]
     expected = moved(compute, matrices, direction, part)
-    assert np.abs(found - expected).max() < SLOPES * np.abs(expected).max()
+    assert np.abs(sensitivity - expected).max() < SLOPES * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("part", [0, 2], ids=["mass", "stiffness"])
@@ -131,10 +133,10 @@ def test_undamped_sensitivities_against_differences(rows, part, what):
     direction = np.random.default_rng(9).standard_normal((1, ORDER, ORDER))
     direction = direction + direction.transpose(0, 2, 1)
     nothing = np.zeros_like(direction)
-    given = (nothing, direction) if part == 0 else (direction, None)
-    found = undamped_sensitivity(compute(list(matrices)), *given)[:, 0]
+    derivatives = (nothing, direction) if part == 0 else (direction, None)
+    sensitivity = undamped_sensitivity(compute(list(matrices)), *derivatives)[:, 0]
     expected = moved(compute, matrices, direction, part)
-    assert np.abs(found - expected).max() < SLOPES * np.abs(expected).max()
+    assert np.abs(sensitivity - expected).max() < SLOPES * np.abs(expected).max()
 
 
 def test_the_complement_is_orthonormal_and_orthogonal_to_the_row(rows):

@@ -68,6 +68,6 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
     ("dofs", "message"),
     [(["3:+z"], "there is no sensor at '3:[+]z'"), (["1:z", "2:z"], "leaves no sensor"), (["tip"], "no DOF label")],
 )
-def test_what_makes_no_sense_is_refused(campaign, dofs, message):
+def test_invalid_limits_are_refused(campaign, dofs, message):
     with pytest.raises(FileFormatError, match=f"ingest.hide.*{message}"):
         read_inputs(hiding(campaign, *dofs))

@@ -43,7 +43,7 @@ def test_amplitudes_are_products_of_mass_normalised_shapes():
     model = chain()
     one = label(2, -4)
     found = members([model]).amplitudes(model.row(one.output_dof), model.row(one.input_dof), 3)
-    shapes = undamped_poles(model.mass, model.stiffness).right.real
+    shapes = undamped_poles(model.mass, model.stiffness).right_vectors.real
     assert found.shape == (1, 3)
     assert_allclose(found[0], -shapes[1, :3] * shapes[3, :3], rtol=1e-9)
 

@@ -188,7 +188,7 @@ def test_text_of_others_cannot_break_out_of_its_string():
         ({"kind": "retain", "dofs": []}, "name the DOFs"),
     ],
 )
-def test_what_makes_no_sense_is_refused(wish, message):
+def test_invalid_limits_are_refused(wish, message):
     with pytest.raises(InputError, match=message):
         after(wish)
 

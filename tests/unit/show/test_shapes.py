@@ -39,8 +39,8 @@ def measured_run(model, nominal):
     roots, nominal_roots = poles_of(model), poles_of(nominal)
     shapes = np.stack(
         [
-            roots.right[[abs(label.output_dof.node) - 1 for label in LABELS]],
-            roots.right[[label.input_dof.node - 1 for label in LABELS]],
+            roots.right_vectors[[abs(label.output_dof.node) - 1 for label in LABELS]],
+            roots.right_vectors[[label.input_dof.node - 1 for label in LABELS]],
         ]
     ).prod(axis=0)
     signs = np.array([label.sign for label in LABELS])

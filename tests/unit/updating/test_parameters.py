@@ -112,7 +112,7 @@ def test_generic_parameters_span_every_symmetric_change():
 def test_a_generic_change_is_relative_to_the_two_frequencies():
     model = chain(4)
     roots = undamped_poles(model.mass, model.stiffness)
-    shapes, omega = roots.right.real, np.sqrt(roots.values.real)
+    shapes, omega = roots.right_vectors.real, np.sqrt(roots.values.real)
     basis = generic_basis(model)
     inside = shapes.T @ basis.stiffness[basis.names.index("stiffness 1-3")] @ shapes
     expected = np.zeros((4, 4))

@@ -40,7 +40,7 @@ class BeamSection:
     elements : pair of int
         First and last element, both included.
     thickness_m, width_m : float, optional
-        m; that of the beam where it is left out.
+        m; by default that of the beam.
     """
 
     __pydantic_config__ = STRICT
@@ -57,7 +57,7 @@ class BeamPointMass:
     Parameters
     ----------
     node : int
-        Where.
+        Its node.
     mass_kg, rotary_inertia_kgm2 : float
         kg and kg m^2.
     """
@@ -76,7 +76,7 @@ class BeamPointSpring:
     Parameters
     ----------
     node : int
-        Where.
+        Its node.
     stiffness_N_m, rotational_stiffness_Nm_rad : float
         N/m and N m/rad.
     """
@@ -101,9 +101,9 @@ class BeamOptions:
     formulation : str
         ``timoshenko`` or ``euler-bernoulli``.
     youngs_modulus_Pa, density_kg_m3, poisson_ratio : float
-        Material. Poisson's ratio matters for Timoshenko only; 0.3 stands for a metal.
+        Material. Poisson's ratio matters for Timoshenko only; 0.3 is that of most metals.
     left, right : str
-        How an end is held: ``clamped`` (z, ry), ``pinned`` (z), ``sliding`` (ry) or ``free``.
+        Support of an end: ``clamped`` (z, ry), ``pinned`` (z), ``sliding`` (ry) or ``free``.
     section : tuple of BeamSection
         Other cross-sections.
     point_mass : tuple of BeamPointMass
@@ -159,9 +159,9 @@ def files(file: BeamFile, path: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     file : BeamFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is.
+        Its path.
 
     Returns
     -------
@@ -173,14 +173,14 @@ def files(file: BeamFile, path: Path) -> tuple[Path, ...]:
 
 
 def read(file: BeamFile, path: Path) -> StructuralModel:
-    """Check what the single keys cannot show, and build the beam.
+    """Check the keys against each other, and build the beam.
 
     Parameters
     ----------
     file : BeamFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is, for messages.
+        Its path, for messages.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def build_beam(file: BeamFile) -> StructuralModel:
     Parameters
     ----------
     file : BeamFile
-        Options of the whole file; kept as the model's `source`.
+        Options of the whole file; stored as the model's `source`.
 
     Returns
     -------
@@ -222,7 +222,7 @@ def build_beam(file: BeamFile) -> StructuralModel:
         name=file.model.name,
         kind=KIND,
         all_dofs=dofs,
-        fixed=_held(beam, dofs),
+        fixed=_is_held(beam, dofs),
         mass_all=mass,
         stiffness_all=stiffness,
         damping_all=damping,
@@ -248,9 +248,9 @@ def beam_elements(beam: BeamOptions) -> BeamElements:
     """
     width, thickness = np.full(beam.elements, beam.width_m), np.full(beam.elements, beam.thickness_m)
     for section in beam.section:
-        stretch = slice(section.elements[0] - 1, section.elements[1])
-        width[stretch] = section.width_m or beam.width_m
-        thickness[stretch] = section.thickness_m or beam.thickness_m
+        elements = slice(section.elements[0] - 1, section.elements[1])
+        width[elements] = section.width_m or beam.width_m
+        thickness[elements] = section.thickness_m or beam.thickness_m
     length = np.full(beam.elements, beam.length_m / beam.elements)
     area, second_moment = width * thickness, width * thickness**3 / 12
     bending = beam.youngs_modulus_Pa * second_moment
@@ -296,19 +296,19 @@ def element_parts(beam: BeamOptions) -> list[Part]:
 
 def _point_parts(beam: BeamOptions) -> list[Part]:
     masses = [
-        _point_part("mass", place, mass.node, mass=(mass.mass_kg, mass.rotary_inertia_kgm2))
-        for place, mass in enumerate(beam.point_mass, start=1)
+        _point_part("mass", number, mass.node, mass=(mass.mass_kg, mass.rotary_inertia_kgm2))
+        for number, mass in enumerate(beam.point_mass, start=1)
     ]
     springs = [
-        _point_part("spring", place, spring.node, stiffness=(spring.stiffness_N_m, spring.rotational_stiffness_Nm_rad))
-        for place, spring in enumerate(beam.point_spring, start=1)
+        _point_part("spring", number, spring.node, stiffness=(spring.stiffness_N_m, spring.rotational_stiffness_Nm_rad))
+        for number, spring in enumerate(beam.point_spring, start=1)
     ]
     return masses + springs
 
 
 def _point_part(
     what: str,
-    place: int,
+    number: int,
     node: int,
     *,
     mass: tuple[float, float] = (0.0, 0.0),
@@ -316,7 +316,7 @@ def _point_part(
 ) -> Part:
     return Part(
         kind="point",
-        name=f"{what} {place} at node {node}",
+        name=f"{what} {number} at node {node}",
         nodes=(node,),
         indices=_rows(node),
         stiffness=np.diag(stiffness),
@@ -328,7 +328,7 @@ def _rows(node: int) -> IntArray:
     return np.arange(2 * node - 2, 2 * node)
 
 
-def _held(beam: BeamOptions, dofs: tuple[Dof, ...]) -> BoolArray:
+def _is_held(beam: BeamOptions, dofs: tuple[Dof, ...]) -> BoolArray:
     held = {Dof(1, direction) for direction in HELD[beam.left]}
     held |= {Dof(beam.elements + 1, direction) for direction in HELD[beam.right]}
     return np.array([dof in held for dof in dofs])
@@ -348,9 +348,9 @@ def _geometry(beam: BeamOptions) -> Geometry:
 
 
 def _check_sections(beam: BeamOptions, path: Path) -> None:
-    taken: dict[int, int] = {}
-    for place, section in enumerate(beam.section, start=1):
-        where = f"key 'beam.section.[{place}]'"
+    section_of: dict[int, int] = {}
+    for number, section in enumerate(beam.section, start=1):
+        where = f"key 'beam.section.[{number}]'"
         first, last = section.elements
         if first > last or last > beam.elements:
             raise FileFormatError(
@@ -358,28 +358,30 @@ def _check_sections(beam: BeamOptions, path: Path) -> None:
             )
         if section.thickness_m is None and section.width_m is None:
             raise FileFormatError(path, "changes nothing; give thickness_m or width_m", where=where)
-        shared = taken.keys() & range(first, last + 1)
+        shared = section_of.keys() & range(first, last + 1)
         if shared:
             raise FileFormatError(
-                path, f"element {min(shared)} is in section {taken[min(shared)]} too; let them not overlap", where=where
+                path,
+                f"element {min(shared)} is in section {section_of[min(shared)]} too; sections must not overlap",
+                where=where,
             )
-        taken |= dict.fromkeys(range(first, last + 1), place)
+        section_of |= dict.fromkeys(range(first, last + 1), number)
 
 
 def _check_points(beam: BeamOptions, path: Path) -> None:
-    places = [(f"point_mass.[{place}]", mass.node) for place, mass in enumerate(beam.point_mass, start=1)]
-    places += [(f"point_spring.[{place}]", spring.node) for place, spring in enumerate(beam.point_spring, start=1)]
-    for key, node in places:
+    keys = [(f"point_mass.[{number}]", mass.node) for number, mass in enumerate(beam.point_mass, start=1)]
+    keys += [(f"point_spring.[{number}]", spring.node) for number, spring in enumerate(beam.point_spring, start=1)]
+    for key, node in keys:
         if node > beam.elements + 1:
             raise FileFormatError(
                 path,
                 f"there is no node {node}; the beam has nodes 1 to {beam.elements + 1}",
                 where=f"key 'beam.{key}.node'",
             )
-    for place, spring in enumerate(beam.point_spring, start=1):
+    for number, spring in enumerate(beam.point_spring, start=1):
         if not (spring.stiffness_N_m or spring.rotational_stiffness_Nm_rad):
             raise FileFormatError(
                 path,
                 "has no stiffness; give stiffness_N_m or rotational_stiffness_Nm_rad",
-                where=f"key 'beam.point_spring.[{place}]'",
+                where=f"key 'beam.point_spring.[{number}]'",
             )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 KIND = "lumped"
 GROUND = 0
-ACROSS = np.array([[1.0, -1.0], [-1.0, 1.0]])
+DIFFERENCE = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class LumpedSpring:
     id : str
         Its name.
     nodes : pair of int
-        What it joins; 0 is the ground.
+        The nodes it joins; 0 is the ground.
     stiffness_N_m, damping_Ns_m : float
         N/m and N s/m.
     """
@@ -74,7 +74,7 @@ class LumpedOptions:
     mass : tuple of LumpedMass
         The nodes.
     spring : tuple of LumpedSpring
-        What joins them.
+        The springs between them.
     direction : str
         The direction in which all of them move.
     """
@@ -116,9 +116,9 @@ def files(file: LumpedFile, path: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     file : LumpedFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is.
+        Its path.
 
     Returns
     -------
@@ -130,16 +130,16 @@ def files(file: LumpedFile, path: Path) -> tuple[Path, ...]:
 
 
 def read(file: LumpedFile, path: Path) -> StructuralModel:
-    """Check what the single keys cannot show, and build the model.
+    """Check the keys against each other, and build the model.
 
     The ground is a DOF that is held, so that every spring has its two ends among the DOFs.
 
     Parameters
     ----------
     file : LumpedFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is, for messages.
+        Its path, for messages.
 
     Returns
     -------
@@ -149,16 +149,18 @@ def read(file: LumpedFile, path: Path) -> StructuralModel:
     Raises
     ------
     FileFormatError
-        If a node or an id is given twice, or a spring joins what does not exist.
+        If a node or an id is given twice, or a spring ends at a node that does not exist.
     """
     lumped = file.lumped
     _check(lumped, path)
     nodes = sorted({mass.node for mass in lumped.mass} | {node for spring in lumped.spring for node in spring.nodes})
-    place = {node: index for index, node in enumerate(nodes)}
-    parts = (*_mass_parts(lumped, place), *_spring_parts(lumped, place))
+    row_of = {node: index for index, node in enumerate(nodes)}
+    parts = (*_mass_parts(lumped, row_of), *_spring_parts(lumped, row_of))
     mass, stiffness = assemble_mass_and_stiffness(parts, len(nodes))
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
-    dampers = [(_rows(spring, place), spring.damping_Ns_m * ACROSS) for spring in lumped.spring if spring.damping_Ns_m]
+    dampers = [
+        (_rows(spring, row_of), spring.damping_Ns_m * DIFFERENCE) for spring in lumped.spring if spring.damping_Ns_m
+    ]
     return StructuralModel(
         name=file.model.name,
         kind=KIND,
@@ -174,13 +176,13 @@ def read(file: LumpedFile, path: Path) -> StructuralModel:
     )
 
 
-def _mass_parts(lumped: LumpedOptions, place: dict[int, int]) -> list[Part]:
+def _mass_parts(lumped: LumpedOptions, row_of: dict[int, int]) -> list[Part]:
     return [
         Part(
             kind="point",
             name=f"mass at node {mass.node}",
             nodes=(mass.node,),
-            indices=np.array([place[mass.node]]),
+            indices=np.array([row_of[mass.node]]),
             stiffness=np.zeros((1, 1)),
             mass=np.array([[mass.mass_kg]]),
         )
@@ -188,22 +190,22 @@ def _mass_parts(lumped: LumpedOptions, place: dict[int, int]) -> list[Part]:
     ]
 
 
-def _spring_parts(lumped: LumpedOptions, place: dict[int, int]) -> list[Part]:
+def _spring_parts(lumped: LumpedOptions, row_of: dict[int, int]) -> list[Part]:
     return [
         Part(
             kind="spring",
             name=spring.id,
             nodes=spring.nodes,
-            indices=_rows(spring, place),
-            stiffness=spring.stiffness_N_m * ACROSS,
+            indices=_rows(spring, row_of),
+            stiffness=spring.stiffness_N_m * DIFFERENCE,
             mass=np.zeros((2, 2)),
         )
         for spring in lumped.spring
     ]
 
 
-def _rows(spring: LumpedSpring, place: dict[int, int]) -> IntArray:
-    return np.array([place[node] for node in spring.nodes])
+def _rows(spring: LumpedSpring, row_of: dict[int, int]) -> IntArray:
+    return np.array([row_of[node] for node in spring.nodes])
 
 
 def _geometry(lumped: LumpedOptions, nodes: list[int]) -> Geometry:
@@ -221,15 +223,17 @@ def _geometry(lumped: LumpedOptions, nodes: list[int]) -> Geometry:
 def _check(lumped: LumpedOptions, path: Path) -> None:
     if not lumped.mass:
         raise FileFormatError(path, "there is no mass; give at least one [[lumped.mass]]", where="key 'lumped.mass'")
-    twice = _first_twice([str(mass.node) for mass in lumped.mass])
-    if twice is not None:
-        raise FileFormatError(path, f"node {twice} has two masses; give their sum once", where="key 'lumped.mass'")
-    doubled = _first_twice([spring.id for spring in lumped.spring])
-    if doubled is not None:
-        raise FileFormatError(path, f"two springs are called '{doubled}'; rename one", where="key 'lumped.spring'")
+    repeated_node = _first_repeated([str(mass.node) for mass in lumped.mass])
+    if repeated_node is not None:
+        raise FileFormatError(
+            path, f"node {repeated_node} has two masses; give their sum once", where="key 'lumped.mass'"
+        )
+    repeated_id = _first_repeated([spring.id for spring in lumped.spring])
+    if repeated_id is not None:
+        raise FileFormatError(path, f"two springs are called '{repeated_id}'; rename one", where="key 'lumped.spring'")
     known = {mass.node for mass in lumped.mass} | {GROUND}
-    for spring_place, spring in enumerate(lumped.spring, start=1):
-        _check_spring(spring, known, path, f"key 'lumped.spring.[{spring_place}].nodes'")
+    for number, spring in enumerate(lumped.spring, start=1):
+        _check_spring(spring, known, path, f"key 'lumped.spring.[{number}].nodes'")
 
 
 def _check_spring(spring: LumpedSpring, known: set[int], path: Path, where: str) -> None:
@@ -244,5 +248,5 @@ def _check_spring(spring: LumpedSpring, known: set[int], path: Path, where: str)
             )
 
 
-def _first_twice(items: list[str]) -> str | None:
+def _first_repeated(items: list[str]) -> str | None:
     return next((item for item, times in Counter(items).items() if times > 1), None)

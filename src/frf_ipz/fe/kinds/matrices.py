@@ -12,7 +12,7 @@ from scipy import sparse
 from frf_ipz.arrays import IntArray
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.assembly import stated_damping
-from frf_ipz.fe.matrices.definiteness import require_mass, require_semidefinite
+from frf_ipz.fe.matrices.definiteness import require_positive_definite_mass, require_semidefinite
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
 from frf_ipz.fe.matrices.matrix_market import read_symmetric
 from frf_ipz.fe.matrices.neighbours import lines_between_neighbours
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Matrix
 
 KIND = "matrices"
-SUM_TOLERANCE = 1e-6  # of a diagonal entry: what rounding of printed groups may add up to
+SUM_TOLERANCE = 1e-6  # of a diagonal entry: rounding of printed groups may add up to that
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,9 +105,9 @@ def files(file: MatricesFile, path: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     file : MatricesFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is.
+        Its path.
 
     Returns
     -------
@@ -121,14 +121,14 @@ def files(file: MatricesFile, path: Path) -> tuple[Path, ...]:
 
 
 def read(file: MatricesFile, path: Path) -> StructuralModel:
-    """Read the matrices, check them, and make a model of them.
+    """Read the matrices, check them, and build a model.
 
     Parameters
     ----------
     file : MatricesFile
-        What ``model.toml`` says.
+        Content of ``model.toml``.
     path : Path
-        Where it is.
+        Its path.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     options, folder = file.matrices, path.parent
     table = read_dof_table(folder / options.dofs)
     mass = _matrix(folder / options.mass, table, options)
-    require_mass(mass, table.dofs, folder / options.mass)
+    require_positive_definite_mass(mass, table.dofs, folder / options.mass)
     stiffness = _matrix(folder / options.stiffness, table, options)
     require_semidefinite(stiffness, table.dofs, folder / options.stiffness, "stiffness")
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
@@ -176,10 +176,10 @@ def _matrix(path: Path, table: DofTable, options: MatricesOptions) -> Matrix:
 
 
 def _groups(options: MatricesOptions, path: Path, table: DofTable, mass: Matrix, stiffness: Matrix) -> tuple[Part, ...]:
-    twice = next((name for name, times in Counter(group.name for group in options.group).items() if times > 1), None)
-    if twice is not None:
-        raise FileFormatError(path, f"two groups are called '{twice}'; rename one", where="key 'matrices.group'")
-    parts, stiffness_left, mass_left = [], stiffness.diagonal(), mass.diagonal()
+    repeated = next((name for name, count in Counter(group.name for group in options.group).items() if count > 1), None)
+    if repeated is not None:
+        raise FileFormatError(path, f"two groups are called '{repeated}'; rename one", where="key 'matrices.group'")
+    parts, remaining_stiffness, remaining_mass = [], stiffness.diagonal(), mass.diagonal()
     for group in options.group:
         group_stiffness = _matrix(path.parent / group.stiffness, table, options)
         group_mass = (
@@ -188,9 +188,10 @@ def _groups(options: MatricesOptions, path: Path, table: DofTable, mass: Matrix,
             else sparse.csr_array(stiffness.shape, dtype=np.float64)
         )
         parts.append(_group_part(group.name, table, group_mass, group_stiffness))
-        stiffness_left, mass_left = stiffness_left - group_stiffness.diagonal(), mass_left - group_mass.diagonal()
-    for what, left, whole in (("stiffness", stiffness_left, stiffness), ("mass", mass_left, mass)):
-        excess = -left - SUM_TOLERANCE * whole.diagonal()
+        remaining_stiffness = remaining_stiffness - group_stiffness.diagonal()
+        remaining_mass = remaining_mass - group_mass.diagonal()
+    for what, remaining, whole in (("stiffness", remaining_stiffness, stiffness), ("mass", remaining_mass, mass)):
+        excess = -remaining - SUM_TOLERANCE * whole.diagonal()
         if excess.max() > 0:
             dof = table.dofs[int(np.argmax(excess))]
             raise FileFormatError(
@@ -207,7 +208,7 @@ def _group_part(name: str, table: DofTable, mass: Matrix, stiffness: Matrix) -> 
     return Part(
         kind="group",
         name=name,
-        nodes=tuple(sorted({table.dofs[place].node for place in indices.tolist()})),
+        nodes=tuple(sorted({table.dofs[index].node for index in indices.tolist()})),
         indices=indices,
         stiffness=stiffness[indices][:, indices],
         mass=mass[indices][:, indices],
@@ -215,5 +216,5 @@ def _group_part(name: str, table: DofTable, mass: Matrix, stiffness: Matrix) -> 
 
 
 def _used_rows(matrix: Matrix) -> IntArray:
-    used = sparse.coo_array(matrix)
-    return np.unique(used.row[used.data != 0]).astype(np.int64)
+    entries = sparse.coo_array(matrix)
+    return np.unique(entries.row[entries.data != 0]).astype(np.int64)

@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Matrix
 
 DENSE_ORDER = 1000  # up to here all eigenvalues are computed, and the message can name the worst DOF
-SINGULAR_MASS = 1e-12  # smallest eigenvalue of the mass matrix scaled to a diagonal of ones: rounding of a singular one
-NEGATIVE_STIFFNESS = 1e-10  # of the largest eigenvalue: what the contract lets printed digits do
+SINGULAR_MASS = (
+    1e-12  # smallest eigenvalue of the mass matrix scaled to a diagonal of ones: that of a singular one after rounding
+)
+NEGATIVE_STIFFNESS = 1e-10  # of the largest eigenvalue: allowed for rounding of printed digits
 ESTIMATE_TOLERANCE = 1e-2  # of the largest eigenvalue, which is only a yardstick
 
 
-def require_mass(mass: Matrix, dofs: Sequence[Dof], path: Path) -> None:
+def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof], path: Path) -> None:
     """Refuse a mass matrix that is not positive definite.
 
     Parameters
@@ -35,7 +37,7 @@ def require_mass(mass: Matrix, dofs: Sequence[Dof], path: Path) -> None:
     dofs : sequence of Dof
         Its rows.
     path : Path
-        Where it came from, for the message.
+        Its file, for the message.
 
     Raises
     ------
@@ -54,14 +56,14 @@ def require_mass(mass: Matrix, dofs: Sequence[Dof], path: Path) -> None:
     scale = sparse.diags_array(1 / np.sqrt(diagonal))
     scaled = sparse.csr_array(scale @ mass @ scale)
     if mass.shape[0] <= DENSE_ORDER:
-        smallest, motion = _smallest(scaled)
-        is_fine, near = smallest > SINGULAR_MASS, f", most of all at the DOF {dofs[int(np.argmax(motion))].name}"
+        smallest, motion = _smallest_eigenpair(scaled)
+        is_definite, where = smallest > SINGULAR_MASS, f", most of all at the DOF {dofs[int(np.argmax(motion))].name}"
     else:
-        is_fine, near = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(dofs)), ""
-    if not is_fine:
+        is_definite, where = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(dofs)), ""
+    if not is_definite:
         raise FileFormatError(
             path,
-            f"the mass matrix is not positive definite: a motion has no mass or a negative one{near}; "
+            f"the mass matrix is not positive definite: a motion has no mass or a negative one{where}; "
             "export the mass matrix that the FE program computes modes with",
         )
 
@@ -76,7 +78,7 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], path: Path, what: 
     dofs : sequence of Dof
         Its rows.
     path : Path
-        Where it came from, for the message.
+        Its file, for the message.
     what : str
         ``stiffness`` or ``damping``.
 
@@ -86,39 +88,39 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], path: Path, what: 
         If an eigenvalue is below -1e-10 times the largest one.
     """
     if matrix.shape[0] <= DENSE_ORDER:
-        smallest, motion = _smallest(matrix)
-        is_fine = smallest >= -NEGATIVE_STIFFNESS * _largest(matrix)
-        near = f" of {smallest:.4g}, most of all at the DOF {dofs[int(np.argmax(motion))].name}"
+        smallest, motion = _smallest_eigenpair(matrix)
+        is_semidefinite = smallest >= -NEGATIVE_STIFFNESS * _largest_eigenvalue(matrix)
+        where = f" of {smallest:.4g}, most of all at the DOF {dofs[int(np.argmax(motion))].name}"
     else:
-        shifted = _shifted(matrix, NEGATIVE_STIFFNESS * _largest(matrix))
-        is_fine, near = matrix.nnz == 0 or is_positive_definite(shifted, _nodes(dofs)), ""
-    if not is_fine:
+        shifted = _shifted(matrix, NEGATIVE_STIFFNESS * _largest_eigenvalue(matrix))
+        is_semidefinite, where = matrix.nnz == 0 or is_positive_definite(shifted, _nodes(dofs)), ""
+    if not is_semidefinite:
         raise FileFormatError(
             path,
-            f"the {what} matrix is indefinite: it has a negative eigenvalue{near}; 0 is allowed, and -1e-10 times the "
+            f"the {what} matrix is indefinite: it has a negative eigenvalue{where}; 0 is allowed, and -1e-10 times the "
             "largest one. Check units and signs of what was exported",
         )
 
 
-def _smallest(matrix: Matrix) -> tuple[float, FloatArray]:
+def _smallest_eigenpair(matrix: Matrix) -> tuple[float, FloatArray]:
     values, vectors = linalg.eigh(matrix.toarray(), subset_by_index=[0, 0])
     return float(values[0]), np.abs(vectors[:, 0])
 
 
-def _largest(matrix: Matrix) -> float:
+def _largest_eigenvalue(matrix: Matrix) -> float:
     if matrix.shape[0] <= DENSE_ORDER:
         last = matrix.shape[0] - 1
         return float(linalg.eigh(matrix.toarray(), eigvals_only=True, subset_by_index=[last, last])[0])
     if matrix.nnz == 0:
         return 0.0
     start = np.ones(matrix.shape[0])
-    start[::2] = -1.0  # neighbours against each other: near the stiffest motion
+    start[::2] = -1.0  # neighbours in opposite directions: close to the stiffest motion
     values = sparse_linalg.eigsh(matrix, 1, which="LA", tol=ESTIMATE_TOLERANCE, v0=start, return_eigenvectors=False)
     return float(values[0])
 
 
-def _shifted(matrix: Matrix, by: float) -> Matrix:
-    return sparse.csr_array(matrix + by * sparse.eye_array(matrix.shape[0]))
+def _shifted(matrix: Matrix, shift: float) -> Matrix:
+    return sparse.csr_array(matrix + shift * sparse.eye_array(matrix.shape[0]))
 
 
 def _nodes(dofs: Sequence[Dof]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

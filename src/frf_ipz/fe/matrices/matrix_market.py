@@ -27,9 +27,9 @@ def read_symmetric(path: Path, order: int, ordered_by: str) -> Matrix:
     path : Path
         The file, in coordinate or array form, general or symmetric.
     order : int
-        Number of rows it must have.
+        Required number of rows.
     ordered_by : str
-        What says so, for messages.
+        File that names the rows, for messages.
 
     Returns
     -------

@@ -14,12 +14,13 @@ class ReduceOptions:
     Parameters
     ----------
     modes : int, optional
-        Eigenmodes to keep, rigid-body modes included; where it is left out those of the band, and what the residual
-        terms need.
+        Eigenmodes of the basis, rigid-body modes included; by default those up to 2.5 times the band, and more where
+        DOFs need them.
     dofs : tuple of str
-        DOFs to retain, as many as modes and residual vectors; chosen well conditioned where it is left out.
+        DOFs to retain, as many as modes and residual vectors; by default chosen so that the modes are well conditioned.
     residual_flexibility : tuple of str, optional
-        DOFs whose residual flexibility joins the basis; the actuators where it is left out.
+        DOFs whose residual flexibility joins the basis; by default the actuators, or the sensors and points where these
+        are fewer, and DOFs with dampers.
     """
 
     __pydantic_config__ = STRICT

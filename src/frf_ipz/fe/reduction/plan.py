@@ -1,4 +1,4 @@
-"""What a reduction is asked for: by the test, and by the options."""
+"""Requirements of a reduction, from the test and from the options."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 
-MOST_DAMPED = 12  # DOFs with dampers: more are damping of the structure, not single dampers
+MAX_DAMPED = 12  # DOFs with dampers: more are damping of the structure, not single dampers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReductionPlan:
-    """What is wanted, and what the user has fixed; all DOFs are unsigned and free in the model.
+    """Required DOFs, and what the user has fixed; all DOFs are unsigned and free in the model.
 
     Parameters
     ----------
-    wanted : tuple of Dof
+    required : tuple of Dof
         Actuators, sensors and points of interest, each once.
     residual : tuple of Dof
         DOFs whose residual flexibility joins the basis.
     residual_is_given : bool
         True where the user named them.
     dofs : tuple of Dof
-        DOFs to retain; empty where they are to be chosen.
+        DOFs to retain; empty where the program chooses them.
     modes : int, optional
-        Modes to keep, where the user says so.
+        Number of modes, where the user gives it.
     """
 
-    wanted: tuple[Dof, ...]
+    required: tuple[Dof, ...]
     residual: tuple[Dof, ...]
     residual_is_given: bool
     dofs: tuple[Dof, ...]
@@ -53,7 +53,7 @@ def plan_reduction(
     sensors: Sequence[Dof],
     points: Sequence[Dof],
 ) -> ReductionPlan:
-    """Bring test and options together, and see that they fit the model and each other.
+    """Combine test and options, and check that they fit the model and each other.
 
     Parameters
     ----------
@@ -67,37 +67,39 @@ def plan_reduction(
     Returns
     -------
     ReductionPlan
-        What is to be done.
+        Required DOFs, residual vectors and modes.
 
     Raises
     ------
     InputError
         If the model lacks a DOF or holds it, one is named twice, or the numbers do not fit.
     """
-    loaded, read = unsigned(actuators), unsigned([*sensors, *points])
-    given = options.residual_flexibility
-    fewer = min((side for side in (loaded, read) if side), key=len, default=())
+    excited, observed = unsigned(actuators), unsigned([*sensors, *points])
+    named = options.residual_flexibility
+    fewer = min((side for side in (excited, observed) if side), key=len, default=())
     plan = ReductionPlan(
-        wanted=unsigned([*actuators, *sensors, *points]),
-        residual=_parsed(given, "residual_flexibility") if given is not None else unsigned([*fewer, *_damped(model)]),
-        residual_is_given=given is not None,
-        dofs=_parsed(options.dofs, "dofs"),
+        required=unsigned([*actuators, *sensors, *points]),
+        residual=_parse_dofs(named, "residual_flexibility")
+        if named is not None
+        else unsigned([*fewer, *_damped_dofs(model)]),
+        residual_is_given=named is not None,
+        dofs=_parse_dofs(options.dofs, "dofs"),
         modes=options.modes,
     )
-    for dof in (*plan.wanted, *plan.residual, *plan.dofs):
+    for dof in (*plan.required, *plan.residual, *plan.dofs):
         model.index(dof)
     _require_counts(plan, model)
     return plan
 
 
-def _damped(model: StructuralModel) -> tuple[Dof, ...]:
-    """DOFs on which dampers act: their forces bend the shapes, and undamped modes alone do not follow."""
-    on = np.flatnonzero(model.damping.diagonal())
-    return tuple(model.dofs[row] for row in on.tolist()) if len(on) <= MOST_DAMPED else ()
+def _damped_dofs(model: StructuralModel) -> tuple[Dof, ...]:
+    """DOFs on which dampers act: their forces bend the shapes in a way that undamped modes alone do not follow."""
+    damped = np.flatnonzero(model.damping.diagonal())
+    return tuple(model.dofs[row] for row in damped.tolist()) if len(damped) <= MAX_DAMPED else ()
 
 
 def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:
-    """Take each DOF once, in the positive direction.
+    """List each DOF once, in the positive direction.
 
     Parameters
     ----------
@@ -112,11 +114,11 @@ def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:
     return tuple(dict.fromkeys(dof.unsigned for dof in dofs))
 
 
-def _parsed(labels: Sequence[str], key: str) -> tuple[Dof, ...]:
+def _parse_dofs(labels: Sequence[str], key: str) -> tuple[Dof, ...]:
     dofs = tuple(parse_dof(label).unsigned for label in labels)
-    for place, dof in enumerate(dofs):
-        if dof in dofs[:place]:
-            raise InputError(f"[reduce] {key} names the DOF {dof.name} twice; each one counts once")
+    for index, dof in enumerate(dofs):
+        if dof in dofs[:index]:
+            raise InputError(f"[reduce] {key} names the DOF {dof.name} twice; name it once")
     return dofs
 
 
@@ -129,10 +131,10 @@ def _require_counts(plan: ReductionPlan, model: StructuralModel) -> None:
     if plan.modes is not None and plan.residual_is_given and len(plan.dofs) != plan.modes + len(plan.residual):
         raise InputError(
             f"[reduce] dofs names {len(plan.dofs)} DOFs, but {plan.modes} modes and {len(plan.residual)} residual "
-            f"vectors need {plan.modes + len(plan.residual)}; change one of the three, or leave dofs out"
+            f"vectors need {plan.modes + len(plan.residual)}; change one of the three, or omit dofs"
         )
     if len(plan.dofs) <= len(plan.residual):
         raise InputError(
-            f"[reduce] dofs names {len(plan.dofs)} DOFs, which leaves no mode beside {len(plan.residual)} residual "
-            "vectors; name more, or leave dofs out"
+            f"[reduce] dofs names {len(plan.dofs)} DOFs: no mode remains beside {len(plan.residual)} residual vectors; "
+            "name more, or omit dofs"
         )

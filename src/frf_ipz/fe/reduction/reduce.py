@@ -1,8 +1,8 @@
 """Reduction of an FE model to a few physical DOFs: eigenmodes and residual flexibility, eq. (2) of [Dorosti2018].
 
-The basis holds the lowest modes, rigid-body modes among them, and the static deflection under unit loads without what
-those modes contribute. A Ritz step makes that deflection mass- and stiffness-orthogonal too, so that the basis carries
-the modes exactly and the reduced matrices are symmetric as they are made.
+The basis holds the lowest modes, rigid-body modes among them, and the static deflection under unit loads without the
+contribution of those modes. A Ritz step makes that deflection mass- and stiffness-orthogonal too, so that the basis
+contains the modes exactly and the reduced matrices are symmetric.
 
 [Dorosti2018] M. Dorosti, R. H. B. Fey, M. F. Heertjes, H. Nijmeijer, Iterative Pole-Zero model updating: A combined
 sensitivity approach, Control Engineering Practice 71, 2018, 164-174, doi:10.1016/j.conengprac.2017.11.002.
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
     from frf_ipz.fe.reduction.options import ReduceOptions
 
-DEFAULT_DAMPING_RATIO = 0.005  # where neither model nor test says anything: a bolted metal structure
+DEFAULT_DAMPING_RATIO = 0.005  # where neither model nor test states one: a bolted metal structure
 BAND_MARGIN = 2.5  # modes up to this times the top of the band: the band's antiresonances are then right to about 0.1 %
-NOTHING_LEFT = 1e-9  # of a DOF's flexibility: a residual vector below adds nothing to the modes
-MAX_EXPANDED = 200_000  # free DOFs up to which the motion of all of them is kept
+NO_FLEXIBILITY = 1e-9  # of a DOF's flexibility: a residual vector below adds nothing to the modes
+MAX_EXPANDED = 200_000  # free DOFs up to which the motion of all of them is stored
 MAX_GROWTH = 2  # times the modes that the band needs: more are not added just to have a row for each sensor
-FEW_DOFS = 24  # up to here they are, even so
-EIGENVALUE_TOLERANCE = 1e-6  # relative, of a mode's eigenvalue after the reduction: far below what a test can see
+FEW_DOFS = 24  # up to which they are added all the same
+EIGENVALUE_TOLERANCE = 1e-6  # relative, of a mode's eigenvalue after the reduction: far below what a test resolves
 
 
 def reduce_model(
@@ -52,20 +52,20 @@ def reduce_model(
 ) -> ReducedModel:
     """Reduce an FE model to physical DOFs.
 
-    What the options leave open is chosen so:
+    Where the options are silent, the program chooses:
 
-    - Modes: those up to 2.5 times the band's top. A residual vector holds what lies above at rest, which is right to
-      (f / f_k)^2 of a neglected mode's share, and zeros feel that most. If actuators, sensors and points are more DOFs
-      than that gives rows, more modes are added, up to twice as many rows or 24.
+    - Modes: those up to 2.5 times the band's top. A residual vector holds the modes above as static flexibility, which
+      is right to (f / f_k)^2 of a neglected mode's share, and zeros are most sensitive to that. If there are more
+      actuators, sensors and points than retained DOFs, modes are added, up to twice as many DOFs or 24.
     - Residual vectors: at the actuators; or at the sensors and points, where these are fewer. By reciprocity both make
       the static part of every FRF between the two sides exact.
     - DOFs: the actuators, sensors and points, and further translations that make the mode matrix well conditioned.
-      What cannot be a row of its own (too many of them, or one a copy of another) is reached through `expansion`,
-      which follows the same modes.
+      DOFs that cannot be retained (too many of them, or one a copy of another) follow through `expansion`, in the
+      same modes.
 
-    The damping matrix is ``M Phi diag(2 zeta omega) Phi^T M`` for modes and residual vectors alike, with the model's
+    The damping matrix is ``M Phi diag(2 zeta omega) Phi^T M`` for modes and residual vectors, with the model's
     ratios by ascending frequency (a residual vector counts as a mode above the others, at its Ritz frequency), and
-    the model's own viscous damping besides.
+    the model's viscous damping.
 
     Parameters
     ----------
@@ -96,13 +96,13 @@ def reduce_model(
     damped = with_default_damping(model, nominal)
     notes = []
     if damped is not model:
-        given = "as the test says" if default_damping_ratio is not None else "as nothing else is said"
-        notes.append(f"damping: {nominal:g} for every mode, {given}")
+        origin = "from the test" if default_damping_ratio is not None else "by default"
+        notes.append(f"damping: {nominal:g} for every mode, {origin}")
     plan = plan_reduction(damped, options, actuators=actuators, sensors=sensors, points=points)
-    basis = _modes(damped, plan, band_hz, notes)
+    basis = _solve_retained_modes(damped, plan, band_hz, notes)
     ritz = _with_residual_vectors(damped, basis, plan, notes)
     rows = _retained_rows(damped, ritz, plan, notes)
-    return _reduced(damped, ritz, rows, plan, tuple(notes))
+    return _reduced_model(damped, ritz, rows, plan, tuple(notes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,69 +116,71 @@ class _Ritz:
     residual: tuple[Dof, ...]
 
 
-def _modes(model: StructuralModel, plan: ReductionPlan, band_hz: tuple[float, float], notes: list[str]) -> ModalBasis:
+def _solve_retained_modes(
+    model: StructuralModel, plan: ReductionPlan, band_hz: tuple[float, float], notes: list[str]
+) -> ModalBasis:
     if plan.modes is not None:
         return solve_basis(model, n_modes=plan.modes)
     order = int(np.count_nonzero(~model.fixed))
     if plan.dofs:
         count = min(len(plan.dofs) - len(plan.residual), order)
-        notes.append(f"modes: {count}, as many as dofs and residual vectors ask for")
+        notes.append(f"modes: {count}, as many as dofs and residual vectors need")
         return solve_basis(model, n_modes=count)
     basis = solve_basis(model, up_to_hz=BAND_MARGIN * band_hz[1])
     in_margin = len(basis.eigenvalues)
     rows = max(in_margin, 1) + len(plan.residual)
     allowed = max(MAX_GROWTH * rows, FEW_DOFS)
-    count = min(max(in_margin, 1, min(len(plan.wanted), allowed) - len(plan.residual)), order)
+    count = min(max(in_margin, 1, min(len(plan.required), allowed) - len(plan.residual)), order)
     notes.append(f"modes: {in_margin} up to {BAND_MARGIN * band_hz[1]:g} Hz, {BAND_MARGIN:g} times the top of the band")
     if count > in_margin:
-        notes.append(f"modes: {count - in_margin} more, so that actuators, sensors and points are rows of their own")
+        notes.append(f"modes: {count - in_margin} more, so that actuators, sensors and points are retained DOFs")
         basis = solve_basis(model, n_modes=count)
     return basis
 
 
 def _with_residual_vectors(model: StructuralModel, basis: ModalBasis, plan: ReductionPlan, notes: list[str]) -> _Ritz:
-    vectors, kept = _residual_vectors(model, basis, plan)
+    vectors, residual_dofs = _residual_vectors(model, basis, plan)
     if not plan.residual_is_given:
-        at = ", ".join(dof.name for dof in kept) or "none, as the modes hold all flexibility"
-        notes.append(f"residual flexibility: {at}")
-    weights = np.zeros(0)
-    if kept:
+        names = ", ".join(dof.name for dof in residual_dofs) or "none, as the modes hold all flexibility"
+        notes.append(f"residual flexibility: {names}")
+    eigenvalues = np.zeros(0)
+    if residual_dofs:
         stiffness, mass = (vectors.T @ multiply(matrix, vectors) for matrix in (basis.stiffness, basis.mass))
-        weights, axes = linalg.eigh(stiffness, mass)
+        eigenvalues, axes = linalg.eigh(stiffness, mass)
         vectors = vectors @ axes
     return _Ritz(
-        eigenvalues=np.concatenate([basis.eigenvalues, weights]),
+        eigenvalues=np.concatenate([basis.eigenvalues, eigenvalues]),
         shapes=np.column_stack([basis.shapes, vectors]),
         n_modes=len(basis.eigenvalues),
         n_rigid=basis.n_rigid,
-        residual=tuple(kept),
+        residual=tuple(residual_dofs),
     )
 
 
 def _residual_vectors(model: StructuralModel, basis: ModalBasis, plan: ReductionPlan) -> tuple[FloatArray, list[Dof]]:
-    """Residual flexibility at DOFs where the modes, and the vectors before, leave some; columns of unit mass."""
+    """Residual flexibility at DOFs where modes and the vectors before do not hold all of it; columns of unit mass."""
     rows = [model.index(dof) for dof in plan.residual]
     loads = np.zeros((len(basis.shapes), len(rows)))
     loads[rows, np.arange(len(rows))] = 1.0
     elastic = slice(basis.n_rigid, None)
     in_modes = np.sum(basis.shapes[rows, elastic] ** 2 / basis.eigenvalues[elastic], 1)
-    most = len(basis.shapes) - len(basis.eigenvalues)
-    deflections = basis.residual_flexibility(loads) if most else np.zeros_like(loads)
+    max_count = len(basis.shapes) - len(basis.eigenvalues)
+    deflections = basis.residual_flexibility(loads) if max_count else np.zeros_like(loads)
     vectors = np.zeros((len(basis.shapes), 0))
-    kept: list[Dof] = []
+    residual_dofs: list[Dof] = []
     for column, (dof, row) in enumerate(zip(plan.residual, rows, strict=True)):
         rest = deflections[:, column] - vectors @ (vectors.T @ multiply(basis.mass, deflections[:, column]))
         size = float(np.sqrt(rest @ multiply(basis.mass, rest)))
-        own = abs(deflections[row, column])
-        is_new = own > NOTHING_LEFT * in_modes[column] and abs(rest[row]) > NOTHING_LEFT * own and len(kept) < most
-        if is_new and size > 0:
-            vectors, kept = np.column_stack([vectors, rest / size]), [*kept, dof]
+        flexibility = abs(deflections[row, column])
+        is_new = flexibility > NO_FLEXIBILITY * in_modes[column] and abs(rest[row]) > NO_FLEXIBILITY * flexibility
+        if is_new and len(residual_dofs) < max_count and size > 0:
+            vectors, residual_dofs = np.column_stack([vectors, rest / size]), [*residual_dofs, dof]
         elif plan.residual_is_given:
             raise InputError(
                 f"[reduce] residual_flexibility: at {dof.name} the modes, and the DOFs named before it, hold all the "
-                "flexibility already; leave it out"
+                "flexibility already; omit it"
             )
-    return vectors, kept
+    return vectors, residual_dofs
 
 
 def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, notes: list[str]) -> IntArray:
@@ -187,7 +189,7 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
         if len(plan.dofs) != count:
             raise InputError(
                 f"[reduce] dofs names {len(plan.dofs)} DOFs, but there are {ritz.n_modes} modes and "
-                f"{len(ritz.residual)} residual vectors; name {count}, or leave dofs out"
+                f"{len(ritz.residual)} residual vectors; name {count}, or omit dofs"
             )
         rows = np.array([model.index(dof) for dof in plan.dofs])
         _require_condition(model, ritz, rows, plan)
@@ -195,43 +197,45 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
         rows = _chosen_rows(model, ritz, plan)
         if condition_number(ritz.shapes[rows]) > MAX_CONDITION:
             raise IllConditionedError(
-                f"{count} modes and residual vectors cannot be told apart at any DOFs of the model '{model.name}'; "
-                "keep fewer ([reduce] modes)"
+                f"{count} modes and residual vectors cannot be distinguished at any DOFs of the model '{model.name}'; "
+                "use fewer ([reduce] modes)"
             )
         notes.append("dofs: " + ", ".join(model.dofs[row].name for row in rows.tolist()))
     retained = {model.dofs[row] for row in rows.tolist()}
-    reached = [dof.name for dof in plan.wanted if dof not in retained]
-    if reached:
-        notes.append(f"dofs: {', '.join(reached)} are no rows of their own, but follow from the others")
+    expanded = [dof.name for dof in plan.required if dof not in retained]
+    if expanded:
+        notes.append(f"dofs: {', '.join(expanded)} are not retained, but follow from the retained ones")
     return rows
 
 
 def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> IntArray:
-    """Choose actuators, sensors, points and translations; rotations only where translations cannot tell modes apart."""
+    """Choose actuators, sensors, points and translations; rotations only where translations do not separate modes."""
     dofs = model.dofs
-    wanted, count = [model.index(dof) for dof in plan.wanted], ritz.shapes.shape[1]
+    required, count = [model.index(dof) for dof in plan.required], ritz.shapes.shape[1]
     translations = np.array([row for row, dof in enumerate(dofs) if not dof.direction.startswith("r")], dtype=np.int64)
     if translations.size >= count:
-        rows = choose_retained_rows(ritz.shapes, wanted, translations, count)
+        rows = choose_retained_rows(ritz.shapes, required, translations, count)
         if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
             return rows
     # rotations have another unit: only the directions of the rows can be compared
     lengths = np.linalg.norm(ritz.shapes, axis=1, keepdims=True)
-    return choose_retained_rows(ritz.shapes / np.where(lengths > 0, lengths, 1.0), wanted, np.arange(len(dofs)), count)
+    return choose_retained_rows(
+        ritz.shapes / np.where(lengths > 0, lengths, 1.0), required, np.arange(len(dofs)), count
+    )
 
 
 def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:
-    found = condition_number(ritz.shapes[rows])
-    if found > MAX_CONDITION:
+    condition = condition_number(ritz.shapes[rows])
+    if condition > MAX_CONDITION:
         better = _chosen_rows(model, ritz, plan)
         names = ", ".join(f'"{model.dofs[row].name}"' for row in better.tolist())
         raise IllConditionedError(
-            f"[reduce] dofs: the modes can hardly be told apart at these DOFs (condition number {found:.2g}, at most "
-            f"{MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.shapes[better]):.2g})"
+            f"[reduce] dofs: the modes can hardly be distinguished at these DOFs (condition number {condition:.2g}, at "
+            f"most {MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.shapes[better]):.2g})"
         )
 
 
-def _reduced(
+def _reduced_model(
     model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan, notes: tuple[str, ...]
 ) -> ReducedModel:
     inverse = linalg.inv(ritz.shapes[rows])
@@ -244,15 +248,15 @@ def _reduced(
     damping = _gram(np.sqrt(rates)[:, None] * inverse) + dashpots
     states_both = np.any(rates) and np.any(viscous)
     dofs = model.dofs
-    shown = np.arange(len(dofs)) if len(dofs) <= MAX_EXPANDED else _rows_asked_for(model, rows, plan, ritz)
-    expansion = np.asarray(ritz.shapes[shown] @ inverse)
+    expanded = np.arange(len(dofs)) if len(dofs) <= MAX_EXPANDED else _required_rows(model, rows, plan, ritz)
+    expansion = np.asarray(ritz.shapes[expanded] @ inverse)
     return ReducedModel(
         mass=mass,
         damping=(damping + damping.T) / 2,
         stiffness=stiffness,
         dofs=tuple(dofs[row] for row in rows.tolist()),
         expansion=expansion,
-        expanded_dofs=tuple(dofs[row] for row in shown.tolist()),
+        expanded_dofs=tuple(dofs[row] for row in expanded.tolist()),
         n_modes=ritz.n_modes,
         residual_dofs=ritz.residual,
         choices=notes,
@@ -260,19 +264,19 @@ def _reduced(
     )
 
 
-def _rows_asked_for(model: StructuralModel, rows: IntArray, plan: ReductionPlan, ritz: _Ritz) -> IntArray:
-    asked = [model.index(dof) for dof in (*plan.wanted, *ritz.residual)]
-    return np.unique(np.concatenate([rows, np.array(asked, dtype=np.int64)]))
+def _required_rows(model: StructuralModel, rows: IntArray, plan: ReductionPlan, ritz: _Ritz) -> IntArray:
+    required = [model.index(dof) for dof in (*plan.required, *ritz.residual)]
+    return np.unique(np.concatenate([rows, np.array(required, dtype=np.int64)]))
 
 
 def _require_modes(mass: FloatArray, stiffness: FloatArray, ritz: _Ritz) -> None:
-    """See that rounding in the reduced matrices has left the modes as they were."""
-    found = linalg.eigh(stiffness, mass, eigvals_only=True)
+    """Check that rounding in the reduced matrices does not change the modes."""
+    eigenvalues = linalg.eigh(stiffness, mass, eigvals_only=True)
     elastic = slice(ritz.n_rigid, ritz.n_modes)
-    wrong = np.abs(found[elastic] / ritz.eigenvalues[elastic] - 1).max(initial=0.0)
-    if wrong > EIGENVALUE_TOLERANCE:
+    error = np.abs(eigenvalues[elastic] / ritz.eigenvalues[elastic] - 1).max(initial=0.0)
+    if error > EIGENVALUE_TOLERANCE:
         raise IllConditionedError(
-            f"rounding in the reduced matrices shifts a mode's omega^2 by {wrong:.1g} of its value; keep fewer modes, "
+            f"rounding in the reduced matrices shifts a mode's omega^2 by {error:.1g} of its value; use fewer modes, "
             "or DOFs that are farther apart ([reduce] modes, dofs)"
         )
 

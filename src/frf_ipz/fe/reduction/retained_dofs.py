@@ -1,4 +1,4 @@
-"""Which DOFs a reduced model is written in: independent ones, by pivoted QR of their mode shapes.
+"""The DOFs that a reduced model retains: independent ones, by pivoted QR of their mode shapes.
 
 [Kammer1991] D. C. Kammer, Sensor placement for on-orbit modal identification and correlation of large space structures,
 Journal of Guidance, Control and Dynamics 14 (2), 1991, 251-259, doi:10.2514/3.20635.
@@ -16,8 +16,8 @@ from frf_ipz.arrays import FloatArray, IntArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-MAX_CONDITION = 1e3  # beyond, the reduced matrices keep fewer than ten of sixteen digits (they hold its square)
-INDEPENDENT = (0.02, 0.1, 0.5, 1.0)  # share of a wanted DOF's shapes that those before must not hold, tried in turn
+MAX_CONDITION = 1e3  # beyond, fewer than ten of sixteen digits of the reduced matrices are right (they hold its square)
+INDEPENDENT = (0.02, 0.1, 0.5, 1.0)  # share of a required DOF's shapes beyond those before it, tried in turn
 
 
 def condition_number(shapes: FloatArray) -> float:
@@ -41,23 +41,23 @@ def condition_number(shapes: FloatArray) -> float:
     return float(np.linalg.cond(shapes / lengths[:, None]))
 
 
-def choose_retained_rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int) -> IntArray:
+def choose_retained_rows(shapes: FloatArray, required: Sequence[int], candidates: IntArray, count: int) -> IntArray:
     """Choose DOFs at which modes are as independent as can be.
 
-    Those wanted come first, in their order, as long as they are independent of each other; the others follow by
+    The required ones come first, in their order, as long as they are independent of each other; further ones follow by
     pivoted QR, which makes the volume that their shapes span large (and so, nearly, the effective independence of
-    [Kammer1991]). If the whole is badly conditioned all the same, fewer of those wanted are taken.
+    [Kammer1991]). If the whole is badly conditioned all the same, fewer of the required ones are retained.
 
     Parameters
     ----------
     shapes : (n, r) array
         Mode shapes and residual vectors at all DOFs.
-    wanted : sequence of int
-        Rows to take if possible.
+    required : sequence of int
+        Rows to retain if possible.
     candidates : (n_candidates,) int array
         Rows to fill up with.
     count : int
-        How many rows to choose; at most r.
+        Number of rows to choose; at most r.
 
     Returns
     -------
@@ -66,16 +66,18 @@ def choose_retained_rows(shapes: FloatArray, wanted: Sequence[int], candidates: 
     """
     rows = np.zeros(0, np.int64)
     for independent in INDEPENDENT:
-        rows = _rows(shapes, wanted, candidates, count, independent)
+        rows = _select_rows(shapes, required, candidates, count, independent)
         if condition_number(shapes[rows]) <= MAX_CONDITION:
             break
     return rows
 
 
-def _rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count: int, independent: float) -> IntArray:
+def _select_rows(
+    shapes: FloatArray, required: Sequence[int], candidates: IntArray, count: int, independent: float
+) -> IntArray:
     chosen: list[int] = []
     spanned = np.zeros((shapes.shape[1], 0))
-    for row in wanted:
+    for row in required:
         shape = shapes[row]
         rest = shape - spanned @ (spanned.T @ shape)
         if len(chosen) < count and np.linalg.norm(rest) > independent * np.linalg.norm(shape):
@@ -83,8 +85,8 @@ def _rows(shapes: FloatArray, wanted: Sequence[int], candidates: IntArray, count
             spanned = np.column_stack([spanned, rest / np.linalg.norm(rest)])
     missing = count - len(chosen)
     if missing:
-        others = np.setdiff1d(candidates, chosen)
-        rest = shapes[others] - (shapes[others] @ spanned) @ spanned.T
+        further = np.setdiff1d(candidates, chosen)
+        rest = shapes[further] - (shapes[further] @ spanned) @ spanned.T
         _, pivots = linalg.qr(rest.T, mode="r", pivoting=True)
-        chosen += [int(row) for row in others[pivots[:missing]]]
+        chosen += [int(row) for row in further[pivots[:missing]]]
     return np.array(chosen, dtype=np.int64)

@@ -189,7 +189,7 @@ class DampingPhase:
         for places, roots in tracked.groups:
             # by each entry of the damping matrix: -s y x^T / slope; every parameter is a sum over entries
             weights = (roots.values / roots.slope)[:, None, None]
-            entries = (weights * roots.left.T[:, :, None] * roots.right.T[:, None, :]).real
+            entries = (weights * roots.left_vectors.T[:, :, None] * roots.right_vectors.T[:, None, :]).real
             by_mode = (entries * own).sum(axis=2) / 2 + (entries * own).sum(axis=1) / 2
             by_coupling = (entries[:, row, column] + entries[:, column, row]) * couplings
             by_chosen = np.tensordot(entries, self.chosen, ([1, 2], [1, 2]))

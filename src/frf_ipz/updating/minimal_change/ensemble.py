@@ -86,7 +86,7 @@ def _draw_stiffness(
     poles = np.flatnonzero(phase.wanted.frf < 0)
     promised = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
     wanted = np.exp(2 * promised[:, poles])
-    shapes = next((roots.right.real for _, roots in result.tracked.groups if len(poles)), None)
+    shapes = next((roots.right_vectors.real for _, roots in result.tracked.groups if len(poles)), None)
     return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, wanted)
 
 

@@ -79,7 +79,7 @@ def modal_frame(mass: FloatArray, stiffness: FloatArray) -> ModalFrame:
         Modes by ascending frequency.
     """
     poles = undamped_poles(mass, stiffness)
-    shapes = poles.right.real
+    shapes = poles.right_vectors.real
     return ModalFrame(eigenvalues=np.maximum(poles.values.real, 0.0), shapes=shapes, inverse=shapes.T @ mass)
 
 
