@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.report.page import write_report
+from hostile_run import HOSTILE, hostile_folder
 from synthetic_run import Folder, many_frfs, synthetic_folder
 
 pytestmark = pytest.mark.browser
@@ -199,4 +200,14 @@ def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
     write_report(Folder(results={"ingest": many_frfs(100, 50_000)}, manifest={"stages": {}}, stale=()), path)
     page = open_page(browser, path)
     assert page.find_element("id", "shown").text == "6 of 100"
+    assert errors(page) == []
+
+
+def test_hostile_names_are_drawn_as_text(browser, tmp_path):
+    path = tmp_path / "hostile.html"
+    write_report(hostile_folder(), path)
+    page = open_page(browser, path)
+    assert page.execute_script("return window.hacked") is None
+    assert page.execute_script("return document.querySelectorAll('img').length") == 0
+    assert HOSTILE in page.find_element("css selector", "h1").text
     assert errors(page) == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,22 +54,6 @@ class Packer:
             self._known[data] = len(self.arrays)
             self.arrays.append(base64.b64encode(data).decode("ascii"))
         return self._known[data]
-
-
-def to_json(value: object) -> str:
-    """Write a packed tree so that it can stand inside a script element.
-
-    Parameters
-    ----------
-    value : object
-        What `Packer.pack` gave.
-
-    Returns
-    -------
-    str
-        JSON without ``</``.
-    """
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  a leaf of such a tree

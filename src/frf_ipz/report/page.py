@@ -6,17 +6,17 @@ a section, or None where there is nothing to show. Adding a section is one file 
 
 from __future__ import annotations
 
-from html import escape
-from importlib.resources import files
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from plotly.offline import get_plotlyjs
 
 from frf_ipz.progress import Progress, silent
 from frf_ipz.report.contents import RunContents, read_contents
-from frf_ipz.report.packing import Packer, to_json
+from frf_ipz.report.html import REPORT, page_environment, read_asset
+from frf_ipz.report.packing import Packer
 from frf_ipz.report.picture import colour_of
-from frf_ipz.report.section import Section, pictures_of, render_section
+from frf_ipz.report.section import Section, pictures_of
 from frf_ipz.report.sections import (
     diagnosis,
     fit,
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from frf_ipz.dofs import Dof
     from frf_ipz.runs.folder import RunFolder
 
 Build: TypeAlias = "Callable[[RunContents], Section | None]"
@@ -100,27 +101,40 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
     str
         HTML.
     """
-    name = str(run.manifest.get("name", "")) or "run"
-    links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
-    body = "\n".join(render_section(section) for section in sections)
-    return "\n".join(
-        [
-            '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{escape(name)} – frf_ipz</title><style>{_asset('page.css')}</style></head><body>",
-            '<a class="skip" href="#overview">Skip to the results</a>',
-            f'<div class="bar"><nav aria-label="Sections">{links}</nav>',
-            f'<div class="tools">{page_tools(run)}</div></div>',
-            f'<header class="head"><h1>{escape(name)}</h1></header><main>{body}</main>',
-            f"<footer>frf_ipz {escape(str(run.manifest.get('frf_ipz', '')))}. Pictures: drag to zoom, double-click to "
-            "go back; with the keyboard: Tab, then arrow keys, + and −, 0; Enter on a name of the legend.</footer>",
-            f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
-            f"<script>{get_plotlyjs()}</script><script>{_asset('page.js')}</script></body></html>",
-        ]
+    template = page_environment().get_template("report/report.html")
+    return template.render(
+        **run_values(run, sections),
+        style=read_asset(REPORT, "page.css"),
+        script=read_asset(REPORT, "page.js"),
+        plotly=get_plotlyjs(),
     )
 
 
-def page_data(run: RunContents, sections: Sequence[Section]) -> str:
+def run_values(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
+    """Give what ``report/run.html`` shows of a run.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    sections : sequence of Section
+        What to show.
+
+    Returns
+    -------
+    dict
+        Values of the template.
+    """
+    return {
+        "title": str(run.manifest.get("name", "")) or "run",
+        "version": str(run.manifest.get("frf_ipz", "")),
+        "chooser": frf_chooser(run),
+        "sections": sections,
+        "page_data": page_data(run, sections),
+    }
+
+
+def page_data(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
     """Give what the page's script draws from.
 
     Parameters
@@ -132,8 +146,8 @@ def page_data(run: RunContents, sections: Sequence[Section]) -> str:
 
     Returns
     -------
-    str
-        JSON that can stand inside a script element.
+    dict
+        What JSON can hold.
     """
     packer = Packer()
     pictures = {
@@ -142,19 +156,39 @@ def page_data(run: RunContents, sections: Sequence[Section]) -> str:
     }
     low, high = run.band_hz
     frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
-    return to_json(
-        {
-            "pictures": pictures,
-            "hiddenFrfs": run.hidden_frfs,
-            "frequencyScale": "log" if low > 0 and high > WIDE * low else "linear",
-            "lowestHz": min([1.0, *frequencies]),
-            "arrays": packer.arrays,
-        }
-    )
+    return {
+        "pictures": pictures,
+        "hiddenFrfs": run.hidden_frfs,
+        "frequencyScale": "log" if low > 0 and high > WIDE * low else "linear",
+        "lowestHz": min([1.0, *frequencies]),
+        "arrays": packer.arrays,
+    }
 
 
-def page_tools(run: RunContents) -> str:
-    """Give the tools of the page's bar: which FRFs are shown, how axes are divided, light or dark, print.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrfBox:
+    """One box of the chooser of FRFs.
+
+    Parameters
+    ----------
+    number : int
+        Which FRF.
+    label : str
+        What it connects, and its quantity.
+    colour : str
+        A name of the themes.
+    is_visible : bool
+        The pictures show it at first.
+    """
+
+    number: int
+    label: str
+    colour: str
+    is_visible: bool
+
+
+def frf_chooser(run: RunContents) -> dict[str, object] | None:
+    """Lay out a matrix of boxes, outputs by inputs: which FRFs the pictures show.
 
     Parameters
     ----------
@@ -163,50 +197,27 @@ def page_tools(run: RunContents) -> str:
 
     Returns
     -------
-    str
-        HTML.
+    dict or None
+        ``inputs``, ``rows`` with ``output`` and ``cells``, ``n_visible`` and ``n_frfs``; None without FRFs.
     """
-    buttons = (
-        '<button id="scale" type="button" title="Frequency axes: linear or logarithmic">Frequency</button>'
-        '<button id="theme" type="button" title="Light or dark">Light / dark</button>'
-        '<button id="print" type="button">Print</button>'
-    )
-    return _chooser(run) + buttons if run.labels else buttons
-
-
-def _chooser(run: RunContents) -> str:
-    """Offer a matrix of boxes, outputs by inputs: which FRFs the pictures show."""
-    rows = dict.fromkeys(label.output_dof for label in run.labels)
-    columns = dict.fromkeys(label.input_dof for label in run.labels)
-    numbers: dict[object, list[int]] = {}
+    if not run.labels:
+        return None
+    boxes: dict[tuple[Dof, Dof], list[FrfBox]] = {}
     for number, label in enumerate(run.labels):
-        numbers.setdefault((label.output_dof, label.input_dof), []).append(number)
-    head = "".join(f'<th scope="col">{escape(str(dof))}</th>' for dof in columns)
-    body = ""
-    for row in rows:
-        cells = "".join(f"<td>{_boxes(run, numbers.get((row, column), []))}</td>" for column in columns)
-        body += f'<tr><th scope="row">{escape(str(row))}</th>{cells}</tr>'
-    n_visible = len(run.labels) - len(run.hidden_frfs)
-    return (
-        f'<details class="chooser"><summary class="button">FRFs: <span id="shown">{n_visible} of {len(run.labels)}'
-        '</span></summary><div><p><button type="button" data-all="1">All</button>'
-        f'<button type="button" data-all="0">None</button></p>'
-        f'<table><thead><tr><th scope="col">output \\ input</th>{head}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div></details>"
-    )
-
-
-def _boxes(run: RunContents, numbers: Sequence[int]) -> str:
-    boxes = ""
-    for number in numbers:
-        checked = "" if number in run.hidden_frfs else " checked"
-        label = escape(f"{run.labels[number]}, {run.labels[number].quantity.value}")
-        boxes += (
-            f'<label title="{label}"><input type="checkbox" value="{number}" aria-label="FRF {label}"{checked}>'
-            f'<span class="swatch" data-colour="{colour_of(number)}"></span></label>'
+        box = FrfBox(
+            number=number,
+            label=f"{label}, {label.quantity.value}",
+            colour=colour_of(number),
+            is_visible=number not in run.hidden_frfs,
         )
-    return boxes
-
-
-def _asset(name: str) -> str:
-    return (files("frf_ipz.report") / "assets" / name).read_text(encoding="utf-8")
+        boxes.setdefault((label.output_dof, label.input_dof), []).append(box)
+    inputs = dict.fromkeys(label.input_dof for label in run.labels)
+    return {
+        "inputs": [str(dof) for dof in inputs],
+        "rows": [
+            {"output": str(output), "cells": [boxes.get((output, dof), []) for dof in inputs]}
+            for output in dict.fromkeys(label.output_dof for label in run.labels)
+        ],
+        "n_visible": len(run.labels) - len(run.hidden_frfs),
+        "n_frfs": len(run.labels),
+    }

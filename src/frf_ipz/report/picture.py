@@ -7,7 +7,7 @@ the dark theme; arrays are packed once for the whole page by `report.packing`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -70,6 +70,8 @@ class Picture:
     is_over_frequency : bool
         Its horizontal axis is a frequency, linked with the others.
     """
+
+    kind: ClassVar[str] = "picture"
 
     name: str
     title: str

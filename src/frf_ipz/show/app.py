@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +15,10 @@ from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainT
 from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
+from frf_ipz.report.html import REPORT, read_asset
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
-from frf_ipz.show.page import render_choices, render_page
+from frf_ipz.show.page import SHOW, render_choices, render_page
 from frf_ipz.show.shapes import draw_shape, mode_shape, operating_shape
 from frf_ipz.show.workbench import Workbench
 from frf_ipz.show.zoom import zoomed_traces
@@ -72,8 +72,8 @@ def _routes(bench: Workbench, *, home: str = "") -> list[Route]:
         Route("/run", _answering(bench, _run), methods=["POST"]),
         Route("/run/{path:path}", _answering(bench, _file)),
         Route("/plotly.js", _fixed(get_plotlyjs(), SCRIPT)),
-        Route("/page.js", _fixed(_asset("report", "page.js"), SCRIPT)),
-        Route("/show.js", _fixed(_asset("show", "show.js"), SCRIPT)),
+        Route("/page.js", _fixed(read_asset(REPORT, "page.js"), SCRIPT)),
+        Route("/show.js", _fixed(read_asset(SHOW, "show.js"), SCRIPT)),
         *_styles(),
     ]
 
@@ -88,8 +88,8 @@ def _routes_of_list(benches: Sequence[Workbench]) -> list[Route]:
 
 def _styles() -> list[Route]:
     return [
-        Route("/page.css", _fixed(_asset("report", "page.css"), STYLE)),
-        Route("/show.css", _fixed(_asset("show", "show.css"), STYLE)),
+        Route("/page.css", _fixed(read_asset(REPORT, "page.css"), STYLE)),
+        Route("/show.css", _fixed(read_asset(SHOW, "show.css"), STYLE)),
     ]
 
 
@@ -185,7 +185,3 @@ def _fixed(text: str, kind: str) -> Callable[[Request], Awaitable[Response]]:
         return Response(text, media_type=kind, headers={"cache-control": "private, max-age=3600"})
 
     return endpoint
-
-
-def _asset(part: str, name: str) -> str:
-    return (files(f"frf_ipz.{part}") / "assets" / name).read_text(encoding="utf-8")

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import json
 import os
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
 from frf_ipz.report.findings import SENTENCES
+from frf_ipz.report.html import page_environment
+from frf_ipz.show.page import SHOW
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.show.workbench import Workbench
-
-HEAD = (
-    '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-    '<meta name="viewport" content="width=device-width, initial-scale=1"><title>Runs – frf_ipz</title>'
-    '<link rel="icon" href="data:,"><link rel="stylesheet" href="page.css"><link rel="stylesheet" href="show.css">'
-    '</head><body><header class="head"><h1>Runs of this campaign</h1></header><main>'
-)
-COLUMNS = ("run", "pipeline", "results", "computed", "what came out")
 
 
 def render_list(benches: Sequence[Workbench]) -> str:
@@ -39,27 +32,20 @@ def render_list(benches: Sequence[Workbench]) -> str:
         HTML; the k-th run is at ``k/``, from 1.
     """
     top = Path(os.path.commonpath([bench.folder for bench in benches]))
-    rows = "".join(_row(number, bench, top) for number, bench in enumerate(benches, start=1))
-    head = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
-    lead = f"In {top}. Open one to look at it and to work on it; one that is not yet computed can be started there."
-    return (
-        f'{HEAD}<p class="lead">{escape(lead)}</p><table id="runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody>'
-        "</table></main></body></html>"
-    )
+    template = page_environment(SHOW).get_template("show/list.html")
+    return template.render(title="Runs", folder=str(top), runs=[_describe(bench, top) for bench in benches])
 
 
-def _row(number: int, bench: Workbench, top: Path) -> str:
+def _describe(bench: Workbench, top: Path) -> dict[str, str]:
     manifest = bench.manifest
-    name = str(manifest.get("name", "")) or _name_in_file(bench)
     when = str(manifest.get("when", ""))[:16].replace("T", " ")
-    computed = f"{when} UTC" if when else "at work" if bench.status.running else "not yet"
-    verdict = _verdict(bench.folder) if manifest else ""
-    cells = [_below(bench.pipeline, top), _below(bench.folder, top), computed, verdict]
-    return (
-        f'<tr><th scope="row"><a href="{number}/">{escape(name)}</a></th>'
-        + "".join(f"<td>{escape(str(cell))}</td>" for cell in cells)
-        + "</tr>"
-    )
+    return {
+        "name": str(manifest.get("name", "")) or _name_in_file(bench),
+        "pipeline": str(_below(bench.pipeline, top)),
+        "folder": str(_below(bench.folder, top)),
+        "computed": f"{when} UTC" if when else "at work" if bench.status.running else "not yet",
+        "verdict": _verdict(bench.folder) if manifest else "",
+    }
 
 
 def _below(path: Path, top: Path) -> Path:

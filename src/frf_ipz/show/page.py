@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from html import escape
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.report.page import SECTIONS, page_data, page_tools
+from frf_ipz.report.html import page_environment
+from frf_ipz.report.page import SECTIONS, run_values
 from frf_ipz.report.picture import Picture
-from frf_ipz.report.section import Markup, Section, render_section
+from frf_ipz.report.section import Section
 from frf_ipz.show.controls import (
-    choices_panel,
+    Choices,
     command_line,
-    dof_controls,
-    pole_controls,
-    record_controls,
-    shape_controls,
+    dof_forms,
+    list_choices,
+    pole_forms,
+    record_list,
+    shape_form,
 )
 from frf_ipz.show.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
 from frf_ipz.show.setup import read_setup
@@ -26,20 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
     from frf_ipz.show.workbench import Workbench
 
-HEAD = (
-    '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-    '<meta name="viewport" content="width=device-width, initial-scale=1"><title>{name} – frf_ipz</title>'
-    '<link rel="icon" href="data:,"><link rel="stylesheet" href="page.css"><link rel="stylesheet" href="show.css">'
-    '</head><body data-stamp="{stamp}"><a class="skip" href="#overview">Skip to the results</a>'
-)
-STATUS = (
-    '<div id="status" role="status" aria-live="polite" hidden><progress id="progress" max="1" value="0"></progress>'
-    '<span id="doing"></span></div><div id="problem" role="alert" hidden><span></span> '
-    '<button type="button" id="read">Close</button></div>'
-)
-SCRIPTS = (
-    '<script src="plotly.js"></script><script src="page.js"></script><script src="show.js"></script></body></html>'
-)
+SHOW = "frf_ipz.show"
 
 
 def render_page(bench: Workbench, *, home: str = "") -> str:
@@ -63,29 +51,20 @@ def render_page(bench: Workbench, *, home: str = "") -> str:
         If a result of the run is damaged.
     """
     stamp = bench.stamp
-    choices, _ = _choices(bench)
+    choices, _ = _read_choices(bench)
     if stamp:
         run = bench.contents()
         sections = page_sections(run, choices)
     else:
         run, setup = read_setup(bench.pipeline, bench.read)
         sections = [setup if choices is None or not setup.blocks else _pickable(setup, run, choices)]
-    name = escape(str(run.manifest.get("name", "")) or "run")
-    links = "".join(f'<a href="#{section.anchor}">{escape(section.title)}</a>' for section in sections)
-    body = "\n".join(render_section(section) for section in sections)
-    back = f'<a href="{home}">All runs</a> ' if home else ""
-    report = ' <a href="run/report.html">The report to send on</a>' if stamp else ""
-    return "\n".join(
-        [
-            HEAD.format(name=name, stamp=escape(stamp)),
-            f'<div class="bar"><nav aria-label="Sections">{links}</nav><div class="tools">{page_tools(run)}</div>',
-            f"{STATUS}</div>",
-            f'<header class="head"><h1>{back}{name}</h1><div id="choices">{render_choices(bench)}</div></header>',
-            f"<main>{body}</main><footer>frf_ipz {escape(str(run.manifest.get('frf_ipz', '')))}, ",
-            f"{escape(str(bench.folder))}.{report}</footer>",
-            f'<script type="application/json" id="page-data">{page_data(run, sections)}</script>',
-            SCRIPTS,
-        ]
+    template = page_environment(SHOW).get_template("show/workbench.html")
+    return template.render(
+        **run_values(run, sections),
+        stamp=stamp,
+        home=home,
+        folder=str(bench.folder),
+        choices=_choices_of(bench),
     )
 
 
@@ -102,10 +81,19 @@ def render_choices(bench: Workbench) -> str:
     str
         HTML.
     """
-    choices, problem = _choices(bench)
-    text = "" if choices is None else bench.text()
-    command = command_line(bench.pipeline, bench.folder)
-    return choices_panel(choices, problem, text, command, is_first=not bench.stamp)
+    return page_environment(SHOW).get_template("show/choices.html").render(choices=_choices_of(bench))
+
+
+def _choices_of(bench: Workbench) -> Choices:
+    file, problem = _read_choices(bench)
+    if file is None:
+        return Choices(problem=problem)
+    return Choices(
+        entries=list_choices(file),
+        command=command_line(bench.pipeline, bench.folder),
+        text=bench.text(),
+        is_first_run=not bench.stamp,
+    )
 
 
 def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Section]:
@@ -140,9 +128,10 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
             with_choices(block, run.fit, choices.fit) if isinstance(block, Picture) and block.name == DIAGRAM else block
             for block in blocks
         ]
-        blocks.insert(1, Markup(html=pole_controls(run.fit)))
+        blocks.insert(1, pole_forms(run.fit))
     if section.anchor == "recordings":
-        blocks.append(Markup(html=record_controls(run, choices)))
+        records = record_list(run, choices)
+        blocks += [] if records is None else [records]
     if section.anchor == "overview" and (run.geometry is not None or run.labels):
         return _pickable(section, run, choices)
     return replace(section, blocks=tuple(blocks))
@@ -157,15 +146,15 @@ def _pickable(section: Section, run: RunContents, choices: PipelineFile) -> Sect
         else block
         for block in section.blocks
     ]
-    return replace(section, blocks=(*blocks, Markup(html=dof_controls(run, choices, retained))))
+    return replace(section, blocks=(*blocks, dof_forms(run, choices, retained)))
 
 
 def _shapes(run: RunContents) -> Section:
     lead = "How the structure moves: what was measured beside the model before and after updating."
-    return Section(anchor="shapes", title="Shapes", lead=lead, blocks=(Markup(html=shape_controls(run)),))
+    return Section(anchor="shapes", title="Shapes", lead=lead, blocks=(shape_form(run),))
 
 
-def _choices(bench: Workbench) -> tuple[PipelineFile | None, str]:
+def _read_choices(bench: Workbench) -> tuple[PipelineFile | None, str]:
     try:
         return bench.choices(), ""
     except InputError as error:

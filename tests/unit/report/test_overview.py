@@ -18,14 +18,15 @@ def run():
     return read_contents(synthetic_folder())
 
 
-def html(run):
-    return build(run).blocks[0].html
+def card(run, title):
+    return next(card for card in build(run).blocks[0].cards if card.title == title)
 
 
 def test_the_error_at_the_point_of_interest_is_that_against_the_frf_kept_aside(run):
     truth = run.reference.values
     figures = [compare_frfs(truth, values).median_db[0] for values in (run.prediction.nominal, run.prediction.values)]
-    assert " → ".join(number(float(figure), 2) for figure in figures) in html(run)
+    text = card(run, "Error at the point of interest").figure
+    assert text == " → ".join(number(float(figure), 2) for figure in figures) + " dB"
 
 
 def test_the_worst_target_is_the_largest_error(run):
@@ -34,7 +35,9 @@ def test_the_worst_target_is_the_largest_error(run):
     by_hand = np.abs(np.abs(run.updated.after) / np.abs(measured) - 1)
     np.testing.assert_allclose(errors, by_hand, rtol=1e-9, atol=1e-15)  # differences of nearly equal numbers
     worst = run.targets()[int(np.argmax(by_hand))]
-    assert f"Worst target after updating</dt><dd>{100 * by_hand.max():.2g} %</dd><dd>{worst.name}" in html(run)
+    target = card(run, "Worst target after updating")
+    assert target.figure == f"{100 * by_hand.max():.2g} %"
+    assert target.meaning.startswith(worst.name)
 
 
 def test_the_verdict_counts_poles_and_zeros(run):
@@ -48,17 +51,20 @@ def test_roots_that_the_model_lacks_are_counted(run):
         replace(row, verdict=Verdict.MISSING_IN_MODEL, computed=-1) if place < 2 else row
         for place, row in enumerate(run.pairs.rows)
     )
-    assert "2 poles and zeros" in html(replace(run, pairs=replace(run.pairs, rows=rows)))
+    figure = card(replace(run, pairs=replace(run.pairs, rows=rows)), "Missing in the model").figure
+    assert figure == "2 poles and zeros"
 
 
 def test_unknown_gains_are_fitted_before_errors_are_stated(run):
     frfs = replace(run.estimate.frfs, values=3.0 * run.estimate.frfs.values, unknown_scale="per_channel")
     scaled = replace(run, estimate=replace(run.estimate, frfs=frfs), prediction=None)
     exact = replace(run, prediction=None)
-    figure = html(exact).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
-    refit = html(scaled).split("Error at the measured points</dt><dd>")[1].split("→")[1].split(" dB")[0]
+    figure, refit = (
+        card(contents, "Error at the measured points").figure.split("→")[1].split(" dB")[0]
+        for contents in (exact, scaled)
+    )
     assert float(refit) <= 1.5 * float(figure)
-    assert "unknown gains are fitted" in html(scaled)
+    assert "unknown gains are fitted" in card(scaled, "Error at the measured points").meaning
 
 
 def test_a_worst_target_that_came_no_closer_stands_apart_from_the_others(run):

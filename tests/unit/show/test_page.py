@@ -9,10 +9,11 @@ from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.report.contents import read_contents
-from frf_ipz.report.section import pictures_of, render_section
-from frf_ipz.show.controls import choices_panel
+from frf_ipz.report.html import page_environment
+from frf_ipz.report.section import pictures_of
+from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.marks import with_choices, with_retained
-from frf_ipz.show.page import page_sections
+from frf_ipz.show.page import SHOW, page_sections
 from synthetic_run import synthetic_folder
 
 OF_MODEL = ("model", "reduce", "pair", "update", "predict", "export", "reference")
@@ -36,11 +37,14 @@ def run():
 
 
 def html_of(run, choices=CHOICES):
-    return "\n".join(render_section(section) for section in page_sections(run, choices))
+    macros = page_environment(SHOW).get_template("report/macros.html").module
+    return "\n".join(macros.section(section) for section in page_sections(run, choices))
 
 
 def test_all_that_is_chosen_is_listed_with_a_button_each():
-    panel = choices_panel(CHOICES, "", "", "")
+    panel = (
+        page_environment(SHOW).get_template("show/choices.html").render(choices=Choices(entries=list_choices(CHOICES)))
+    )
     for text in (
         "5 to 500 Hz",
         "pinned at 20 Hz ",

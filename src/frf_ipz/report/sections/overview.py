@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +10,7 @@ from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, verdict_of
 from frf_ipz.report.reference import measured_at
-from frf_ipz.report.section import Markup, Section
+from frf_ipz.report.section import Card, Headline, Section
 from frf_ipz.report.structure_drawing import Marks, draw_structure
 from frf_ipz.report.wording import counted, listed, number, percent, small_percent
 
@@ -24,15 +22,6 @@ if TYPE_CHECKING:
     from frf_ipz.report.contents import RunContents
 
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """One number with its name and what it means."""
-
-    title: str
-    figure: str
-    meaning: str
 
 
 def build(run: RunContents) -> Section:
@@ -48,17 +37,8 @@ def build(run: RunContents) -> Section:
     Section
         The section.
     """
-    cards = _cards(run)
-    items = "".join(
-        f'<div class="card"><dt>{escape(card.title)}</dt><dd>{escape(card.figure)}</dd>'
-        f"<dd>{escape(card.meaning)}</dd></div>"
-        for card in cards
-    )
     sentence, addition = verdict(run)
-    text = f'<p class="verdict">{escape(sentence)}</p>' + (
-        f'<p class="lead">{escape(addition)}</p>' if addition else ""
-    )
-    head = Markup(html=f'{text}<dl class="cards">{items}</dl>')
+    headline = Headline(sentence=sentence, addition=addition, cards=tuple(_cards(run)))
     frfs = run.frfs
     marks = Marks(
         sensors=() if frfs is None else frfs.output_dofs,
@@ -76,7 +56,7 @@ def build(run: RunContents) -> Section:
         anchor="overview",
         title="Overview",
         lead="",
-        blocks=(head, *([] if drawing is None else [drawing])),
+        blocks=(headline, *([] if drawing is None else [drawing])),
         notes=notes,
     )
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from html import escape
 from typing import TYPE_CHECKING
 
-from frf_ipz.report.section import Markup, Section, Table
+from frf_ipz.report.section import Listing, Section, Table
 from frf_ipz.report.wording import number
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def build(run: RunContents) -> Section:
             rows=[[name, digest[:SHOWN_DIGITS] + "…"] for name, digest in manifest.get("inputs", {}).items()],
             file="run.json",
         ),
-        Markup(html=f"<details><summary>All options, as resolved</summary><pre>{escape(options)}</pre></details>"),
+        Listing(title="All options, as resolved", text=options),
     )
     return Section(anchor="provenance", title="Provenance", lead=lead, blocks=blocks)
 
