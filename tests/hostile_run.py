@@ -102,9 +102,9 @@ def _diagnosis(diagnosis):
             replace(check, name=hostile(check.name), statement=hostile(check.statement))
             for check in diagnosis.data_checks
         ),
-        held=HOSTILE,
+        held_out_kind=HOSTILE,
         detectability={HOSTILE: {HOSTILE: 1.0}},
         statement=HOSTILE,
         warnings=(HOSTILE,),
-        at_work=law,
+        law_in_time=law,
     )
