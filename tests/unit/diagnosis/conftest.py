@@ -54,14 +54,14 @@ def chain(chain_like):
 
 
 def pulse(time_s, peak_n):
-    """Smooth blow, without anything above the sampling rate's half."""
+    """Smooth impact, without anything above the sampling rate's half."""
     part = np.clip((time_s - PULSE_START_S) / PULSE_S, 0, 1)
     return peak_n * np.sin(np.pi * part) ** 4
 
 
 @pytest.fixture(scope="session")
 def strike(chain):
-    """Strikes node 1 at several levels, with a force at places: law(w, v) times a vector of DOF."""
+    """Strikes node 1 at several levels, with a force at locations: law(w, v) times a vector of DOF."""
 
     @cache
     def run(law=None, where=(0, 0, 1, 0), seed=1):
@@ -79,11 +79,11 @@ def strike(chain):
                     force = force - where * law(where @ x, where @ v)
                 return np.concatenate([v, (force - chain.K @ x - chain.C @ v) / MASS_KG])
 
-            found = solve_ivp(
+            solution = solve_ivp(
                 derivative, (0, time[-1]), np.zeros(2 * N), t_eval=time, rtol=INTEGRATION, atol=1e-14, max_step=2e-3
             )
             accelerations.append(
-                np.array([derivative(t, y)[N:] for t, y in zip(time, found.y.T, strict=True)])[:, [1, 3]].T
+                np.array([derivative(t, y)[N:] for t, y in zip(time, solution.y.T, strict=True)])[:, [1, 3]].T
             )
         largest = np.abs(accelerations).max()
         sensors = tuple(
@@ -92,15 +92,15 @@ def strike(chain):
         )
         records = tuple(
             ObservedRecord(
-                name=f"blow {peak:g} N",
+                name=f"impact {peak:g} N",
                 input_channel="force",
                 input_dof=parse_dof("1:+x"),
                 sensors=sensors,
                 step_s=1 / RATE_HZ,
                 force=pulse(time, peak) + NOISE * peak * rng.standard_normal(N_SAMPLES),
-                responses=shown + NOISE * largest * rng.standard_normal(shown.shape),
+                responses=acceleration + NOISE * largest * rng.standard_normal(acceleration.shape),
             )
-            for peak, shown in zip(LEVELS_N, accelerations, strict=True)
+            for peak, acceleration in zip(LEVELS_N, accelerations, strict=True)
         )
         return Observations(kind="hammer", records=records, band_hz=BAND_HZ)
 
@@ -110,7 +110,7 @@ def strike(chain):
 @pytest.fixture(scope="session")
 def random_records():
     def make(observations, loud_s):
-        """Turn blows into records of a shaker from rest, thirty times as strong about a time."""
+        """Turn impacts into records of a shaker from rest, thirty times as strong about a time."""
         records = []
         for seed, record in enumerate(observations.records[:2]):
             time = record.step_s * np.arange(record.n_samples)

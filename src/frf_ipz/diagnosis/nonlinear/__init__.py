@@ -1,1 +1,1 @@
-"""What is not linear: the gate that sees it, the law and its place, and the model that has it."""
+"""Nonlinear laws: the test of linearity, the search for a law and its location, and the simulation with it."""

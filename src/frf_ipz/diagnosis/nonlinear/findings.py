@@ -1,4 +1,4 @@
-"""Laws at their places as findings: their evidence, their numbers with intervals, and where else each may sit."""
+"""Laws at their locations as findings: evidence, parameters with intervals, and the location set."""
 
 from __future__ import annotations
 
@@ -10,56 +10,56 @@ from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel
+    from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
+    from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel
 
-LOG_RANGE = np.log(1e6)  # of a law's numbers: uniform over six decades each
+LOG_RANGE = np.log(1e6)  # of a law's parameters: uniform over six decades each
 NORMAL_95 = 1.96
-WIDER = 2.0  # times the standard deviation of the fit: neighbouring lines share the model's errors
-TOLD = 3.0  # standard deviations from zero: laws that were there had 9 and more, two that explained without being 2
-MOST_PLACES = 12
-LISTED = 0.95
+STD_INFLATION = 2.0  # of the fit's standard deviations: neighbouring lines share the model's errors
+MIN_STDS = 3.0  # from zero: laws that were there had 9 and more, two that explained without being there had 2
+MAX_LOCATIONS = 12
+COVERAGE = 0.95
 
 
-def gain_of(fit: LawFit, drop: float, n_places: int, scale: float) -> float:
-    """Take off from a drop of the cost what the freedom of the law is worth.
+def log_evidence_gain(fit: LawFit, drop: float, n_locations: int, scale: float) -> float:
+    """Subtract the Occam factor of a law from the drop of the cost.
 
     Parameters
     ----------
     fit : LawFit
-        A law at its place.
+        A law at its location.
     drop : float
-        Half the drop of the cost against the linear model, nats.
-    n_places : int
-        At which it might sit.
+        Half the drop of the cost against the linear model.
+    n_locations : int
+        At which it might act.
     scale : float
         Expected mean square of the misfit.
 
     Returns
     -------
     float
-        Evidence, nats.
+        Log evidence over that of the linear model.
     """
-    gain = drop - np.log(n_places)
+    gain = drop - np.log(n_locations)
     for value, variance in fit.numbers.values():
         spread = min(np.sqrt(max(variance, 1e-300) * scale) / max(abs(value), 1e-300), LOG_RANGE)
         gain += np.log(np.sqrt(2 * np.pi) * max(spread, 1e-12) / LOG_RANGE)
     return float(gain)
 
 
-def findings_of(
+def make_findings(
     modal_model: ModalModel, fits: list[LawFit], gains: FloatArray, probability: FloatArray, scale: float
 ) -> tuple[Finding, ...]:
-    """Make one finding of each law, at its best place.
+    """Make one finding of each law, at its best location.
 
     Parameters
     ----------
     modal_model : ModalModel
         The structure.
     fits : list of LawFit
-        Laws at places.
+        Laws at locations.
     gains, probability : (n_fits,) array
-        Evidence of each, nats, and how probable it is among them.
+        Log evidence of each over the linear model, and its probability among them.
     scale : float
         Expected mean square of the misfit.
 
@@ -69,51 +69,50 @@ def findings_of(
         The most probable first.
     """
     order = np.argsort(-gains)
-    found: dict[str, Finding] = {}
+    findings: dict[str, Finding] = {}
     for index in order:
-        fit, place = fits[index], modal_model.places[fits[index].place]
-        if fit.law.name in found:
+        fit, location = fits[index], modal_model.locations[fits[index].location]
+        if fit.law.name in findings:
             continue
-        mine = [i for i in order if fits[i].law is fit.law]
-        share = np.cumsum(probability[mine]) / max(probability[mine].sum(), 1e-300)
-        listed = mine[: min(int(np.searchsorted(share, LISTED)) + 1, MOST_PLACES)]
-        numbers = _numbers(fit, scale)
-        places = tuple(dict(modal_model.places[fits[i].place].location) for i in listed)
-        what = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
-        says = f"At {place.words} sits {what} that the model lacks."
-        found[fit.law.name] = Finding(
+        of_law = [i for i in order if fits[i].law is fit.law]
+        share = np.cumsum(probability[of_law]) / max(probability[of_law].sum(), 1e-300)
+        covering = of_law[: min(int(np.searchsorted(share, COVERAGE)) + 1, MAX_LOCATIONS)]
+        location_set = tuple(dict(modal_model.locations[fits[i].location].entry) for i in covering)
+        phrase = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
+        statement = f"At {location.words} sits {phrase} that the model lacks."
+        findings[fit.law.name] = Finding(
             effect=fit.law.name,
-            location=dict(place.location),
-            parameters=numbers,
-            probability=float(probability[mine].sum()),
+            location=dict(location.entry),
+            parameters=_estimate_parameters(fit, scale),
+            probability=float(probability[of_law].sum()),
             log_evidence_gain=float(gains[index]),
-            statement=says + describe_location_set(places),
-            location_set=places,
+            statement=statement + describe_location_set(location_set),
+            location_set=location_set,
         )
-    return tuple(found.values())
+    return tuple(findings.values())
 
 
-def is_told(fit: LawFit, scale: float) -> bool:
-    """Say whether recordings determine any number of a law: if none, a force that is hardly there is no explanation.
+def is_determined(fit: LawFit, scale: float) -> bool:
+    """Tell whether records determine any parameter of a law: if none, the law explains nothing.
 
     Parameters
     ----------
     fit : LawFit
-        A law at its place.
+        A law at its location.
     scale : float
         Expected mean square of the misfit.
 
     Returns
     -------
     bool
-        Not so where all numbers may as well be zero.
+        False where all parameters may as well be zero.
     """
-    return any(abs(number.value) > TOLD * number.std for number in _numbers(fit, scale).values())
+    return any(abs(estimate.value) > MIN_STDS * estimate.std for estimate in _estimate_parameters(fit, scale).values())
 
 
-def _numbers(fit: LawFit, scale: float) -> dict[str, Estimate]:
-    found = {}
+def _estimate_parameters(fit: LawFit, scale: float) -> dict[str, Estimate]:
+    estimates = {}
     for name, (value, variance) in fit.numbers.items():
-        std = WIDER * float(np.sqrt(max(variance, 0.0) * scale))
-        found[name] = Estimate(value=value, std=std, low=value - NORMAL_95 * std, high=value + NORMAL_95 * std)
-    return found
+        std = STD_INFLATION * float(np.sqrt(max(variance, 0.0) * scale))
+        estimates[name] = Estimate(value=value, std=std, low=value - NORMAL_95 * std, high=value + NORMAL_95 * std)
+    return estimates

@@ -1,4 +1,4 @@
-"""A law at its place in time: its force, and what a blow would have shown without it."""
+"""A law at its location in time: its force, and the response to a record with and without it."""
 
 from __future__ import annotations
 
@@ -7,44 +7,43 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.recorded.segments import starts_at_rest
+from frf_ipz.diagnosis.nonlinear.segments import starts_at_rest
 from frf_ipz.diagnosis.nonlinear.simulate import simulate
 from frf_ipz.diagnosis.result import LawInTime
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
-    from frf_ipz.diagnosis.nonlinear.fitting.fitted_segments import FittedSegments
-    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
+    from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
+    from frf_ipz.diagnosis.nonlinear.fitting.problem import LawFitData, LawFitProblem
     from frf_ipz.diagnosis.observations import ObservedRecord
 
 
-def show_law(recordings: FittedSegments, track: LawFitProgress, fit: LawFit) -> LawInTime:
-    """Show a law at work.
+def simulate_law_in_time(data: LawFitData, problem: LawFitProblem, fit: LawFit) -> LawInTime:
+    """Simulate a law for a figure.
 
     Parameters
     ----------
-    recordings : FittedSegments
-        What it was fitted to, and what was held out.
-    track : LawFitProgress
-        The stretches that it was fitted to.
+    data : LawFitData
+        Records that it was fitted to, and those held out.
+    problem : LawFitProblem
+        The segments that it was fitted to.
     fit : LawFit
-        The law at its place.
+        The law at its location.
 
     Returns
     -------
     LawInTime
-        With the response to the strongest blow that was held out, or else to the strongest of all, from rest.
+        With the response to the strongest record from rest that was held out, or else to the strongest of all.
     """
-    most = int(np.argmax(np.abs(fit.motion).max(1)))
-    motion, velocity = fit.motion[most], fit.velocity[most]
+    largest = int(np.argmax(np.abs(fit.motion).max(1)))
+    motion, velocity = fit.motion[largest], fit.velocity[largest]
     force = fit.strength * fit.law.unit_force(motion, velocity, fit.shape)
     law = LawInTime(motion_m=motion, velocity_m_s=velocity, force_N=force)
-    is_hammer = recordings.training.kind == "hammer"
-    for source in (recordings.held_out, recordings.training):
-        resting = [record for record in source.records if _is_from_rest(record, is_hammer=is_hammer)]
-        if resting:
-            record = max(resting, key=lambda one: one.level)
-            return _with_response(law, recordings, track, fit, record, is_held_out=source is recordings.held_out)
+    is_hammer = data.training.kind == "hammer"
+    for observations in (data.held_out, data.training):
+        from_rest = [record for record in observations.records if _is_from_rest(record, is_hammer=is_hammer)]
+        if from_rest:
+            record = max(from_rest, key=lambda candidate: candidate.level)
+            return _with_response(law, data, problem, fit, record, is_held_out=observations is data.held_out)
     return law
 
 
@@ -54,18 +53,18 @@ def _is_from_rest(record: ObservedRecord, *, is_hammer: bool) -> bool:
 
 def _with_response(
     law: LawInTime,
-    recordings: FittedSegments,
-    track: LawFitProgress,
+    data: LawFitData,
+    problem: LawFitProblem,
     fit: LawFit,
     record: ObservedRecord,
     *,
     is_held_out: bool,
 ) -> LawInTime:
-    nuisance_prior, unknowns = track.linear.nuisance_prior.without_starts(fit.unknowns)
-    alone = replace(recordings.training, records=(record,))
-    shown = simulate(alone, nuisance_prior, replace(fit, unknowns=unknowns), duration_s=track.duration_s)
-    sizes = np.maximum(np.linalg.norm(shown.measured[0], axis=1), np.finfo(float).tiny)
-    row = int(np.argmax(np.linalg.norm(shown.simulated[0] - shown.without[0], axis=1) / sizes))
+    nuisance_prior, nuisance = problem.linear.nuisance_prior.without_initial_states(fit.nuisance)
+    alone = replace(data.training, records=(record,))
+    simulation = simulate(alone, nuisance_prior, replace(fit, nuisance=nuisance), duration_s=problem.duration_s)
+    sizes = np.maximum(np.linalg.norm(simulation.measured[0], axis=1), np.finfo(float).tiny)
+    row = int(np.argmax(np.linalg.norm(simulation.simulated[0] - simulation.without[0], axis=1) / sizes))
     sensor = nuisance_prior.modal_model.sensors[row]
     return replace(
         law,
@@ -74,8 +73,8 @@ def _with_response(
         channel=sensor.channel,
         response=sensor.quantity.response,
         unit=sensor.quantity.response_unit(sensor.dof.direction),
-        time_s=np.asarray(shown.step_s * np.arange(shown.measured.shape[-1]), float),
-        measured=shown.measured[0, row],
-        without=shown.without[0, row],
-        simulated=shown.simulated[0, row],
+        time_s=np.asarray(simulation.step_s * np.arange(simulation.measured.shape[-1]), float),
+        measured=simulation.measured[0, row],
+        without=simulation.without[0, row],
+        simulated=simulation.simulated[0, row],
     )

@@ -1,10 +1,10 @@
-"""Does one linear system explain all blows of all levels? Asked of the recordings alone, without any model.
+"""Test of linearity: does one linear system explain the records of all levels? No model is needed.
 
-Blows of a hammer start at rest: damped by exp(-sigma t) until nothing is left at their end, the responses over the
-forces must agree line by line. A shaker may have been running before: within a few neighbouring lines every linear
-system is a quotient of two short polynomials, the same for all records, and what a record starts and ends with is
-another one over the same denominator, of each record its own (the local rational method of [McKelveyGuerin2012]). What
-is left is compared with the noise of the channels and with a small part of the response.
+Impacts start at rest: damped by exp(-sigma t) until nothing is left at their end, the responses over the forces must
+agree line by line. With a shaker the structure may move before the record: within a few neighbouring lines every linear
+system is a quotient of two short polynomials, the same for all records, and the transient of a record is another one
+over the same denominator, different in each record (the local rational method of [McKelveyGuerin2012]). The misfit is
+compared with the noise of the channels and with a small part of the response.
 
 [McKelveyGuerin2012] T. McKelvey and G. Guerin, Non-parametric frequency response estimation using a local rational
 model, IFAC Proceedings 45(16), 2012, doi:10.3182/20120711-3-BE-2027.00299.
@@ -20,39 +20,39 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, isolate_pulse, missing_ringing
 from frf_ipz.diagnosis.measured.group_spectra import group_records
-from frf_ipz.diagnosis.nonlinear.recorded.noise import ChannelNoise, read_noise
+from frf_ipz.diagnosis.nonlinear.channel_noise import ChannelNoise, read_noise
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
-WIDTH = 24  # lines that are looked at together
+WIDTH = 24  # lines that are fitted together
 DEGREES = (0, 2), (2, 2), (3, 3)  # of the local polynomials: of the poles; of the zeros and of transients
 ROUNDS = 4  # of weights
-DECAYS = 8.0  # sigma times the record of a hammer's blow: its end counts for 3e-4
-BEFORE = 2  # samples before the pulse
-END = 10  # a record's part at its end that tells how much is left for the next blow in the same recording
-UNEXPLAINED = 0.003  # of the response: what the local quotient, sampling and positions of blows may miss
-LEAST_RECORDS = 2
+WINDOW_DECAYS = 8.0  # sigma times the record of an impact: its end counts for 3e-4
+LEAD = 2  # samples before the pulse
+END = 10  # part of a record at its end that shows the residual motion for the next impact in the same recording
+MODEL_ERROR = 0.003  # of the response: misfit by the local quotient, sampling and positions of impacts
+MIN_RECORDS = 2
 CUT = 1e-12  # of the largest singular value of the local polynomials
-REACH = 2.0  # lines: so far a tone is seen beside its own
+LEAKAGE = 2.0  # lines beside its own on which a tone shows
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linearity:
-    """How far recordings of different levels disagree with any linear system.
+    """How far records of different levels disagree with any linear system.
 
     Parameters
     ----------
     score : float
-        Largest misfit of all groups of lines over what noise explains; about 1 or less for a linear system.
+        Largest misfit of all groups of lines over the one expected by noise; about 1 or less for a linear system.
     limit : float
-        Above it, the system is not linear, or was not the same in all blows.
+        Above it, the system is not linear, or changed between the records.
     frequency_hz : (n_groups,) array
-        Middle of the groups of lines, of all struck places in turn.
+        Middle of the groups of lines, of all excited points in turn.
     misfit : (n_groups, n_sensors) array
-        Over what noise explains.
+        Over the one expected by noise.
     """
 
     score: float
@@ -62,25 +62,25 @@ class Linearity:
 
     @property
     def is_nonlinear(self) -> bool:
-        """No linear system explains the recordings."""
+        """No linear system explains the records."""
         return self.score > self.limit
 
 
 def assess_linearity(observations: Observations) -> Linearity:
-    """Compare all blows or records at each place with the best linear system.
+    """Compare all records of each excited point with the best linear system.
 
     Parameters
     ----------
     observations : Observations
-        Blows or records; places with a single one say nothing.
+        Records of a hammer or a shaker; excited points with a single one do not count.
 
     Returns
     -------
     Linearity
-        The verdict and where in the band it comes from.
+        The score and where in the band it comes from.
     """
     noise = read_noise(observations)
-    parts = [_at_place(observations, records, noise) for records in group_records(observations)]
+    parts = [_assess_group(observations, records, noise) for records in group_records(observations)]
     frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
     return Linearity(
         score=float(misfit.max(initial=0.0)),
@@ -90,47 +90,52 @@ def assess_linearity(observations: Observations) -> Linearity:
     )
 
 
-def _at_place(
+def _assess_group(
     observations: Observations, records: tuple[ObservedRecord, ...], noise: ChannelNoise
 ) -> tuple[FloatArray, FloatArray]:
     """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
     n, step = min(record.n_samples for record in records), records[0].step_s
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
-    looked_at = observations.mask_band(frequency, REACH / (n * step)) & (len(records) >= LEAST_RECORDS)
-    used, n_groups = _groups(np.flatnonzero(looked_at))
+    included = observations.mask_band(frequency, LEAKAGE / (n * step)) & (len(records) >= MIN_RECORDS)
+    used, n_groups = _group_lines(np.flatnonzero(included))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
     if not n_groups:
         return middle, misfit
-    sigma = DECAYS / (n * step) if noise.is_hammer else 0.0
-    lines = [_lines(record, noise, n, sigma)[:, used] for record in records]
-    length = (1 - np.exp(-2 * DECAYS)) / (2 * sigma) if sigma else n * step
-    lacking = np.array(
-        [_lacking(record) if noise.is_hammer else np.zeros(1 + len(record.responses)) for record in records]
+    sigma = WINDOW_DECAYS / (n * step) if noise.is_hammer else 0.0
+    lines = [_transform(record, noise, n, sigma)[:, used] for record in records]
+    length = (1 - np.exp(-2 * WINDOW_DECAYS)) / (2 * sigma) if sigma else n * step
+    missing = np.array(
+        [
+            _missing_ringing_energy(record) if noise.is_hammer else np.zeros(1 + len(record.responses))
+            for record in records
+        ]
     )
-    of_force = noise.force_energy(frequency[used], n * step) + lacking[:, :1]
+    of_force = noise.force_energy(frequency[used], n * step) + missing[:, :1]
     for row, sensor in enumerate(records[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
-        of_response = noise.response_energy(column, frequency[used], length) + lacking[:, [1 + row]]
-        of_response = of_response + _left_over(records, row, frequency[used], sigma)
+        of_response = noise.response_energy(column, frequency[used], length) + missing[:, [1 + row]]
+        of_response = of_response + _residual_motion_energy(records, row, frequency[used], sigma)
         energies = np.array([of_force, of_response])
         for group in range(n_groups):
-            here = slice(group * WIDTH, (group + 1) * WIDTH)
-            force, motion = (np.array([line[i, here] for line in lines]) for i in (0, 1 + row))
-            left = _apart if noise.is_hammer else _left
-            misfit[group, column] = left(force, motion, energies[..., here])
+            part = slice(group * WIDTH, (group + 1) * WIDTH)
+            force, motion = (np.array([line[i, part] for line in lines]) for i in (0, 1 + row))
+            relative_misfit = _frf_misfit if noise.is_hammer else _quotient_misfit
+            misfit[group, column] = relative_misfit(force, motion, energies[..., part])
     return middle, misfit
 
 
-def _lacking(record: ObservedRecord) -> FloatArray:
-    """Energy, of the force and of each response, of the ringing that a record lacks at its beginning."""
+def _missing_ringing_energy(record: ObservedRecord) -> FloatArray:
+    """Energy, of the force and of each response, of the filter ringing that is missing at the start of a record."""
     return MISSING_SAMPLES * (record.step_s * missing_ringing(isolate_pulse(record), record.responses)) ** 2
 
 
-def _left_over(records: tuple[ObservedRecord, ...], row: int, frequency_hz: FloatArray, sigma: float) -> FloatArray:
-    """Energy of the motion that is left where the next blow of a recording falls, (n_blows, n_lines).
+def _residual_motion_energy(
+    records: tuple[ObservedRecord, ...], row: int, frequency_hz: FloatArray, sigma: float
+) -> FloatArray:
+    """Energy of the residual motion at the next impact of a recording, (n_records, n_lines).
 
-    What is taken off of it leaves as much where a mode is not known well. Its size is read at the ends of the records.
+    Where a mode is not known well, as much remains after its removal. Its size is read at the ends of the records.
     """
     ends = [record.responses[row, -max(record.n_samples // END, 1) :] for record in records]
     largest = 2 * max(float(np.mean(end**2)) for end in ends)
@@ -138,18 +143,18 @@ def _left_over(records: tuple[ObservedRecord, ...], row: int, frequency_hz: Floa
     return np.array([energy if record.has_predecessor and sigma else np.zeros_like(energy) for record in records])
 
 
-def _groups(used: IntArray) -> tuple[IntArray, int]:
-    """Keep lines that make whole groups of neighbours, and count the groups."""
+def _group_lines(used: IntArray) -> tuple[IntArray, int]:
+    """Select lines that make whole groups of neighbours, and count the groups."""
     runs = np.split(used, np.flatnonzero(np.diff(used) > 1) + 1)
-    kept = np.concatenate([run[: len(run) // WIDTH * WIDTH] for run in runs])
-    return kept, len(kept) // WIDTH
+    grouped = np.concatenate([run[: len(run) // WIDTH * WIDTH] for run in runs])
+    return grouped, len(grouped) // WIDTH
 
 
-def _lines(record: ObservedRecord, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:
-    """Transform force and responses, a blow's from its pulse on."""
+def _transform(record: ObservedRecord, noise: ChannelNoise, n: int, sigma: float) -> ComplexArray:
+    """Transform force and responses, those of an impact from its pulse on."""
     signals = np.vstack([noise.force_of(record), record.responses])[:, :n]
     if sigma:
-        start = max(int(np.argmax(np.abs(signals[0]) > 0)) - BEFORE, 0)
+        start = max(int(np.argmax(np.abs(signals[0]) > 0)) - LEAD, 0)
         signals = np.hstack([signals[:, start:], np.zeros((len(signals), start))])
     return (
         np.asarray(np.fft.rfft(signals * np.exp(-sigma * record.step_s * np.arange(signals.shape[1])))) * record.step_s
@@ -157,27 +162,29 @@ def _lines(record: ObservedRecord, noise: ChannelNoise, n: int, sigma: float) ->
 
 
 def _variance(motion: ComplexArray, frf: ComplexArray, energies: FloatArray) -> FloatArray:
-    return np.asarray(energies[1] + np.abs(frf) ** 2 * energies[0] + (UNEXPLAINED * np.abs(motion)) ** 2)
+    return np.asarray(energies[1] + np.abs(frf) ** 2 * energies[0] + (MODEL_ERROR * np.abs(motion)) ** 2)
 
 
-def _apart(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
-    """Misfit of one FRF for all blows over its expectation; force and motion are (n_blows, WIDTH)."""
+def _frf_misfit(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+    """Misfit of one FRF for all records over the expected one; force and motion are (n_records, WIDTH)."""
     frf = np.sum(motion * force.conj(), 0) / np.sum(np.abs(force) ** 2, 0)
     variance = _variance(motion, frf, energies)
     frf = np.sum(motion * force.conj() / variance, 0) / np.sum(np.abs(force) ** 2 / variance, 0)
     return float(np.sum(np.abs(motion - frf * force) ** 2 / variance) / (motion.size - motion.shape[1]))
 
 
-def _left(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
-    """Misfit of the best local quotient over its expectation; force and motion are (n_records, WIDTH).
+def _quotient_misfit(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
+    """Misfit of the best local quotient over the expected one; force and motion are (n_records, WIDTH).
 
-    Where no resonance is near, poles follow the noise; any quotient that explains is a proof of linearity.
+    Far from resonances, poles follow the noise; any quotient that explains is a proof of linearity.
     """
-    return min(_left_by(degrees, force, motion, energies) for degrees in DEGREES)
+    return min(_quotient_misfit_of(degrees, force, motion, energies) for degrees in DEGREES)
 
 
-def _left_by(degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
-    """Misfit of the best of all rounds over its expectation; they may swing where a pole comes onto a line."""
+def _quotient_misfit_of(
+    degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray, energies: FloatArray
+) -> float:
+    """Least misfit of all rounds over the expected one; it may oscillate where a pole comes onto a line."""
     (n_records, n_lines), (poles, zeros) = motion.shape, degrees
     above = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(zeros + 1)
     below = above[:, 1 : poles + 1]
@@ -188,9 +195,9 @@ def _left_by(degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray
     for _ in range(ROUNDS):
         weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
         weighted = np.asarray(columns * weight[:, None], np.complex128)
-        found = solve_scaled_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
-        denominator = 1 + below @ found[:poles]
-        frf = (above @ found[poles : poles + zeros + 1]) / denominator
-        left = (motion.ravel() - columns @ found).reshape(motion.shape) / denominator
-        least = min(least, float(np.sum(np.abs(left) ** 2 / _variance(motion, frf, energies))))
+        coefficients = solve_scaled_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
+        denominator = 1 + below @ coefficients[:poles]
+        frf = (above @ coefficients[poles : poles + zeros + 1]) / denominator
+        misfit = (motion.ravel() - columns @ coefficients).reshape(motion.shape) / denominator
+        least = min(least, float(np.sum(np.abs(misfit) ** 2 / _variance(motion, frf, energies))))
     return float(least / (motion.size - columns.shape[1]))

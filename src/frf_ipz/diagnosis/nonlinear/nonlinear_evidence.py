@@ -1,7 +1,7 @@
-"""What a law explains beyond anything linear: how much better all blows agree with one linear system without its force.
+"""Evidence of a law beyond anything linear: how much better one linear system explains all records without its force.
 
-The best FRF of each line and struck place takes up whatever a linear model could be wrong by. What it leaves is how
-blows of different levels disagree, and there a law has to earn its place: a mere spring or damper gains nothing.
+The best FRF of each line and excited point takes up all errors of a linear model. Its misfit is the disagreement of
+records of different levels, and a law has to explain that: a mere spring or damper explains none of it.
 """
 
 from __future__ import annotations
@@ -12,73 +12,72 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
+from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
+    from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
+    from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-ENOUGH = 2  # blows at a place
-FLOOR = 0.002  # of the response: what blows on a linear structure may differ by, besides noise
+MIN_SEGMENTS = 2  # of an excited point
+FLOOR = 0.002  # of the response: expected disagreement of records of a linear structure, besides noise
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How well blows of different levels agree with one linear system besides a law.
+    """How well records of different levels agree with one linear system beside a law.
 
     Parameters
     ----------
     gain : float
-        Evidence of the law beyond anything linear, nats; NaN where stretches start in motion, or no place has two.
-    left : float
-        Mean square of what still disagrees, over the expected one.
+        Log evidence of the law beyond anything linear; NaN where segments start in motion, or no point has two.
+    mean_misfit : float
+        Mean square of the remaining disagreement over the expected one.
     """
 
     gain: float
-    left: float
+    mean_misfit: float
 
 
-def agreement_with(stretches: SegmentSet, nuisance_prior: NuisancePrior, fit: LawFit) -> Agreement:
-    """Compare how blows agree with one linear system, before and after the law's force is taken out.
+def assess_agreement(segments: SegmentSet, nuisance_prior: NuisancePrior, fit: LawFit) -> Agreement:
+    """Compare how records agree with one linear system, before and after the law's force is subtracted.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         From rest.
     nuisance_prior : NuisancePrior
-        Unknowns that the law was fitted with.
+        That the law was fitted with.
     fit : LawFit
-        The law at its place.
+        The law at its location.
 
     Returns
     -------
     Agreement
-        Of the blows at all struck places.
+        Of the records of all excited points.
     """
-    counts = np.bincount(stretches.input_of)
-    if stretches.moving.any() or counts.max() < ENOUGH:
+    counts = np.bincount(segments.input_of)
+    if segments.moving.any() or counts.max() < MIN_SEGMENTS:
         return Agreement(np.nan, np.nan)
-    used = stretches.used
-    response = respond(
-        nuisance_prior.modal_model, stretches.s[used], nuisance_prior.deviations(fit.unknowns, fit.place)
-    )
-    motion = stretches.motion[:, :, used]
-    without = motion + response.to_sensors(fit.place) * fit.force[:, None, used]
-    present = np.isfinite(stretches.variance[:, :, used])
-    variance = np.where(present, stretches.noise[:, :, used] + (FLOOR * np.abs(motion)) ** 2, np.inf)
-    before, after = (_disagreement(stretches, values, variance) for values in (motion, without))
+    used = segments.used
+    nuisance_values = nuisance_prior.to_values(fit.nuisance, fit.location)
+    response = respond(nuisance_prior.modal_model, segments.s[used], nuisance_values)
+    motion = segments.motion[:, :, used]
+    without = motion + response.to_sensors(fit.location) * fit.force[:, None, used]
+    present = np.isfinite(segments.variance[:, :, used])
+    variance = np.where(present, segments.noise[:, :, used] + (FLOOR * np.abs(motion)) ** 2, np.inf)
+    before, after = (_disagreement(segments, values, variance) for values in (motion, without))
     expected = 2 * (np.sum(present) - np.count_nonzero(counts) * present[0].size)
-    left = after / max(expected, 1)
-    return Agreement(float(0.5 * (before - after) / max(1.0, left)), float(left))
+    mean_misfit = after / max(expected, 1)
+    return Agreement(float(0.5 * (before - after) / max(1.0, mean_misfit)), float(mean_misfit))
 
 
-def _disagreement(stretches: SegmentSet, motion: ComplexArray, variance: FloatArray) -> float:
-    """Weighted sum of squares that the best FRF of each line and place leaves."""
+def _disagreement(segments: SegmentSet, motion: ComplexArray, variance: FloatArray) -> float:
+    """Weighted sum of squared misfits of the best FRF of each line and excited point."""
     cost, weight = 0.0, 1 / variance
-    for number in np.unique(stretches.input_of):
-        mine = stretches.input_of == number
-        force, y, w = stretches.force[mine][:, None, stretches.used], motion[mine], weight[mine]
+    for number in np.unique(segments.input_of):
+        of_input = segments.input_of == number
+        force, y, w = segments.force[of_input][:, None, segments.used], motion[of_input], weight[of_input]
         frf = np.sum(w * y * force.conj(), 0) / np.maximum(np.sum(w * np.abs(force) ** 2, 0), 1e-300)
         cost += float(np.sum(w * np.abs(y - frf * force) ** 2))
     return cost

@@ -18,9 +18,9 @@ def test_force_of_a_step_fits_the_motion_that_it_leaves(name):
     law, step = shipped_laws()[name], StepCompliance(*STEP[name])
     w = np.linspace(-1e-3, 1e-3, 41)
     force = law.solve(w, np.zeros_like(w), step)
-    left = step.strength * law.unit_force(w - step.motion * force, np.zeros_like(w), step.shape)
+    law_force = step.strength * law.unit_force(w - step.motion * force, np.zeros_like(w), step.shape)
     assert np.abs(force).max() > 1e-3 * step.strength * 1e-9
-    assert_allclose(left, force, rtol=SOLVED, atol=SOLVED * np.abs(force).max())
+    assert_allclose(law_force, force, rtol=SOLVED, atol=SOLVED * np.abs(force).max())
 
 
 def test_friction_sticks_below_its_force_and_slides_above():

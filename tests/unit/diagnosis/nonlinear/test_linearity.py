@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, _left, assess_linearity
+from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, _quotient_misfit, assess_linearity
 
 HALF_BAND = WIDTH / 2  # lines
 ACROSS = np.linspace(-1, 1, WIDTH)  # a group of lines
@@ -13,10 +13,10 @@ STEPS = 1e-3  # of the largest response
 SLOW_HZ = 0.4  # far below the band
 
 
-def test_blows_on_a_linear_chain_agree(strike):
-    found = assess_linearity(strike())
-    assert not found.is_nonlinear
-    assert found.score > 0  # something was compared
+def test_impacts_on_a_linear_chain_agree(strike):
+    linearity = assess_linearity(strike())
+    assert not linearity.is_nonlinear
+    assert linearity.score > 0  # something was compared
 
 
 @pytest.mark.parametrize(
@@ -24,13 +24,13 @@ def test_blows_on_a_linear_chain_agree(strike):
     [lambda w, _: 2e10 * w**3, lambda _, v: 1.5 * np.tanh(v / 1e-3)],
     ids=["cubic", "friction"],
 )
-def test_blows_on_a_nonlinear_chain_do_not(strike, law):
+def test_impacts_on_a_nonlinear_chain_disagree(strike, law):
     assert assess_linearity(strike(law)).is_nonlinear
 
 
 @pytest.mark.parametrize("law", [None, lambda w, _: 2e10 * w**3], ids=["linear", "cubic"])
-def test_blows_are_compared_where_sensors_rove(strike, law):
-    """Each layout of sensors has blows of several levels of its own."""
+def test_impacts_are_compared_where_sensors_rove(strike, law):
+    """Each layout of sensors has impacts of several levels."""
     observations = strike(law)
     layouts = [
         replace(
@@ -42,28 +42,28 @@ def test_blows_are_compared_where_sensors_rove(strike, law):
         for row in range(2)
         for record in observations.records
     ]
-    found = assess_linearity(replace(observations, records=tuple(layouts)))
-    assert found.score > 0
-    assert found.is_nonlinear == (law is not None)
+    linearity = assess_linearity(replace(observations, records=tuple(layouts)))
+    assert linearity.score > 0
+    assert linearity.is_nonlinear == (law is not None)
 
 
 @pytest.mark.parametrize("follows", [True, False])
-def test_what_a_blow_before_has_left_is_no_nonlinearity(strike, follows):
-    """A slow motion that goes on from blow to blow, of which too little is seen to take it off."""
+def test_residual_motion_is_no_nonlinearity(strike, follows):
+    """A slow motion that goes on from impact to impact, of which too little is measured to remove it."""
     observations = strike()
-    first, *others = observations.records
+    first, *later = observations.records
     slow = (
         STEPS * np.abs(first.responses).max() * np.cos(2 * np.pi * SLOW_HZ * first.step_s * np.arange(first.n_samples))
     )
-    late = [replace(record, responses=record.responses + slow, number=2 if follows else 1) for record in others]
-    found = assess_linearity(replace(observations, records=(first, *late)))
-    assert found.is_nonlinear == (not follows)
+    shifted = [replace(record, responses=record.responses + slow, number=2 if follows else 1) for record in later]
+    linearity = assess_linearity(replace(observations, records=(first, *shifted)))
+    assert linearity.is_nonlinear == (not follows)
 
 
-def test_a_law_shows_beside_what_a_blow_before_has_left(strike):
+def test_a_law_shows_beside_residual_motion(strike):
     observations = strike(lambda w, _: 2e10 * w**3)
-    first, *others = observations.records
-    records = (first, *(replace(record, number=2) for record in others))
+    first, *later = observations.records
+    records = (first, *(replace(record, number=2) for record in later))
     assert assess_linearity(replace(observations, records=records)).is_nonlinear
 
 
@@ -78,18 +78,18 @@ def test_a_channel_whose_noise_is_below_its_steps_is_not_taken_for_nonlinear(str
             for record in observations.records
         ),
     )
-    found = assess_linearity(rounded)
-    assert found.score > 0
-    assert not found.is_nonlinear
+    linearity = assess_linearity(rounded)
+    assert linearity.score > 0
+    assert not linearity.is_nonlinear
 
 
-def test_groups_of_lines_keep_out_of_what_is_left_out(strike):
+def test_groups_of_lines_keep_out_of_excluded_bands(strike):
     low, high = 30.0, 40.0
-    found = assess_linearity(replace(strike(), exclude_hz=((low, high),)))
+    linearity = assess_linearity(replace(strike(), exclude_hz=((low, high),)))
     spacing = 0.25 * HALF_BAND  # of lines, 4 s of record
-    assert len(found.frequency_hz) > 4
-    assert np.all((found.frequency_hz + spacing < low) | (found.frequency_hz - spacing > high))
-    assert not found.is_nonlinear
+    assert len(linearity.frequency_hz) > 4
+    assert np.all((linearity.frequency_hz + spacing < low) | (linearity.frequency_hz - spacing > high))
+    assert not linearity.is_nonlinear
 
 
 def test_a_local_quotient_does_not_follow_loud_noise():
@@ -99,7 +99,7 @@ def test_a_local_quotient_does_not_follow_loud_noise():
     for _ in range(GROUPS):
         force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
         motion = force * np.exp(-0.5 * ACROSS) + LOUD * drawn(rng, 3, WIDTH) + drawn(rng, 3, 1)
-        misfits.append(_left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, LOUD**2)])))
+        misfits.append(_quotient_misfit(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, LOUD**2)])))
     assert max(misfits) < 1.6  # of 1 that is expected: 66 squared moduli, the worst of many groups
 
 
@@ -110,16 +110,16 @@ def test_a_resonance_of_a_stiff_machine_agrees_as_one_of_a_soft_machine_does(com
     force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
     motion = compliance * force / (1j * (ACROSS - 0.1) + 0.3)
     noise = (1e-4 * compliance) ** 2
-    assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, noise)])) < 1.0
+    assert _quotient_misfit(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, noise)])) < 1.0
 
 
 def test_three_close_resonances_agree():
-    """Of a machine whose motion is far above the noise: nothing of it may be left."""
+    """Of a machine whose motion is far above the noise: no misfit may remain."""
     rng = np.random.default_rng(3)
     force = np.array([[1.0], [0.45], [0.15]]) * drawn(rng, 3, WIDTH)
     modes = ((1.0, -0.75), (0.8, -0.1), (0.7, 0.3))
-    motion = force * sum(part / (1j * (ACROSS - place) + 0.05) for part, place in modes) + drawn(rng, 3, 1)
-    assert _left(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, 1e-6)])) < 1.0
+    motion = force * sum(part / (1j * (ACROSS - location) + 0.05) for part, location in modes) + drawn(rng, 3, 1)
+    assert _quotient_misfit(force, motion, np.stack([np.zeros(WIDTH), np.full(WIDTH, 1e-6)])) < 1.0
 
 
 def decayed(record):

@@ -1,22 +1,22 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
 
 EXACT = 1e-6  # relative: digits that remain of unknowns of such sizes
 SIZES = np.array([1e9, 1.0, 1e-6])
 
 
-def test_unknowns_of_very_different_sizes_are_found():
-    even = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, 0.3], [0.1, 0.3, 1.5]])
-    wanted = np.array([[1e-9, 2e-9], [3.0, -1.0], [5e6, 4e6]])
-    normal = even * np.outer(SIZES, SIZES)
-    assert_allclose(solve_even(normal, normal @ wanted), wanted, rtol=EXACT)
-    assert_allclose(solve_even(normal, normal @ wanted[:, 0]), wanted[:, 0], rtol=EXACT)
+def test_unknowns_of_very_different_sizes_are_solved_for():
+    scaled = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, 0.3], [0.1, 0.3, 1.5]])
+    expected = np.array([[1e-9, 2e-9], [3.0, -1.0], [5e6, 4e6]])
+    normal = scaled * np.outer(SIZES, SIZES)
+    assert_allclose(solve_scaled(normal, normal @ expected), expected, rtol=EXACT)
+    assert_allclose(solve_scaled(normal, normal @ expected[:, 0]), expected[:, 0], rtol=EXACT)
 
 
 def test_rounding_that_left_no_definite_matrix_is_overcome():
     """Two unknowns with one effect, so large that the prior of 1 is lost in rounding."""
     row = 1e9 * np.array([1.0, 1.0])
-    found = solve_even(np.outer(row, row) + np.eye(2) - np.diag([2.0, 2.0]) * 64, row)
-    assert_allclose(row @ found, 1.0, rtol=EXACT)
+    solution = solve_scaled(np.outer(row, row) + np.eye(2) - np.diag([2.0, 2.0]) * 64, row)
+    assert_allclose(row @ solution, 1.0, rtol=EXACT)

@@ -6,8 +6,8 @@ import pytest
 
 from frf_ipz.diagnosis import diagnose as whole
 from frf_ipz.diagnosis.diagnose import diagnose
-from frf_ipz.diagnosis.nonlinear.findings import is_told
-from frf_ipz.diagnosis.nonlinear.law_in_time import show_law
+from frf_ipz.diagnosis.nonlinear.findings import is_determined
+from frf_ipz.diagnosis.nonlinear.law_in_time import simulate_law_in_time
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 from frf_ipz.diagnosis.nonlinear.search import search_laws
@@ -33,94 +33,94 @@ HELD_OUT = 0.05  # of the measured response; without the law at least five times
 def solved(request, chain, strike):
     law, where, location, parameters = CASES[request.param]
     observations = strike(law, where)
-    found = search_laws(chain.model, observations, DiagnoseOptions())
-    return request.param, location, parameters, observations, found
+    result = search_laws(chain.model, observations, DiagnoseOptions())
+    return request.param, location, parameters, observations, result
 
 
-def test_law_place_and_numbers_are_found(solved):
-    name, location, parameters, _, found = solved
-    assert found.is_nonlinear
-    first = found.findings[0]
+def test_law_location_and_parameters_are_found(solved):
+    name, location, parameters, _, result = solved
+    assert result.is_nonlinear
+    first = result.findings[0]
     assert (first.effect, dict(first.location)) == (name, location)
     for key, value in parameters.items():
         assert abs(first.parameters[key].value / value - 1) < PARAMETERS, key
 
 
-def test_blows_disagree_as_the_law_makes_them(solved):
-    found = solved[-1]
-    assert found.nonlinear_evidence > 1e4  # nats
+def test_the_law_explains_the_disagreement_of_impacts(solved):
+    result = solved[-1]
+    assert result.nonlinear_evidence > 1e4
 
 
-def test_blows_that_were_held_out_are_predicted(solved):
-    found = solved[-1]
-    assert found.after.held_out < HELD_OUT
-    assert found.before.held_out > 5 * found.after.held_out
+def test_impacts_that_were_held_out_are_predicted(solved):
+    result = solved[-1]
+    assert result.after.held_out < HELD_OUT
+    assert result.before.held_out > 5 * result.after.held_out
 
 
 def test_whole_records_of_all_levels_are_simulated(solved):
-    *_, observations, found = solved
-    simulation = simulate(observations, found.nuisance_prior, found.fit)
+    *_, observations, result = solved
+    simulation = simulate(observations, result.nuisance_prior, result.fit)
     assert simulation.simulated.shape == simulation.measured.shape
     assert (simulation.misfit < 2 * HELD_OUT).all()
 
 
-def test_a_law_is_shown_at_work_on_the_strongest_blow_that_was_held_out(solved):
-    *_, observations, found = solved
-    law = found.law_in_time
-    assert (law.record, law.is_held_out, law.response, law.unit) == ("blow 55 N", True, "acceleration", "m/s^2")
+def test_a_law_is_simulated_for_the_strongest_impact_that_was_held_out(solved):
+    *_, observations, result = solved
+    law = result.law_in_time
+    assert (law.record, law.is_held_out, law.response, law.unit) == ("impact 55 N", True, "acceleration", "m/s^2")
     record = next(record for record in observations.records if record.name == law.record)
     row = [sensor.channel for sensor in record.sensors].index(law.channel)
     assert set(law.measured) <= set(record.responses[row])
-    left, without = (np.linalg.norm(law.measured - model) for model in (law.simulated, law.without))
-    assert left < 2 * HELD_OUT * np.linalg.norm(law.measured)
-    assert without > 5 * left
-    force = found.fit.strength * found.fit.law.unit_force(law.motion_m, law.velocity_m_s, found.fit.shape)
+    misfit, without = (np.linalg.norm(law.measured - model) for model in (law.simulated, law.without))
+    assert misfit < 2 * HELD_OUT * np.linalg.norm(law.measured)
+    assert without > 5 * misfit
+    force = result.fit.strength * result.fit.law.unit_force(law.motion_m, law.velocity_m_s, result.fit.shape)
     np.testing.assert_array_equal(law.force_N, force)
-    assert np.abs(law.motion_m).max() == np.abs(found.fit.motion).max()
+    assert np.abs(law.motion_m).max() == np.abs(result.fit.motion).max()
 
 
-def test_blows_that_start_in_motion_show_the_force_alone(solved):
-    *_, observations, found = solved
+def test_impacts_that_start_in_motion_show_the_force_alone(solved):
+    *_, observations, result = solved
     moving = replace(observations, records=tuple(replace(record, number=2) for record in observations.records))
-    recordings = SimpleNamespace(training=moving, held_out=replace(moving, records=()))
-    law = show_law(recordings, None, found.fit)
+    data = SimpleNamespace(training=moving, held_out=replace(moving, records=()))
+    law = simulate_law_in_time(data, None, result.fit)
     assert (law.record, len(law.time_s)) == ("", 0)
     assert np.abs(law.force_N).max() > 0
 
 
-def test_the_model_as_it_is_misses_no_less_than_within_its_tolerances(solved):
+def test_the_nominal_model_has_a_larger_misfit_than_within_its_tolerances(solved):
     """In what the fit counts; the chain's model is right but for the law."""
-    found = solved[-1]
-    assert found.after.training_noise < found.updated.training_noise < found.before.training_noise
+    result = solved[-1]
+    assert result.after.training_noise < result.updated.training_noise < result.before.training_noise
 
 
-def test_a_law_that_gains_no_more_than_something_linear_does_not_win(chain, strike, monkeypatch):
+def test_a_law_that_explains_no_more_than_a_linear_system_does_not_win(chain, strike, monkeypatch):
     law, where, *_ = CASES["cubic_stiffness"]
-    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search.agreement_with", lambda *_: Agreement(3.0, 1.0))
-    found = diagnose(chain.model, strike(law, where), DiagnoseOptions())
-    assert found.verdict == "unexplained"
-    assert found.findings == ()
-    assert found.alternatives[0].effect == "cubic_stiffness"
-    assert "no more than a linear system" in found.statement
+    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search.assess_agreement", lambda *_: Agreement(3.0, 1.0))
+    result = diagnose(chain.model, strike(law, where), DiagnoseOptions())
+    assert result.verdict == "unexplained"
+    assert result.findings == ()
+    assert result.alternatives[0].effect == "cubic_stiffness"
+    assert "no more than a linear system" in result.statement
 
 
-def test_a_law_whose_numbers_may_as_well_be_zero_is_no_explanation(chain, strike, monkeypatch):
+def test_a_law_whose_parameters_may_as_well_be_zero_is_no_explanation(chain, strike, monkeypatch):
     law, where, *_ = CASES["cubic_stiffness"]
-    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.findings.WIDER", 1e6)
-    found = search_laws(chain.model, strike(law, where), DiagnoseOptions())
-    assert found.verdict == "unexplained"
-    assert "do not tell from zero" in found.statement
+    monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.findings.STD_INFLATION", 1e6)
+    result = search_laws(chain.model, strike(law, where), DiagnoseOptions())
+    assert result.verdict == "unexplained"
+    assert "do not distinguish from zero" in result.statement
 
 
-@pytest.mark.parametrize(("gap_variance", "told"), [(1e-10, True), (1e-8, False)])
-def test_one_number_that_is_told_is_enough(gap_variance, told):
-    """How stiff a hard stop is, recordings hardly say: its gap they do."""
+@pytest.mark.parametrize(("gap_variance", "expected"), [(1e-10, True), (1e-8, False)])
+def test_one_parameter_that_is_determined_is_enough(gap_variance, expected):
+    """Records hardly determine how stiff a hard stop is, but its gap."""
     fit = SimpleNamespace(numbers={"contact_stiffness_N_m": (1e4, 9e8), "gap_m": (1e-4, gap_variance)})
-    assert is_told(fit, 1.0) == told
+    assert is_determined(fit, 1.0) == expected
 
 
 @pytest.mark.parametrize(
-    ("verdict", "nonlinear_evidence", "said"),
+    ("verdict", "nonlinear_evidence", "expected"),
     [
         ("explained", 200.0, "law"),
         ("explained", 30.0, "spring"),
@@ -129,51 +129,52 @@ def test_one_number_that_is_told_is_enough(gap_variance, told):
     ],
 )
 def test_a_linear_cause_that_leaves_nothing_gives_way_to_a_proven_law_only(
-    monkeypatch, verdict, nonlinear_evidence, said
+    monkeypatch, verdict, nonlinear_evidence, expected
 ):
     monkeypatch.setattr(whole, "_with_law", lambda *_: "law")
-    found = SimpleNamespace(verdict=verdict, nonlinear_evidence=nonlinear_evidence)
-    assert whole._unless_a_law("spring", found) == said
+    laws = SimpleNamespace(verdict=verdict, nonlinear_evidence=nonlinear_evidence)
+    assert whole._unless_a_law("spring", laws) == expected
 
 
 def test_nothing_is_found_in_a_linear_chain(chain, strike):
-    found = search_laws(chain.model, strike(), DiagnoseOptions())
-    assert found.verdict == "linear"
-    assert found.findings == ()
+    result = search_laws(chain.model, strike(), DiagnoseOptions())
+    assert result.verdict == "linear"
+    assert result.findings == ()
 
 
 OUTSIDE = {
     "square": (lambda w, _: 3e7 * w * abs(w), "disagree"),
-    "quintic": (lambda w, _: 2e14 * w**5, "is bent"),  # a cubic spring leaves less than the errors of the model
+    "quintic": (lambda w, _: 2e14 * w**5, "wrong shape"),  # a cubic spring leaves less than the errors of the model
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("law", "words"), OUTSIDE.values(), ids=OUTSIDE)
 def test_a_law_outside_the_catalogue_is_not_explained(chain, strike, law, words):
-    found = search_laws(chain.model, strike(law, (0, 0, 1, 0)), DiagnoseOptions())
-    assert found.verdict == "unexplained"
-    assert words in found.statement
-    assert dict(found.location) == {"nodes": [3]}
+    result = search_laws(chain.model, strike(law, (0, 0, 1, 0)), DiagnoseOptions())
+    assert result.verdict == "unexplained"
+    assert words in result.statement
+    assert dict(result.location) == {"nodes": [3]}
 
 
-def test_recordings_without_the_law_are_those_of_a_linear_chain(solved):
-    *_, observations, found = solved
-    rest = subtract_law(observations, found.nuisance_prior, found.fit)
-    assert assess_linearity(rest).score < 0.1 * found.linearity.score
+def test_records_without_the_law_are_those_of_a_linear_chain(solved):
+    *_, observations, result = solved
+    without_law = subtract_law(observations, result.nuisance_prior, result.fit)
+    assert assess_linearity(without_law).score < 0.1 * result.linearity.score
 
 
-def test_a_law_is_taken_out_of_whole_records_from_rest_that_are_loudest_late(solved, random_records):
-    *_, observations, found = solved
+def test_a_law_is_subtracted_from_whole_records_from_rest_that_are_loudest_late(solved, random_records):
+    *_, observations, result = solved
     records = random_records(observations, 2.0)
-    rest = subtract_law(records, found.nuisance_prior, found.fit)
+    without_law = subtract_law(records, result.nuisance_prior, result.fit)
     changed = [
-        np.abs(one.responses - was.responses).max() for one, was in zip(rest.records, records.records, strict=True)
+        np.abs(without.responses - record.responses).max()
+        for without, record in zip(without_law.records, records.records, strict=True)
     ]
     assert min(changed) > 0
 
 
-def test_a_law_alone_does_not_strain_the_model(solved):
+def test_a_law_alone_needs_no_nuisance(solved):
     assert solved[-1].nuisance_chi2 < 0.1 * STRAINED
 
 

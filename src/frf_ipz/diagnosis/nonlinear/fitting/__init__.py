@@ -1,1 +1,1 @@
-"""From all laws at all places to the one that fits best: screening, refinement, simulation."""
+"""From all laws at all locations to the best fit: score test, alternating fit, output-error fit."""

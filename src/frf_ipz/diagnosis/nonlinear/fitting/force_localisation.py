@@ -1,8 +1,8 @@
-"""Where a force may sit of which nothing is known, not even that it follows a law.
+"""Where a force may act of which nothing is known, not even that it follows a law.
 
-On each line of each blow any force at the place takes up one direction among the sensors: the one in which the place
-reaches them. What is left across it is for the linear model's unknowns to explain, and tells the place, if two sensors
-or more were there. The better the linear model is known, the less is left that several places have in common.
+On each line of each segment any force at a location explains one direction among the sensors: that of the receptances
+from the location to them. What is across it is left for the nuisance parameters of the linear model, and determines the
+location, if there are two sensors or more. The better the linear model is known, the fewer locations explain the rest.
 """
 
 from __future__ import annotations
@@ -12,263 +12,274 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
-from frf_ipz.diagnosis.nonlinear.fitting.refine import Start, motion_at
-from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import respond
+from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawStart, estimate_location_motion
+from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
+from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
+from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.diagnosis.nonlinear.fitting.score_test import LinearFit
+    from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import LinearFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalModel, ModalResponse
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
+    from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel, ModalResponse
+    from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-TURNS, SETTLED = 16, 0.01  # the unknowns change how a place reaches the sensors; relative drop that is worth a turn
-TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a turn: shorter and shorter steps until one lowers the cost
-TIE = 15.0  # of the cost: less tells no place from another
-POSSIBLE, PART = 60.0, 0.1  # of the cost above the least, and part of it: what a place may leave that is possible
-LEAST_SENSORS = 2
-BESIDE = 3  # places beside a possible one that are fitted from its unknowns, where by themselves they leave more
+ROUNDS, CONVERGED = 16, 0.01  # of Gauss-Newton steps; relative drop of the cost that is worth a step
+TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a step: shorter and shorter ones until one lowers the cost
+INDISTINGUISHABLE = 15.0  # difference of the cost: with less, two locations explain equally well
+POSSIBLE, POSSIBLE_PART = 60.0, 0.1  # of the cost above the least, and part of it, at a possible location
+MIN_SENSORS = 2
+NEIGHBOURS = 3  # locations beside a possible one that are fitted from its nuisance parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FreeForce:
-    """The best force at a place, whatever its law.
+    """The best force at a location, whatever its law.
 
     Parameters
     ----------
-    place : int
-        Index in `ModalModel.places`.
+    location : int
+        Index in `ModalModel.locations`.
     cost : float
-        Weighted sum of squares that is left, and of the unknowns.
-    force : (n_blows, n_used) complex array
+        Weighted sum of squared misfits, and of squared nuisance parameters.
+    force : (n_segments, n_used) complex array
         Of the law against the structure, N s.
-    unknowns : (n_unknowns,) array
+    nuisance : (n_nuisance,) array
         Of the linear model, in prior standard deviations.
     """
 
-    place: int
+    location: int
     cost: float
     force: ComplexArray
-    unknowns: FloatArray
+    nuisance: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Whereabouts:
-    """Where a force may sit.
+class ForceLocalisation:
+    """Where a force may act.
 
     Parameters
     ----------
-    possible, equal : tuple of int
-        Indices in `ModalModel.places` that are worth a look, and those of them that nothing but a law tells apart.
+    possible, equivalent : tuple of int
+        Indices in `ModalModel.locations` that have to be tested, and those of them that only a law distinguishes.
     forces : tuple of FreeForce
-        At the equal places, the best first; none where one sensor alone can tell no place from another.
+        At the equivalent locations, the best first; none where a single sensor distinguishes no locations.
     """
 
     possible: tuple[int, ...]
-    equal: tuple[int, ...]
+    equivalent: tuple[int, ...]
     forces: tuple[FreeForce, ...] = ()
 
 
-def anywhere(modal_model: ModalModel) -> Whereabouts:
-    """Leave all places of a structure possible."""
-    every = tuple(range(len(modal_model.places)))
-    return Whereabouts(possible=every, equal=every)
+def all_locations(modal_model: ModalModel) -> ForceLocalisation:
+    """Take all locations of a structure as possible."""
+    indices = tuple(range(len(modal_model.locations)))
+    return ForceLocalisation(possible=indices, equivalent=indices)
 
 
-def free_force(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: FloatArray | None = None) -> FreeForce:
-    """Fit the linear model with any force at a place.
+def fit_free_force(
+    segments: SegmentSet, linear: LinearFit, location: int, nuisance: FloatArray | None = None
+) -> FreeForce:
+    """Fit the linear model with any force at a location.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
-    place : int
-        Index in `ModalModel.places`.
-    unknowns : (n_unknowns,) array, optional
-        Where to start; with the linear model as it is stated otherwise.
+    location : int
+        Index in `ModalModel.locations`.
+    nuisance : (n_nuisance,) array, optional
+        Start values; the nominal model otherwise.
 
     Returns
     -------
     FreeForce
-        The best turn.
+        The best step.
     """
-    best = _across(stretches, linear, place, linear.as_stated if unknowns is None else unknowns)
-    used, damping = stretches.used, 0.0
-    for _ in range(TURNS):
-        columns = linear.nuisance_prior.columns(stretches, best.response.on(used), best.along, place)
-        rows = as_real(columns - best.reach * _along(best.reach, columns)[..., None, :])
-        normal, slope = rows @ rows.T + np.eye(len(rows)), rows @ best.left - best.unknowns
+    best = _project(segments, linear, location, linear.start_nuisance if nuisance is None else nuisance)
+    used, damping = segments.used, 0.0
+    for _ in range(ROUNDS):
+        columns = linear.nuisance_prior.jacobian(segments, best.response.on(used), best.force, location)
+        rows = as_real_rows(columns - best.to_sensors * _force_along(best.to_sensors, columns)[..., None, :])
+        normal, slope = rows @ rows.T + np.eye(len(rows)), rows @ best.misfit - best.nuisance
         for _ in range(TRIALS):
-            step = solve_even(normal + damping * np.diag(np.diag(normal)), slope)
-            tried = _across(stretches, linear, place, best.unknowns + step)
-            if tried.cost < best.cost:
+            step = solve_scaled(normal + damping * np.diag(np.diag(normal)), slope)
+            trial = _project(segments, linear, location, best.nuisance + step)
+            if trial.cost < best.cost:
                 break
             damping = max(STIFFER * damping, LEAST_DAMPING)
-        if not tried.cost <= (1 - SETTLED) * best.cost:  # nor where it is no number
+        if not trial.cost <= (1 - CONVERGED) * best.cost:  # nor where it is no number
             break
-        best, damping = tried, damping / STIFFER
-    best = min(best, tried, key=lambda one: one.cost)
-    return FreeForce(place=place, cost=best.cost, force=-best.along, unknowns=best.unknowns)
+        best, damping = trial, damping / STIFFER
+    best = min(best, trial, key=lambda projection: projection.cost)
+    return FreeForce(location=location, cost=best.cost, force=-best.force, nuisance=best.nuisance)
 
 
-def whereabouts(stretches: SegmentSet, linear: LinearFit) -> Whereabouts:
-    """Say where a force may sit.
+def localise_force(segments: SegmentSet, linear: LinearFit) -> ForceLocalisation:
+    """Find where a force may act.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
 
     Returns
     -------
-    Whereabouts
-        Anywhere, where one sensor alone can tell no place from another.
+    ForceLocalisation
+        All locations, where a single sensor distinguishes none.
     """
-    every = anywhere(linear.nuisance_prior.modal_model)
-    if np.isfinite(stretches.variance).any(2).sum(1).min() < LEAST_SENSORS:
-        return every
-    found = {place: free_force(stretches, linear, place) for place in every.possible}
-    _spread(stretches, linear, found)
-    best_first = sorted(found.values(), key=lambda one: one.cost)
+    everywhere = all_locations(linear.nuisance_prior.modal_model)
+    if np.isfinite(segments.variance).any(2).sum(1).min() < MIN_SENSORS:
+        return everywhere
+    forces = {location: fit_free_force(segments, linear, location) for location in everywhere.possible}
+    _refit_neighbours(segments, linear, forces)
+    best_first = sorted(forces.values(), key=lambda free: free.cost)
     least = best_first[0].cost
-    equal = tuple(one for one in best_first if one.cost < least + TIE)
-    possible = tuple(one.place for one in best_first if _is_possible(one, least))
-    return Whereabouts(possible=possible, equal=tuple(one.place for one in equal), forces=equal)
+    equivalent = tuple(free for free in best_first if free.cost < least + INDISTINGUISHABLE)
+    possible = tuple(free.location for free in best_first if _is_possible(free, least))
+    return ForceLocalisation(
+        possible=possible, equivalent=tuple(free.location for free in equivalent), forces=equivalent
+    )
 
 
-def _spread(stretches: SegmentSet, linear: LinearFit, found: dict[int, FreeForce]) -> None:
-    """Fit places beside possible ones from what explains there: by themselves some end where little is explained."""
-    modal_model, waiting = linear.nuisance_prior.modal_model, sorted(found, key=lambda place: found[place].cost)
+def _refit_neighbours(segments: SegmentSet, linear: LinearFit, forces: dict[int, FreeForce]) -> None:
+    """Fit neighbours of possible locations from the fit there: from the nominal model, some end in a local minimum."""
+    modal_model = linear.nuisance_prior.modal_model
+    waiting = sorted(forces, key=lambda location: forces[location].cost)
     while waiting:
-        here = found[waiting.pop(0)]
-        if not _is_possible(here, min(one.cost for one in found.values())):
+        free = forces[waiting.pop(0)]
+        if not _is_possible(free, min(fitted.cost for fitted in forces.values())):
             continue
-        start = linear.nuisance_prior.of_no_place(here.unknowns)
-        for place in neighbours(modal_model, here.place, BESIDE):
-            if found[place].cost < here.cost + TIE:
+        start = linear.nuisance_prior.without_location(free.nuisance)
+        for location in neighbours(modal_model, free.location, NEIGHBOURS):
+            if forces[location].cost < free.cost + INDISTINGUISHABLE:
                 continue
-            again = free_force(stretches, linear, place, start)
-            if again.cost < found[place].cost:
-                found[place] = again
-                waiting.append(place)
+            refitted = fit_free_force(segments, linear, location, start)
+            if refitted.cost < forces[location].cost:
+                forces[location] = refitted
+                waiting.append(location)
 
 
 def _is_possible(free: FreeForce, least: float) -> bool:
-    return free.cost < least + POSSIBLE + PART * least
+    return free.cost < least + POSSIBLE + POSSIBLE_PART * least
 
 
-def neighbours(modal_model: ModalModel, place: int, count: int) -> list[int]:
-    """List the places whose mode shapes are most like those of a place, or most like their opposite.
+def neighbours(modal_model: ModalModel, location: int, count: int) -> list[int]:
+    """List the locations whose mode shapes are most like those of a location, or most like their opposite.
 
     Parameters
     ----------
     modal_model : ModalModel
         The structure.
-    place : int
-        Index in `ModalModel.places`.
+    location : int
+        Index in `ModalModel.locations`.
     count : int
         How many.
 
     Returns
     -------
     list of int
-        The most alike first.
+        The most similar first.
     """
-    shapes = modal_model.at_places.shapes
-    alike = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
-    nearest = np.argsort(-np.abs(alike @ alike[place]), kind="stable")
-    return [int(i) for i in nearest if i != place][:count]
+    shapes = modal_model.at_locations.shapes
+    directions = shapes / np.maximum(np.linalg.norm(shapes, axis=1), 1e-300)[:, None]
+    nearest = np.argsort(-np.abs(directions @ directions[location]), kind="stable")
+    return [int(i) for i in nearest if i != location][:count]
 
 
-def start_at(stretches: SegmentSet, linear: LinearFit, free: FreeForce, law: Law) -> Start:
-    """Read the numbers of a law from a force that follows none yet.
+def start_from_force(segments: SegmentSet, linear: LinearFit, free: FreeForce, law: Law) -> LawStart:
+    """Read the parameters of a law from a force that follows none yet.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         The data.
     linear : LinearFit
         The linear model.
     free : FreeForce
-        Fitted to these stretches.
+        Fitted to these segments.
     law : Law
         Which.
 
     Returns
     -------
-    Start
+    LawStart
         Strength 0 where the force is not of that law at all.
     """
-    clock, used = Clock(stretches), stretches.used
-    nothing = Start(law=law, place=free.place, strength=0.0, shape=0.0, unknowns=free.unknowns)
-    force = np.zeros((stretches.n_records, len(stretches.s)), complex)
+    laplace, used = NumericalLaplace(segments), segments.used
+    best = LawStart(law=law, location=free.location, strength=0.0, shape=0.0, nuisance=free.nuisance)
+    force = np.zeros((segments.n_segments, len(segments.s)), complex)
     force[:, used] = free.force
-    response, w, v = motion_at(stretches, linear.nuisance_prior, nothing, clock, force)
-    reach = np.abs(response.to_sensors(free.place)[:, used]) ** 2
-    weight = np.sum(reach / stretches.variance[:, :, used], 1)
-    best, most = nothing, 0.0
+    response, w, v = estimate_location_motion(segments, linear.nuisance_prior, best, laplace, force)
+    reach = np.abs(response.to_sensors(free.location)[:, used]) ** 2
+    weight = np.sum(reach / segments.variance[:, :, used], 1)
+    largest_drop = 0.0
     for shape in law.shapes(float(np.abs(w).max()), float(np.abs(v).max())):
-        unit = clock.at_lines(law.unit_force(w, v, float(shape)))[:, used]
-        across, square = np.sum(weight * (unit.conj() * free.force).real), np.sum(weight * np.abs(unit) ** 2)
-        drop = float(across**2 / max(square, np.finfo(float).tiny))
-        if drop > most and (across > 0 or law.strength_can_be_negative):
-            most = drop
-            best = Start(
-                law=law, place=free.place, strength=float(across / square), shape=float(shape), unknowns=free.unknowns
+        unit = laplace.at_lines(law.unit_force(w, v, float(shape)))[:, used]
+        product, square = np.sum(weight * (unit.conj() * free.force).real), np.sum(weight * np.abs(unit) ** 2)
+        drop = float(product**2 / max(square, np.finfo(float).tiny))
+        if drop > largest_drop and (product > 0 or law.strength_can_be_negative):
+            largest_drop = drop
+            best = LawStart(
+                law=law,
+                location=free.location,
+                strength=float(product / square),
+                shape=float(shape),
+                nuisance=free.nuisance,
             )
     return best
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Across:
-    """What any force at a place leaves, and which force it is.
+class _Projection:
+    """The data, projected on any force at a location and on what is across it.
 
     Parameters
     ----------
     response : ModalResponse
-        Of the linear model with its unknowns.
-    reach : (n_blows, n_sensors, n_used) complex array
-        How the place reaches the sensors, weighted.
-    along : (n_blows, n_used) complex array
-        Force on the structure that takes up all it can, N s.
-    left : (n_rows,) array
-        What it leaves, weighted.
-    unknowns : (n_unknowns,) array
+        Of the linear model with its nuisance parameters.
+    to_sensors : (n_segments, n_sensors, n_used) complex array
+        Receptances from the location, weighted.
+    force : (n_segments, n_used) complex array
+        Force on the structure that explains most, N s.
+    misfit : (n_rows,) array
+        What is across, weighted.
+    nuisance : (n_nuisance,) array
         Of the linear model, in prior standard deviations.
     cost : float
-        Sum of squares of what is left, and of the unknowns.
+        Sum of squared misfits and nuisance parameters.
     """
 
     response: ModalResponse
-    reach: ComplexArray
-    along: ComplexArray
-    left: FloatArray
-    unknowns: FloatArray
+    to_sensors: ComplexArray
+    force: ComplexArray
+    misfit: FloatArray
+    nuisance: FloatArray
     cost: float
 
 
-def _across(stretches: SegmentSet, linear: LinearFit, place: int, unknowns: FloatArray) -> _Across:
-    nuisance_prior, used = linear.nuisance_prior, stretches.used
-    weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(unknowns, place))
-    shown = linear_motion(stretches, nuisance_prior, response)
-    shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(unknowns, response)
-    misfit = (stretches.motion - shown)[:, :, used] * weight
-    reach = response.to_sensors(place)[:, used] * weight
-    along = _along(reach, misfit)
-    left = as_real(misfit - reach * along[:, None])
-    cost = float(left @ left + unknowns @ unknowns)
-    return _Across(response=response, reach=reach, along=along, left=left, unknowns=unknowns, cost=cost)
+def _project(segments: SegmentSet, linear: LinearFit, location: int, nuisance: FloatArray) -> _Projection:
+    nuisance_prior, used = linear.nuisance_prior, segments.used
+    weight = 1 / np.sqrt(segments.variance[:, :, used])
+    response = respond(nuisance_prior.modal_model, segments.s, nuisance_prior.to_values(nuisance, location))
+    motion = linear_sensor_motion(segments, nuisance_prior, response)
+    motion[nuisance_prior.moving] += nuisance_prior.sensor_free_vibration(nuisance, response)
+    linear_misfit = (segments.motion - motion)[:, :, used] * weight
+    to_sensors = response.to_sensors(location)[:, used] * weight
+    force = _force_along(to_sensors, linear_misfit)
+    misfit = as_real_rows(linear_misfit - to_sensors * force[:, None])
+    cost = float(misfit @ misfit + nuisance @ nuisance)
+    return _Projection(
+        response=response, to_sensors=to_sensors, force=force, misfit=misfit, nuisance=nuisance, cost=cost
+    )
 
 
-def _along(reach: ComplexArray, values: ComplexArray) -> ComplexArray:
-    """(..., n_blows, n_used) part of weighted values (..., n_blows, n_sensors, n_used) along the reach of a force."""
-    square = np.maximum(np.sum(np.abs(reach) ** 2, 1), np.finfo(float).tiny)
-    return np.asarray(np.sum(reach.conj() * values, -2) / square)
+def _force_along(to_sensors: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """(..., n_segments, n_used) force that explains most of weighted values (..., n_segments, n_sensors, n_used)."""
+    square = np.maximum(np.sum(np.abs(to_sensors) ** 2, 1), np.finfo(float).tiny)
+    return np.asarray(np.sum(to_sensors.conj() * values, -2) / square)

@@ -1,7 +1,8 @@
-"""Fits a law at its place through a simulation of every blow.
+"""Output-error fit of a law at its location: every segment is simulated.
 
-Unlike `refine`, no motion is estimated from the data: the law's force follows from the blows alone, and so does its
-change by each unknown. Steps are damped as long as the simulation gets worse (Levenberg and Marquardt).
+Unlike in `alternating_fit`, no motion is estimated from the data: the law's force follows from the measured force
+alone, and so do its derivatives by all parameters. Steps are damped as long as the misfit grows (Levenberg and
+Marquardt).
 """
 
 from __future__ import annotations
@@ -13,61 +14,67 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.motion import Clock
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_even
-from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit, Start
-from frf_ipz.diagnosis.nonlinear.fitting.score_test import as_real, linear_motion
-from frf_ipz.diagnosis.nonlinear.fitting.time_stepping import AHEAD, TimeSteps, Yielding, step_in_time, step_tangent
-from frf_ipz.diagnosis.nonlinear.linear.modal_model import ModalResponse, respond
-from frf_ipz.diagnosis.nonlinear.linear.place_in_time import PlaceInTime
-from frf_ipz.diagnosis.nonlinear.recorded.segments import FINER
+from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit, LawStart
+from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
+from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
+from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalResponse, respond
+from frf_ipz.diagnosis.nonlinear.model.time_response import TimeResponse
+from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
+    HOLD_LEAD,
+    LocationCompliance,
+    TimeHistory,
+    step_in_time,
+    step_tangent,
+)
+from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.nonlinear.linear.nuisance_prior import NuisancePrior
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
+    from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import NuisancePrior
+    from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4
-FASTER, SLOWER = 0.1, 10.0  # what damping is multiplied with after a good and a bad step
-SETTLED = 3e-3  # relative drop of the cost
-TAMER = 0.1  # what the strength of a law is multiplied with as long as its motion runs away
-RUNAWAY = 1e100  # standard deviations: a change as large runs away, and is taken for none
-LONGEST = 0.5  # relative change of a law's number in one step
-Kinds = Callable[[FloatArray, FloatArray], FloatArray]
-WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: they may be one and the same where nothing is touched
+FIRST_DAMPING, MAX_DAMPING = 1e-3, 1e4
+DAMPING_DOWN, DAMPING_UP = 0.1, 10.0  # factors of the damping after a good and a bad step
+CONVERGED = 3e-3  # relative drop of the cost
+WEAKER = 0.1  # factor of a law's strength as long as its motion diverges
+DIVERGED = 1e100  # standard deviations: a derivative as large has diverged, and is set to zero
+LONGEST = 0.5  # relative change of a law's parameter in one step
+ForceBasis = Callable[[FloatArray, FloatArray], FloatArray]
+WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: without contact, they are not determined separately
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Shot:
-    """A simulation of all stretches."""
+class _Simulation:
+    """A simulation of all segments."""
 
-    start: Start
+    start: LawStart
     response: ModalResponse
-    place: PlaceInTime
-    yielding: Yielding
-    done: TimeSteps
+    time_response: TimeResponse
+    compliance: LocationCompliance
+    history: TimeHistory
     force: ComplexArray
     misfit: FloatArray
 
     @property
     def cost(self) -> float:
-        with np.errstate(all="ignore"):  # of a motion that runs away
-            cost = float(self.misfit @ self.misfit + self.start.unknowns @ self.start.unknowns)
+        with np.errstate(all="ignore"):  # of a motion that diverges
+            cost = float(self.misfit @ self.misfit + self.start.nuisance @ self.start.nuisance)
         return cost if np.isfinite(cost) else np.inf
 
 
 def fit_output_error(
-    stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, *, iterations: int = 6
+    segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart, *, iterations: int = 6
 ) -> LawFit:
-    """Fit a law at a place.
+    """Fit a law at a location.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         The data.
     nuisance_prior : NuisancePrior
-        Unknowns of the linear model.
-    start : Start
-        Law, place, and first values; the strength is not zero.
+        Of the linear model.
+    start : LawStart
+        Law, location, and first values; the strength is not zero.
     iterations : int
         Steps at most; with 0 the start is only simulated.
 
@@ -76,152 +83,170 @@ def fit_output_error(
     LawFit
         The best simulation.
     """
-    shot, damping = _fire(stretches, nuisance_prior, start), FIRST_DAMPING
-    while not np.isfinite(shot.cost):  # a softening spring that is too strong runs away
-        shot = _fire(stretches, nuisance_prior, replace(shot.start, strength=TAMER * shot.start.strength))
-    rows, settled = _slopes(stretches, nuisance_prior, shot), False
+    simulation, damping = _simulate(segments, nuisance_prior, start), FIRST_DAMPING
+    while not np.isfinite(simulation.cost):  # a softening spring that is too strong diverges
+        weaker = replace(simulation.start, strength=WEAKER * simulation.start.strength)
+        simulation = _simulate(segments, nuisance_prior, weaker)
+    rows, converged = _derivative_rows(segments, nuisance_prior, simulation), False
     for _ in range(iterations):
-        before = shot.cost
-        while damping < MOST_DAMPING:
-            trial = _fire(stretches, nuisance_prior, _step(shot, rows, damping))
-            if trial.cost < shot.cost:
+        before = simulation.cost
+        while damping < MAX_DAMPING:
+            trial = _simulate(segments, nuisance_prior, _damped_step(simulation, rows, damping))
+            if trial.cost < simulation.cost:
                 break
-            damping *= SLOWER
+            damping *= DAMPING_UP
         else:
-            settled = True
+            converged = True
             break
-        shot, damping = trial, damping * FASTER
-        rows = _slopes(stretches, nuisance_prior, shot)
-        settled = bool(shot.cost > (1 - SETTLED) * before)
-        if settled:
+        simulation, damping = trial, damping * DAMPING_DOWN
+        rows = _derivative_rows(segments, nuisance_prior, simulation)
+        converged = bool(simulation.cost > (1 - CONVERGED) * before)
+        if converged:
             break
-    return _finish(shot, rows, settled=settled)
+    return _as_law_fit(simulation, rows, converged=converged)
 
 
-def gain_of_further(stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start, kinds: Kinds) -> float:
-    """Say how far forces of other kinds at a law's place, free in all their strengths, would lower the cost.
+def gain_of_added_forces(
+    segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart, force_basis: ForceBasis
+) -> float:
+    """Compute how far other forces at a law's location, free in all their strengths, would lower the cost.
 
     Parameters
     ----------
-    stretches : SegmentSet
+    segments : SegmentSet
         The data.
     nuisance_prior : NuisancePrior
-        Unknowns of the linear model.
-    start : Start
+        Of the linear model.
+    start : LawStart
         The law as it was fitted.
-    kinds : callable
-        Gives the forces, (n_kinds, n_blows, n_times), for motion and velocity.
+    force_basis : callable
+        Gives the forces, (n_forces, n_segments, n_times), for motion and velocity.
 
     Returns
     -------
     float
-        Drop of the weighted sum of squares, as far as small strengths tell.
+        Drop of the weighted sum of squares, linearised in the strengths.
     """
-    shot = _fire(stretches, nuisance_prior, start)
-    forces = kinds(shot.done.motion, shot.done.velocity)
-    rows = _slopes(stretches, nuisance_prior, shot, forces)
+    simulation = _simulate(segments, nuisance_prior, start)
+    forces = force_basis(simulation.history.motion, simulation.history.velocity)
+    rows = _derivative_rows(segments, nuisance_prior, simulation, forces)
     n_plain = len(rows) - len(forces)
     sizes = np.linalg.norm(rows[n_plain:], axis=1)
     rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
-    normal, right = _normal(shot, rows)
-    drops = [right[:n] @ solve_even(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
+    normal, right = _normal_equations(simulation, rows)
+    drops = [right[:n] @ solve_scaled(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
     return float(drops[1] - drops[0])
 
 
-def _fire(stretches: SegmentSet, nuisance_prior: NuisancePrior, start: Start) -> _Shot:
-    place = PlaceInTime(stretches=stretches, nuisance_prior=nuisance_prior, unknowns=start.unknowns, place=start.place)
-    yielding = place.yielding(constant=start.law.holds)
-    response = respond(nuisance_prior.modal_model, stretches.s, nuisance_prior.deviations(start.unknowns, start.place))
-    used = stretches.used
-    with np.errstate(all="ignore"):  # a step too far may run away: its cost is infinite
-        done = step_in_time(start.law, (start.strength, start.shape), yielding, *place.without_law())
-        force = _lines(stretches, done.force, holds=start.law.holds)
-        shown = linear_motion(stretches, nuisance_prior, response) - response.to_sensors(start.place) * force[:, None]
-        shown[nuisance_prior.moving] += nuisance_prior.sensor_starts(start.unknowns, response)
-        misfit = as_real((stretches.motion - shown)[:, :, used] / np.sqrt(stretches.variance[:, :, used]))
-    return _Shot(start=start, response=response, place=place, yielding=yielding, done=done, force=force, misfit=misfit)
-
-
-def _lines(stretches: SegmentSet, force: FloatArray, *, holds: bool) -> ComplexArray:
-    """Transform a law's force; one that is constant for a step acts around its time as `make_modes` has it."""
-    clock = Clock(stretches, oversampling=FINER, fades=False)
-    lines = clock.at_lines(np.where(np.isfinite(force), force, 0.0))
-    lines[~np.isfinite(force).all(-1)] = np.inf
-    way = stretches.s * clock.step_s
-    return lines * (np.expm1(AHEAD * way) - np.expm1((AHEAD - 1) * way)) / way if holds else lines
-
-
-def _slopes(
-    stretches: SegmentSet, nuisance_prior: NuisancePrior, shot: _Shot, added: FloatArray | None = None
-) -> FloatArray:
-    """Derive the weighted responses by unknowns, strength and shape (times their size), and further forces."""
-    start, used, n_free = shot.start, stretches.used, len(nuisance_prior.modes)
-    changes = shot.place.changes(shot.done.force)
-    with np.errstate(all="ignore"):  # changes that run away are taken for none below
-        by_force = step_tangent(start.law, shot.yielding, shot.done, changes, added)
-    to_sensors = shot.response.to_sensors(start.place)[:, used]
-    weight = 1 / np.sqrt(stretches.variance[:, :, used])
-    lines = _lines(stretches, by_force, holds=start.law.holds)[..., used]
-    with np.errstate(all="ignore"):
-        seen = -to_sensors * lines[:, :, None] * weight
-    on_used = shot.response.on(used)
-    rows = nuisance_prior.columns(stretches, on_used, -shot.force[:, used], start.place, start.unknowns)
-    rows[: 2 * n_free] += seen[: 2 * n_free]
-    first = 2 * n_free + nuisance_prior.sensors.size
-    for number in range(len(nuisance_prior.inputs)):
-        mine = stretches.input_of == number
-        rows[first + number * n_free : first + (number + 1) * n_free, mine] += seen[2 * n_free : 3 * n_free, mine]
-    first += nuisance_prior.inputs.size
-    rows[first : first + n_free] += seen[3 * n_free : 4 * n_free]
-    first += n_free
-    for which in range(2 if len(nuisance_prior.moving) else 0):
-        for record in nuisance_prior.moving:
-            rows[first : first + n_free, record] += seen[(4 + which) * n_free : (5 + which) * n_free, record]
-            first += n_free
-    found = np.nan_to_num(as_real(np.concatenate([rows, seen[len(changes) :]])), posinf=0.0, neginf=0.0)
-    return np.where(np.abs(found).max(axis=1, keepdims=True) < RUNAWAY, found, 0.0)
-
-
-def _normal(shot: _Shot, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    n = len(shot.start.unknowns)
-    prior = np.full(len(rows), WEAK_PRIOR)
-    prior[:n] = 1.0
-    right = rows @ shot.misfit
-    right[:n] -= shot.start.unknowns
-    return rows @ rows.T + np.diag(prior), right
-
-
-def _step(shot: _Shot, rows: FloatArray, damping: float) -> Start:
-    start, n = shot.start, len(shot.start.unknowns)
-    normal, right = _normal(shot, rows)
-    damped = normal + damping * np.diag(np.diag(normal))
-    step = solve_even(damped, right)
-    step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
-    shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
-    return replace(
-        start, strength=float(start.strength * (1 + step[n])), shape=float(shape), unknowns=start.unknowns + step[:n]
+def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> _Simulation:
+    time_response = TimeResponse(
+        segments=segments, nuisance_prior=nuisance_prior, nuisance=start.nuisance, location=start.location
+    )
+    compliance = time_response.compliance(hold=start.law.holds)
+    response = respond(nuisance_prior.modal_model, segments.s, nuisance_prior.to_values(start.nuisance, start.location))
+    used = segments.used
+    with np.errstate(all="ignore"):  # too long a step may diverge: its cost is infinite
+        history = step_in_time(
+            start.law, (start.strength, start.shape), compliance, *time_response.motion_without_law()
+        )
+        force = _transform_force(segments, history.force, holds=start.law.holds)
+        by_law = response.to_sensors(start.location) * force[:, None]
+        motion = linear_sensor_motion(segments, nuisance_prior, response) - by_law
+        motion[nuisance_prior.moving] += nuisance_prior.sensor_free_vibration(start.nuisance, response)
+        misfit = as_real_rows((segments.motion - motion)[:, :, used] / np.sqrt(segments.variance[:, :, used]))
+    return _Simulation(
+        start=start,
+        response=response,
+        time_response=time_response,
+        compliance=compliance,
+        history=history,
+        force=force,
+        misfit=misfit,
     )
 
 
-def _finish(shot: _Shot, rows: FloatArray, *, settled: bool) -> LawFit:
-    start, n = shot.start, len(shot.start.unknowns)
-    normal, _ = _normal(shot, rows)
-    inverse = solve_even(normal, np.eye(len(rows))[:, n:])[n:]
+def _transform_force(segments: SegmentSet, force: FloatArray, *, holds: bool) -> ComplexArray:
+    """Transform a law's force; one that is held for a step acts around its time as in `discretise_modes`."""
+    laplace = NumericalLaplace(segments, oversampling=REFINEMENT, fades=False)
+    lines = laplace.at_lines(np.where(np.isfinite(force), force, 0.0))
+    lines[~np.isfinite(force).all(-1)] = np.inf
+    angle = segments.s * laplace.step_s
+    return lines * (np.expm1(HOLD_LEAD * angle) - np.expm1((HOLD_LEAD - 1) * angle)) / angle if holds else lines
+
+
+def _derivative_rows(
+    segments: SegmentSet, nuisance_prior: NuisancePrior, simulation: _Simulation, added: FloatArray | None = None
+) -> FloatArray:
+    """Derive the weighted responses by nuisance, strength and shape (times their size), and added forces."""
+    start, used, n_free = simulation.start, segments.used, len(nuisance_prior.modes)
+    changes = simulation.time_response.derivatives(simulation.history.force)
+    with np.errstate(all="ignore"):  # derivatives that diverge are set to zero below
+        by_force = step_tangent(start.law, simulation.compliance, simulation.history, changes, added)
+    to_sensors = simulation.response.to_sensors(start.location)[:, used]
+    weight = 1 / np.sqrt(segments.variance[:, :, used])
+    lines = _transform_force(segments, by_force, holds=start.law.holds)[..., used]
+    with np.errstate(all="ignore"):
+        by_law = -to_sensors * lines[:, :, None] * weight
+    on_used = simulation.response.on(used)
+    rows = nuisance_prior.jacobian(segments, on_used, -simulation.force[:, used], start.location, start.nuisance)
+    rows[: 2 * n_free] += by_law[: 2 * n_free]
+    first = 2 * n_free + nuisance_prior.sensors.size
+    for number in range(len(nuisance_prior.inputs)):
+        of_input = segments.input_of == number
+        rows[first + number * n_free : first + (number + 1) * n_free, of_input] += by_law[
+            2 * n_free : 3 * n_free, of_input
+        ]
+    first += nuisance_prior.inputs.size
+    rows[first : first + n_free] += by_law[3 * n_free : 4 * n_free]
+    first += n_free
+    for which in range(2 if len(nuisance_prior.moving) else 0):
+        for segment in nuisance_prior.moving:
+            rows[first : first + n_free, segment] += by_law[(4 + which) * n_free : (5 + which) * n_free, segment]
+            first += n_free
+    real_rows = np.nan_to_num(as_real_rows(np.concatenate([rows, by_law[len(changes) :]])), posinf=0.0, neginf=0.0)
+    return np.where(np.abs(real_rows).max(axis=1, keepdims=True) < DIVERGED, real_rows, 0.0)
+
+
+def _normal_equations(simulation: _Simulation, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    n = len(simulation.start.nuisance)
+    prior = np.full(len(rows), WEAK_PRIOR)
+    prior[:n] = 1.0
+    right = rows @ simulation.misfit
+    right[:n] -= simulation.start.nuisance
+    return rows @ rows.T + np.diag(prior), right
+
+
+def _damped_step(simulation: _Simulation, rows: FloatArray, damping: float) -> LawStart:
+    start, n = simulation.start, len(simulation.start.nuisance)
+    normal, right = _normal_equations(simulation, rows)
+    damped = normal + damping * np.diag(np.diag(normal))
+    step = solve_scaled(damped, right)
+    step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
+    shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
+    return replace(
+        start, strength=float(start.strength * (1 + step[n])), shape=float(shape), nuisance=start.nuisance + step[:n]
+    )
+
+
+def _as_law_fit(simulation: _Simulation, rows: FloatArray, *, converged: bool) -> LawFit:
+    start, n = simulation.start, len(simulation.start.nuisance)
+    normal, _ = _normal_equations(simulation, rows)
+    inverse = solve_scaled(normal, np.eye(len(rows))[:, n:])[n:]
     sizes = np.array([start.strength, start.shape])[: len(rows) - n]
     covariance = np.zeros((2, 2))
     covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
     return LawFit(
         law=start.law,
-        place=start.place,
+        location=start.location,
         strength=start.strength,
         shape=start.shape,
-        unknowns=start.unknowns,
-        cost=shot.cost,
-        n_rows=len(shot.misfit),
+        nuisance=start.nuisance,
+        cost=simulation.cost,
+        n_rows=len(simulation.misfit),
         covariance=covariance,
-        motion=shot.done.motion,
-        velocity=shot.done.velocity,
-        force=shot.force,
-        misfit=shot.misfit,
-        settled=settled,
+        motion=simulation.history.motion,
+        velocity=simulation.history.velocity,
+        force=simulation.force,
+        misfit=simulation.misfit,
+        converged=converged,
     )

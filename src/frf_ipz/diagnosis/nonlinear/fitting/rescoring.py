@@ -1,8 +1,8 @@
-"""Fits that explain alike, told apart with the variance that each of them leaves.
+"""Rescoring of fits that explain equally well, with the variance that each of them leaves.
 
-How much the model may miss is a guess beforehand: one part of every response, on all lines of all channels. Here it is
-a further unknown of each channel and band, as in iteratively reweighted least squares: a fit is worth the likelihood
-that it reaches with the variances that suit it best. Where less is left than was guessed the data count for more.
+The expected error of the model is a guess beforehand: one part of every response, on all lines of all channels. Here it
+is a further parameter of each channel and subband, as in iteratively reweighted least squares: the evidence of a fit is
+its likelihood with the variances that suit it best. Where the misfit is smaller than guessed the data count for more.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import FloatArray, IntArray
-    from frf_ipz.diagnosis.nonlinear.fitting.candidates import LawFitProgress
-    from frf_ipz.diagnosis.nonlinear.fitting.refine import LawFit
-    from frf_ipz.diagnosis.nonlinear.recorded.segments import SegmentSet
+    from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
+    from frf_ipz.diagnosis.nonlinear.fitting.problem import LawFitProblem
+    from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-ALIKE, MOST = 0.1, 4  # relative difference of the costs of fits that are compared, and how many of them
-BANDS = 8  # in which the variance is read: wide enough for tens of numbers
-LEAST = 1e-4  # of the variance expected: what may be left of it
+MAX_DIFFERENCE, MAX_FITS = 0.1, 4  # relative difference of the costs of fits that are rescored, and how many of them
+SUBBANDS = 8  # in which the variance is estimated: wide enough for tens of numbers
+LEAST_RATIO = 1e-4  # of the expected variance
 STEPS, ROUNDS = 12, 2  # of each fit under a new variance, and of new variances
-FAR_OFF = 4.0  # mean square over the expected one: with more, the model is wrong, not its variance
+MODEL_WRONG = 4.0  # mean square over the expected one: with more, the model is wrong, not its variance
 
 
-def tell_apart(track: LawFitProgress, fits: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
-    """Compare the best fits once more.
+def rescore(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
+    """Rescore the best fits.
 
     Parameters
     ----------
-    track : LawFitProgress
+    problem : LawFitProblem
         The data.
     fits : sequence of LawFit
         Fitted to them, the smallest cost first.
@@ -43,52 +43,53 @@ def tell_apart(track: LawFitProgress, fits: Sequence[LawFit]) -> tuple[list[LawF
     Returns
     -------
     fits : list of LawFit
-        The first of them, in the same order, fitted with the variance that each leaves; cost and misfit are of the
-        data as they are. As they were, where nothing explains like the best.
+        The first of them, in the same order, fitted with the variance that each leaves; cost and misfit are for the
+        variance of the data. Unchanged, where no other fit is close to the best.
     behind : (n_fits,) array
-        Evidence that each lacks against the best of them, nats.
+        Log evidence that each lacks against the best of them.
     """
-    near = list(takewhile(lambda fit: fit.cost <= (1 + ALIKE) * fits[0].cost, fits[:MOST]))
-    if len(near) == 1 or near[0].cost > FAR_OFF * near[0].n_rows:
-        return near, np.zeros(len(near))
-    near = [_reweighted(track, fit) for fit in near]
-    evidence = np.array([_evidence(track.stretches, fit) for fit in near])
-    return near, evidence.max() - evidence
+    contenders = list(takewhile(lambda fit: fit.cost <= (1 + MAX_DIFFERENCE) * fits[0].cost, fits[:MAX_FITS]))
+    if len(contenders) == 1 or contenders[0].cost > MODEL_WRONG * contenders[0].n_rows:
+        return contenders, np.zeros(len(contenders))
+    contenders = [_reweight(problem, fit) for fit in contenders]
+    log_evidence = np.array([_log_evidence(problem.segments, fit) for fit in contenders])
+    return contenders, log_evidence.max() - log_evidence
 
 
-def _reweighted(track: LawFitProgress, fit: LawFit) -> LawFit:
-    """Fit with the variance that is left, and see what then is left of the data as they are."""
-    stretches, nuisance_prior = track.stretches, track.linear.nuisance_prior
+def _reweight(problem: LawFitProblem, fit: LawFit) -> LawFit:
+    """Fit with the variance that remains, and evaluate that fit with the variance of the data."""
+    segments, nuisance_prior = problem.segments, problem.linear.nuisance_prior
     for _ in range(ROUNDS):
-        own = replace(stretches, variance=stretches.variance * _along_lines(stretches, _left(stretches, fit)))
-        again = fit_output_error(own, nuisance_prior, fit.start(), iterations=STEPS)
-        fit = fit_output_error(stretches, nuisance_prior, again.start(), iterations=0)
+        ratio = _along_lines(segments, _variance_ratio(segments, fit))
+        reweighted = replace(segments, variance=segments.variance * ratio)
+        refitted = fit_output_error(reweighted, nuisance_prior, fit.start(), iterations=STEPS)
+        fit = fit_output_error(segments, nuisance_prior, refitted.start(), iterations=0)
     return fit
 
 
-def _evidence(stretches: SegmentSet, fit: LawFit) -> float:
-    """Logarithm of the likelihood with the best variance of each channel and band, and of the prior, nats."""
-    seen = np.isfinite(stretches.variance).any(2)
-    logarithms = np.log(_left(stretches, fit)[seen])
-    return float(-np.sum(logarithms * np.diff(_edges(stretches))) - fit.unknowns @ fit.unknowns / 2)
+def _log_evidence(segments: SegmentSet, fit: LawFit) -> float:
+    """Log likelihood with the best variance of each channel and subband, and log prior."""
+    present = np.isfinite(segments.variance).any(2)
+    logarithms = np.log(_variance_ratio(segments, fit)[present])
+    return float(-np.sum(logarithms * np.diff(_subband_edges(segments))) - fit.nuisance @ fit.nuisance / 2)
 
 
-def _left(stretches: SegmentSet, fit: LawFit) -> FloatArray:
-    """(n_blows, n_sensors, n_bands) mean square that a fit leaves, over the expected one."""
-    shape = (*stretches.variance.shape[:2], len(stretches.used))
+def _variance_ratio(segments: SegmentSet, fit: LawFit) -> FloatArray:
+    """(n_segments, n_sensors, n_subbands) mean square misfit over the expected one."""
+    shape = (*segments.variance.shape[:2], len(segments.used))
     square = np.abs(fit.misfit.view(complex).reshape(shape)) ** 2 / 2
-    left = np.stack([square[..., a:b].mean(-1) for a, b in pairwise(_edges(stretches))], -1)
-    return np.asarray(np.maximum(left, LEAST))
+    ratio = np.stack([square[..., a:b].mean(-1) for a, b in pairwise(_subband_edges(segments))], -1)
+    return np.asarray(np.maximum(ratio, LEAST_RATIO))
 
 
-def _edges(stretches: SegmentSet) -> IntArray:
-    """(n_bands + 1,) edges of the bands, numbers of used lines."""
-    return np.unique(np.linspace(0, len(stretches.used), BANDS + 1).astype(int))
+def _subband_edges(segments: SegmentSet) -> IntArray:
+    """(n_subbands + 1,) edges of the subbands, numbers of used lines."""
+    return np.unique(np.linspace(0, len(segments.used), SUBBANDS + 1).astype(int))
 
 
-def _along_lines(stretches: SegmentSet, of_bands: FloatArray) -> FloatArray:
-    """(n_blows, n_sensors, n_lines) smooth course of positive numbers of the bands."""
-    edges, lines = _edges(stretches), np.arange(len(stretches.s))
-    middle = stretches.used[(edges[:-1] + edges[1:]) // 2]
-    smooth = np.apply_along_axis(lambda row: np.interp(lines, middle, row), -1, np.log(of_bands))
+def _along_lines(segments: SegmentSet, of_subbands: FloatArray) -> FloatArray:
+    """(n_segments, n_sensors, n_lines) smooth interpolation of positive numbers of the subbands."""
+    edges, lines = _subband_edges(segments), np.arange(len(segments.s))
+    middle = segments.used[(edges[:-1] + edges[1:]) // 2]
+    smooth = np.apply_along_axis(lambda row: np.interp(lines, middle, row), -1, np.log(of_subbands))
     return np.asarray(np.exp(smooth))

@@ -1,1 +1,1 @@
-"""Force laws, one a module, found by themselves."""
+"""Force laws, one a module, found without a list."""

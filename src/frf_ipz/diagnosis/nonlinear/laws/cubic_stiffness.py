@@ -29,8 +29,8 @@ class CubicStiffness(Law):
         del v
         u, scale = w, step.motion * step.strength
         if scale > 0:
-            bent = np.sqrt(3 * scale)
-            u = 2 / bent * np.sinh(np.arcsinh(1.5 * bent * w) / 3)
+            root = np.sqrt(3 * scale)
+            u = 2 / root * np.sinh(np.arcsinh(1.5 * root * w) / 3)
             return np.asarray(step.strength * u * u * u)
         for _ in range(NEWTON_STEPS):
             square = scale * (u * u)

@@ -11,7 +11,7 @@ PARTS = np.array([3e-4, 1e-3, 3e-3, 1e-2])  # of the largest velocity: below, th
 
 
 class DryFriction(Law):
-    """Force F_c against the velocity; while nothing moves, whatever holds it up to F_c.
+    """Force F_c against the velocity; at standstill the force that holds, up to F_c.
 
     In the fit the jump at standstill is a steep slope, tanh(v / v_s), since velocities that come from measurements are
     never quite zero; v_s is chosen by the data and is no parameter of the law. The simulation has the jump itself.

@@ -1,4 +1,4 @@
-"""Finds force laws: the modules of this folder, and classes in users' own files."""
+"""Finding force laws: the modules of this folder, and classes in users' own files."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def shipped_laws() -> dict[str, Law]:
     dict of str to Law
         By name.
     """
-    found: dict[str, Law] = {}
+    found_laws: dict[str, Law] = {}
     for module in pkgutil.iter_modules(laws.__path__, f"{laws.__name__}."):
-        found |= {item.name: item() for item in classes_in(import_module(module.name), Law)}
-    return found
+        found_laws |= {law_class.name: law_class() for law_class in classes_in(import_module(module.name), Law)}
+    return found_laws
 
 
 def select_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, ...]:
-    """Give the laws that are to be looked for.
+    """Select the laws that are searched for.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def select_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, .
     Returns
     -------
     tuple of Law
-        Perhaps none.
+        Possibly none.
 
     Raises
     ------
@@ -52,4 +52,4 @@ def select_laws(options: DiagnoseOptions, folder: Path = Path()) -> tuple[Law, .
     """
     shipped = (law for name, law in shipped_laws().items() if not options.effects or name in options.effects)
     classes = (read_class(reference, folder, (Effect, Law)) for reference in options.extra_effects)
-    return (*shipped, *(found() for found in classes if issubclass(found, Law)))
+    return (*shipped, *(law_class() for law_class in classes if issubclass(law_class, Law)))

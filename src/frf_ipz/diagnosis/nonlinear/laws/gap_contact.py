@@ -19,7 +19,7 @@ class GapContact(Law):
     phrase = "a stop behind a gap of {1} m, with a contact stiffness of {0} N/m,"
 
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
-        """Say how far the motion goes beyond the gap."""
+        """Compute the motion beyond the gap."""
         del v
         return np.maximum(w - shape, 0.0)
 

@@ -1,8 +1,8 @@
-"""What a module of `laws` has to say about its force law.
+"""The interface of a force law.
 
-A law is one module with one class that derives from `Law`: the force for motion and velocity at its place, linear in
-one number (its strength), and perhaps bent by a second one (its shape). Search, fit, simulation and verdict follow from
-that. A class in a user's own file does the same::
+A law is one module with one class that derives from `Law`: the force for motion and velocity at its location,
+proportional to one parameter (its strength), and perhaps shaped by a second one (its shape). Search, fit, simulation
+and verdict follow from that. A class in a user's own file does the same::
 
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
 
@@ -24,61 +24,61 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 
-NEWTON_STEPS = 4  # from the force of the step before
+NEWTON_STEPS = 4  # from a force of zero
 DIFFERENCE = 1e-6  # of the motion: step of a derivative, half the digits of double precision
-LEAST_WAY = 1e-30  # m: keeps a derivative at rest finite
+LEAST_MOTION = 1e-30  # m: keeps a derivative at rest finite
 
 
 class Law(ABC):
-    """A force between a place and the ground, or across a spring, against its motion w and velocity v."""
+    """A force between a location and the ground, or across a spring, against its motion w and velocity v."""
 
     name: ClassVar[str]
     """As in `diagnosis.json`."""
     strength_name: ClassVar[str]
     """The parameter that the force is proportional to."""
     shape_name: ClassVar[str] = ""
-    """The parameter that bends the law; empty for a law without, or for one whose shape is no parameter."""
+    """The parameter that shapes the law; empty for a law without, or for one whose shape is no parameter."""
     strength_can_be_negative: ClassVar[bool] = False
     holds: ClassVar[bool] = False
-    """It can hold its place still: in a simulation its force is then constant within a time step."""
+    """It can hold its location still: in a simulation its force is then constant within a time step."""
     degree: ClassVar[float] = 2.0
     """Power of the motion that the work of the force grows with."""
     phrase: ClassVar[str] = ""
-    """What sits at the place, in words: ``{}`` is the strength, or ``{0}`` the strength and ``{1}`` the shape."""
+    """The law in words: ``{}`` is the strength, or ``{0}`` the strength and ``{1}`` the shape."""
 
     @abstractmethod
     def unit_force(self, w: FloatArray, v: FloatArray, shape: float) -> FloatArray:
         """Force for a strength of 1, N; `w` in m and `v` in m/s have any common shape."""
 
     def shapes(self, largest_w: float, largest_v: float) -> FloatArray:
-        """Shapes to start from, for the largest motion and velocity of the place; one zero where there is none."""
+        """Shapes to start from, for the largest motion and velocity of the location; one zero where there is none."""
         del largest_w, largest_v
         return np.zeros(1)
 
     def solve(self, w: FloatArray, v: FloatArray, step: StepCompliance) -> FloatArray:
-        """Force at the end of a time step, where w and v are those without it and it gives way by the compliance.
+        """Force at the end of a time step; w and v are those without it, and it changes them by its compliance.
 
         The default is Newton's method on the force itself; a law with a kink or a jump is better off in closed form.
         """
         force = np.zeros_like(w)
         for _ in range(NEWTON_STEPS):
-            here = step.strength * self.unit_force(w - step.motion * force, v - step.velocity * force, step.shape)
-            more = DIFFERENCE * np.maximum(np.abs(w), LEAST_WAY) / max(step.motion, LEAST_WAY)
-            there = step.strength * self.unit_force(
-                w - step.motion * (force + more), v - step.velocity * (force + more), step.shape
+            by_law = step.strength * self.unit_force(w - step.motion * force, v - step.velocity * force, step.shape)
+            increment = DIFFERENCE * np.maximum(np.abs(w), LEAST_MOTION) / max(step.motion, LEAST_MOTION)
+            changed = step.strength * self.unit_force(
+                w - step.motion * (force + increment), v - step.velocity * (force + increment), step.shape
             )
-            force = force - (force - here) / (1 - (there - here) / more)
+            force = force - (force - by_law) / (1 - (changed - by_law) / increment)
         return force
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepCompliance:
-    """What a force at the end of a time step does to its own place, and the law's numbers.
+    """Effect of a force at the end of a time step on its own location, and the law's parameters.
 
     Parameters
     ----------
     motion, velocity : float
-        Motion and velocity that a unit force takes away, m/N and m/s/N.
+        Motion and velocity that a unit force subtracts, m/N and m/s/N.
     strength, shape : float
         Of the law.
     """

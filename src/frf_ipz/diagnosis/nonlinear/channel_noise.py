@@ -1,4 +1,4 @@
-"""Noise of the channels, read where nothing drives the structure: before and after blows, or beside a shaker's band."""
+"""Noise of all channels, read where nothing drives the structure: around impacts, or beside a shaker's band."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
     from frf_ipz.dofs import Dof
 
-QUIET_PART = 0.3  # quantile of a band of lines that holds noise, between resonances
-QUIET_MEDIAN = 0.42  # that quantile of the mean of a few exponential variables over their mean
+NOISE_QUANTILE = 0.3  # of a subband of lines: noise between resonances
+QUANTILE_OF_MEAN = 0.42  # that quantile of the mean of a few exponential variables over their mean
 UNDRIVEN = 1e-4  # of the force's energy in the band: lines that a shaker does not drive
-LEAST_LINES = 20
+MIN_LINES = 20
 MEDIAN_OF_MEAN = 0.7  # of exponential variables
-PINK = 1.0  # 1/f part over white part at the undriven lines, where only these are seen: half of each
-TRACE = 1e-6  # of the response's energy, where noise is not seen at all
+PINK = 1.0  # 1/f part over white part at the undriven lines, which do not show them separately: half of each
+TRACE = 1e-6  # of the response's energy, where noise does not show at all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,13 +35,13 @@ class ChannelNoise:
     is_hammer : bool
         The force is isolated before it is used, and its noise is that of the pulse alone.
     sensors : tuple of (str, Dof)
-        Channels and where they sat.
+        Channels and their DOFs.
     force : Noise
         N^2 s.
     responses : tuple of Noise
         unit^2 s.
     pulse_s : float
-        Length of the pulse that is kept of a hammer's blow.
+        Length of the gate of an impact.
     """
 
     is_hammer: bool
@@ -51,7 +51,7 @@ class ChannelNoise:
     pulse_s: float
 
     def force_of(self, record: ObservedRecord) -> FloatArray:
-        """(n_samples,) force without what is noise for sure."""
+        """(n_samples,) force, that of an impact without the noise outside its pulse."""
         return isolate_pulse(record).record.force if self.is_hammer else record.force
 
     def force_energy(self, frequency_hz: FloatArray, duration_s: float) -> FloatArray:
@@ -69,36 +69,39 @@ def read_noise(observations: Observations) -> ChannelNoise:
     Parameters
     ----------
     observations : Observations
-        Blows or records.
+        Records of a hammer or a shaker.
 
     Returns
     -------
     ChannelNoise
-        A trace where noise is not seen at all.
+        A trace where noise does not show at all.
     """
     is_hammer = observations.kind == "hammer"
     sensors = tuple({(s.channel, s.dof): None for record in observations.records for s in record.sensors})
-    signals = [_signals(observations, sensor) for sensor in sensors]
+    signals = [_responses_of(observations, sensor) for sensor in sensors]
     step = observations.records[0].step_s
     if is_hammer:
         pulses = tuple(isolate_pulse(record) for record in observations.records)
         length = float(np.median([pulse.stop - pulse.start for pulse in pulses])) * step
-        found = [quiet_density([s[len(s) // 2 :] for s in mine], step).rounded(mine, step) for mine in signals]
+        responses = [
+            estimate_decayed_noise([s[len(s) // 2 :] for s in of_sensor], step).rounded(of_sensor, step)
+            for of_sensor in signals
+        ]
         force = estimate_force_noise(observations.records, pulses)
-        return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(found), pulse_s=length)
+        return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(responses), pulse_s=length)
     forces = [record.force for record in observations.records]
-    lines = _undriven(forces, step, observations.band_hz)
+    lines = _find_undriven_lines(forces, step, observations.band_hz)
     return ChannelNoise(
         is_hammer=False,
         sensors=sensors,
-        force=_beside(forces, lines, step),
-        responses=tuple(_beside(mine, lines, step) for mine in signals),
+        force=_undriven_noise(forces, lines, step),
+        responses=tuple(_undriven_noise(of_sensor, lines, step) for of_sensor in signals),
         pulse_s=0.0,
     )
 
 
-def quiet_density(tails: list[FloatArray], step_s: float) -> Noise:
-    """Read the noise of a channel between the resonances of signals that have nearly decayed.
+def estimate_decayed_noise(tails: list[FloatArray], step_s: float) -> Noise:
+    """Estimate the noise of a channel between the resonances of signals that have nearly decayed.
 
     Parameters
     ----------
@@ -118,14 +121,14 @@ def quiet_density(tails: list[FloatArray], step_s: float) -> Noise:
     energy *= step_s / np.sum(hann**2)
     edges = np.unique(np.geomspace(3, len(energy), 25).astype(int))
     frequency = np.array([(a + b - 1) / 2 / (n * step_s) for a, b in pairwise(edges)])
-    quiet = np.array([np.quantile(energy[a:b], QUIET_PART) for a, b in pairwise(edges)])
-    quiet /= QUIET_MEDIAN ** (1 / len(tails))
+    quiet = np.array([np.quantile(energy[a:b], NOISE_QUANTILE) for a, b in pairwise(edges)])
+    quiet /= QUANTILE_OF_MEAN ** (1 / len(tails))
     white = float(np.median(np.sort(quiet)[: max(len(quiet) // 3, 1)]))
     pink = float(np.quantile(np.maximum(quiet - white, 0.0) * frequency, 0.4))
     return Noise(white=white, pink=pink)
 
 
-def _signals(observations: Observations, sensor: tuple[str, Dof]) -> list[FloatArray]:
+def _responses_of(observations: Observations, sensor: tuple[str, Dof]) -> list[FloatArray]:
     return [
         row
         for record in observations.records
@@ -134,27 +137,27 @@ def _signals(observations: Observations, sensor: tuple[str, Dof]) -> list[FloatA
     ]
 
 
-def _energies(signals: list[FloatArray], step_s: float) -> FloatArray:
+def _periodograms(signals: list[FloatArray], step_s: float) -> FloatArray:
     """(n_signals, n_lines) two-sided periodograms, unit^2 s."""
     n = min(len(signal) for signal in signals)
     hann = np.hanning(n)
     return np.array([np.abs(np.fft.rfft(signal[:n] * hann)) ** 2 for signal in signals]) * (step_s / np.sum(hann**2))
 
 
-def _undriven(forces: list[FloatArray], step_s: float, band_hz: tuple[float, float]) -> FloatArray:
-    """Frequencies above the band that a shaker does not drive, and the number of all lines: (n, ) array, Hz."""
-    energy = _energies(forces, step_s).mean(0)
+def _find_undriven_lines(forces: list[FloatArray], step_s: float, band_hz: tuple[float, float]) -> FloatArray:
+    """Frequencies above the band that a shaker does not drive, (n,) array, Hz."""
+    energy = _periodograms(forces, step_s).mean(0)
     frequency = np.fft.rfftfreq(min(len(force) for force in forces), step_s)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     smooth = median_filter(energy, 31)
     return np.asarray(frequency[(smooth < UNDRIVEN * np.median(energy[inside])) & (frequency > band_hz[1])])
 
 
-def _beside(signals: list[FloatArray], lines_hz: FloatArray, step_s: float) -> Noise:
-    """Noise of a channel by the quietest record's lines that are not driven."""
-    if len(lines_hz) < LEAST_LINES:
+def _undriven_noise(signals: list[FloatArray], lines_hz: FloatArray, step_s: float) -> Noise:
+    """Noise of a channel by the undriven lines of the quietest record."""
+    if len(lines_hz) < MIN_LINES:
         return Noise(white=TRACE * step_s * float(np.mean([np.var(signal) for signal in signals])))
     n = min(len(signal) for signal in signals)
     rows = np.rint(lines_hz * n * step_s).astype(int)
-    white = float(np.median(_energies(signals, step_s)[:, rows], axis=1).min()) / MEDIAN_OF_MEAN
+    white = float(np.median(_periodograms(signals, step_s)[:, rows], axis=1).min()) / MEDIAN_OF_MEAN
     return Noise(white=white, pink=PINK * white * float(np.median(lines_hz)))

@@ -1,0 +1,1 @@
+"""The linear structure with a law: modal model, nuisance prior, and its response in time."""

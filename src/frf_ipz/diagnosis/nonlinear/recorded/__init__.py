@@ -1,1 +1,0 @@
-"""What single recordings say: noise, and transforms of their stretches."""
