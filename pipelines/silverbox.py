@@ -23,7 +23,7 @@ from frf_ipz.quantities import FrfQuantity
 
 RATE_HZ = 1e7 / 2**14
 GROWING = slice(100, 40500)  # samples whose level grows from nothing
-PIECES = 4
+SEGMENTS = 4
 MAINS_HZ = (148.0, 152.0)  # the third harmonic of the mains stands out of the weak part
 TOLERANCES = DiagnoseOptions(frequency_tolerance=0.02, damping_tolerance=0.5, gain_tolerance=0.02)
 
@@ -63,7 +63,7 @@ def linear_oscillator(force: np.ndarray, motion: np.ndarray) -> np.ndarray:
 
 
 def main(folder: Path) -> None:
-    """Print what is found."""
+    """Search with the laws of the catalogue, and with the law of this file."""
     data = pd.read_csv(folder / "SNLS80mV.csv", usecols=["V1", "V2"]).to_numpy()[GROWING].T
     force, motion = data - data[:, :50].mean(1, keepdims=True)
     mass, damping, stiffness = linear_oscillator(force[:8000], motion[:8000])
@@ -79,29 +79,29 @@ def main(folder: Path) -> None:
         model = read_model(path)
     dof = parse_dof("1:+x")
     sensors = (Sensor(channel="V2", dof=dof, quantity=FrfQuantity.RECEPTANCE),)
-    cuts = np.array_split(np.arange(len(force)), PIECES)
+    cuts = np.array_split(np.arange(len(force)), SEGMENTS)
     records = tuple(
-        ObservedRecord(name=f"piece {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
+        ObservedRecord(name=f"segment {i}", input_channel="V1", input_dof=dof, sensors=sensors, step_s=1 / RATE_HZ,
              force=force[cut], responses=motion[None, cut], starts_at_rest=i == 0)
         for i, cut in enumerate(cuts)
     )  # fmt: skip
     observations = Observations(kind="random", records=records, band_hz=(20.0, 180.0), exclude_hz=(MAINS_HZ,))
     print(f"weak: {np.sqrt(stiffness / mass) / 2 / np.pi:.2f} Hz, damping ratio {ratio:.4f}, k1 {stiffness:.4g}")
     show(search_laws(model, observations, TOLERANCES), stiffness)
-    own = replace(TOLERANCES, extra_effects=("silverbox.py:CubicWithSquare",))
-    show(search_laws(model, observations, own, folder=Path(__file__).parent), stiffness)
+    with_own_law = replace(TOLERANCES, extra_effects=("silverbox.py:CubicWithSquare",))
+    show(search_laws(model, observations, with_own_law, folder=Path(__file__).parent), stiffness)
 
 
-def show(found: LawSearch, stiffness: float) -> None:
-    """Print what a search found."""
-    print(f"\n{found.verdict} (linearity {found.linearity.score:.3g} against {found.linearity.limit:g})")
-    print(found.statement)
-    for finding in found.findings:
-        numbers = {name: f"{one.value:.4g} +- {one.std:.2g}" for name, one in finding.parameters.items()}
-        print(f"  {finding.effect}: {finding.log_evidence_gain:.0f} nats, {numbers}")
-    for when, misfit in (("linear", found.updated), ("with the law", found.after)):
+def show(result: LawSearch, stiffness: float) -> None:
+    """Print the result of a search."""
+    print(f"\n{result.verdict} (linearity {result.linearity.score:.3g} against {result.linearity.limit:g})")
+    print(result.statement)
+    for finding in result.findings:
+        numbers = {name: f"{estimate.value:.4g} +- {estimate.std:.2g}" for name, estimate in finding.parameters.items()}
+        print(f"  {finding.effect}: log Bayes factor {finding.log_evidence_gain:.0f}, {numbers}")
+    for when, misfit in (("linear", result.updated), ("with the law", result.after)):
         print(f"  {when}: {misfit.training:.2%} of the response is left, {misfit.training_noise:.3g} times the noise")
-    print(f"  k3 / k1 = {found.fit.strength / stiffness:.3g} 1/V^2")
+    print(f"  k3 / k1 = {result.fit.strength / stiffness:.3g} 1/V^2")
 
 
 if __name__ == "__main__":

@@ -77,12 +77,12 @@ def make_findings(
         of_law = [i for i in order if fits[i].law is fit.law]
         share = np.cumsum(probability[of_law]) / max(probability[of_law].sum(), 1e-300)
         covering = of_law[: min(int(np.searchsorted(share, COVERAGE)) + 1, MAX_LOCATIONS)]
-        location_set = tuple(dict(modal_model.locations[fits[i].location].entry) for i in covering)
+        location_set = tuple(dict(modal_model.locations[fits[i].location].entries) for i in covering)
         phrase = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
         statement = f"At {location.words} sits {phrase} that the model lacks."
         findings[fit.law.name] = Finding(
             effect=fit.law.name,
-            location=dict(location.entry),
+            location=dict(location.entries),
             parameters=_estimate_parameters(fit, scale),
             probability=float(probability[of_law].sum()),
             log_evidence_gain=float(gains[index]),

@@ -310,8 +310,8 @@ def _with_location(result: LawSearch, modal_model: ModalModel, located: SimpleLa
     remark = (
         f"A force of another law at {location.words} would: it leaves {np.sqrt(misfit):.2g} times the expected misfit."
     )
-    doubt = describe_location_set([modal_model.locations[i].entry for i in located.ambiguity_set])
-    return replace(result, location=dict(location.entry), statement=f"{result.statement} {remark}{doubt}")
+    doubt = describe_location_set([modal_model.locations[i].entries for i in located.ambiguity_set])
+    return replace(result, location=dict(location.entries), statement=f"{result.statement} {remark}{doubt}")
 
 
 def _hold_out(observations: Observations) -> tuple[Observations, Observations]:

@@ -46,7 +46,7 @@ def test_a_force_is_localised_whatever_its_law(chain, strike, name):
     law, where, location = LAWS[name]
     segments, linear = segments_and_linear_fit(chain.model, strike(law, where))
     localisation = localise_force(segments, linear)
-    assert dict(linear.nuisance_prior.modal_model.locations[localisation.equivalent[0]].entry) == location
+    assert dict(linear.nuisance_prior.modal_model.locations[localisation.equivalent[0]].entries) == location
     assert localisation.forces[0].cost < 1e-3 * linear.cost
     assert set(localisation.equivalent) <= set(localisation.possible)
     assert len(localisation.possible) < len(linear.nuisance_prior.modal_model.locations)

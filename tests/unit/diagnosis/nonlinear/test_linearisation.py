@@ -19,8 +19,8 @@ from frf_ipz.runs.codec import load_result, save_result
 
 OMEGA, AMPLITUDES = 300.0, np.array([2e-4, 1e-4])
 SINE = 1e-3  # relative: whole periods in steps
-NODE = Location(entry={"nodes": [2]}, ends=(Dof(2, "x"),))
-SPRING = Location(entry={"springs": ["k3"]}, ends=(Dof(2, "x"), Dof(3, "x")))
+NODE = Location(entries={"nodes": [2]}, ends=(Dof(2, "x"),))
+SPRING = Location(entries={"springs": ["k3"]}, ends=(Dof(2, "x"), Dof(3, "x")))
 
 
 def swinging(law, strength, shape=0.0):

@@ -179,7 +179,7 @@ def test_a_law_alone_needs_no_nuisance(solved):
 
 
 @pytest.mark.parametrize(
-    ("nuisance_chi2", "alone", "again", "doubt", "has_dynamics", "early", "both"),
+    ("nuisance_chi2", "alone", "relieved", "doubt", "has_dynamics", "early", "is_found"),
     [
         (50.0, ("explained", 2.0), 2.0, "", False, (False, False), True),
         (50.0, ("explained", 2.0), 20.0, "", True, (False, False), True),
@@ -191,31 +191,33 @@ def test_a_law_alone_needs_no_nuisance(solved):
         (5.0, ("explained", 2.0), 0.1, "", False, (False, False), False),
         (50.0, ("explained", 2.0), 2.0, "", False, (True, False), True),
         (50.0, ("explained", 2.0), 2.0, "", False, (True, True), False),
-        (50.0, ("explained", 2.0), 2.0, "hardly swings", False, (False, False), False),
+        (50.0, ("explained", 2.0), 2.0, "implausible", False, (False, False), False),
     ],
 )
 def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
-    monkeypatch, nuisance_chi2, alone, again, doubt, has_dynamics, early, both
+    monkeypatch, nuisance_chi2, alone, relieved, doubt, has_dynamics, early, is_found
 ):
-    """A cause that is what it looks like gains 1000 nats on the recordings without the law, which it leaves `alone`."""
-    seen = SimpleNamespace(records=())
-    cause = SimpleNamespace(effect=SimpleNamespace(has_dynamics=has_dynamics))
-    hypothesis = SimpleNamespace(change=lambda _: "change", doubts=lambda _: (doubt,), causes=(cause,))
+    """The cause has a log Bayes factor of 1000 on the records without the law, which alone leaves `alone`."""
+    observations = SimpleNamespace(records=())
+    component = SimpleNamespace(effect=SimpleNamespace(has_dynamics=has_dynamics))
+    hypothesis = SimpleNamespace(
+        change=lambda _: "change", implausibilities=lambda _: (doubt,), components=(component,)
+    )
     spring = SimpleNamespace(log_evidence=1e3, mean_misfit=1.0, values=(), hypothesis=hypothesis)
     replaced = {
-        "subtract_law": lambda *_: seen,
-        "fit_nothing": lambda _: SimpleNamespace(log_evidence=0.0),
-        "search": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
+        "subtract_law": lambda *_: observations,
+        "fit_null_model": lambda _: SimpleNamespace(log_evidence=0.0),
+        "search_component": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
         "is_significant": lambda *_: True,
         "with_change": lambda *_: "changed model",
         "undo_chain_effects": lambda *_: "restored",
-        "weigh": lambda *_: ["spring"],
-        "finding_of": lambda cause, *_: cause,
+        "rank_effects": lambda *_: ["spring"],
+        "make_finding": lambda component, *_: component,
     }
     for name, stub in replaced.items():
         monkeypatch.setattr(law_beside, name, stub)
-    verdict, left = alone
-    after = SimpleNamespace(training_noise=left)
+    verdict, misfit = alone
+    after = SimpleNamespace(training_noise=misfit)
     at_rest = SimpleNamespace(moving=())
     laws = SimpleNamespace(
         nuisance_chi2=nuisance_chi2,
@@ -226,7 +228,7 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
         is_early=early[0],
         dispersion_rad=0.0,
     )
-    eased = SimpleNamespace(verdict="explained", nuisance_chi2=again, is_early=early[1])
+    beside_cause = SimpleNamespace(verdict="explained", nuisance_chi2=relieved, is_early=early[1])
     problem = SimpleNamespace(kind="hammer")
-    found = law_beside.search_beside_law(lambda _: problem, laws, "model", seen, lambda *_: eased)
-    assert found == ((eased, "spring") if both else None)
+    result = law_beside.search_beside_law(lambda _: problem, laws, "model", observations, lambda *_: beside_cause)
+    assert result == ((beside_cause, "spring") if is_found else None)

@@ -86,7 +86,7 @@ def test_long_segments_count_where_the_free_force_is_localised(monkeypatch, cost
     ("misfit", "linear", "is_stated"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 260.0, True)]
 )
 def test_the_location_of_an_unknown_law_is_stated_where_a_force_there_explains_nearly_all(misfit, linear, is_stated):
-    modal_model = SimpleNamespace(locations=[SimpleNamespace(words="node 1", entry={"nodes": [1]})])
+    modal_model = SimpleNamespace(locations=[SimpleNamespace(words="node 1", entries={"nodes": [1]})])
     unexplained = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
     located = simple_laws_at(0, 100 * misfit, linear_mean_misfit=linear)
     assert bool(search._with_location(unexplained, modal_model, located, search.MOSTLY).location) == is_stated
@@ -94,7 +94,7 @@ def test_the_location_of_an_unknown_law_is_stated_where_a_force_there_explains_n
 
 def test_the_ambiguity_set_is_stated_with_the_location_of_an_unknown_law():
     modal_model = SimpleNamespace(
-        locations=[SimpleNamespace(words=f"node {i}", entry={"nodes": [i]}) for i in range(9)]
+        locations=[SimpleNamespace(words=f"node {i}", entries={"nodes": [i]}) for i in range(9)]
     )
     located = replace(simple_laws_at(5, 20.0), ambiguity_set=(5, 6, 4))
     unexplained = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)

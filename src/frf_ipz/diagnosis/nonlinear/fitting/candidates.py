@@ -33,9 +33,9 @@ FEW_LOCATIONS = 4  # that only a law distinguishes: with more, the best fit at o
 BY_FREE_FORCE = 2  # locations at which laws are read from the free force
 SIMULATED = 2  # locations of each law that are simulated on short segments
 ROUNDS = 6  # of the fit in alternation
-FIRST_STEPS, MORE_STEPS = 2, 6  # of the output-error fit: of all, and of those that are not hopeless
-HOPELESS, HOPELESS_LONG = 10.0, 4.0  # times the smallest cost, on short and on long segments
-HOPELESS_NEIGHBOUR = 1.5  # times the cost of a neighbour that explains already
+FIRST_STEPS, MORE_STEPS = 2, 6  # of the output-error fit: of all, and of those that are not given up
+MAX_COST_RATIO, MAX_COST_RATIO_LONG = 10.0, 4.0  # to the least, on short and long segments: others are given up
+MAX_COST_RATIO_NEIGHBOUR = 1.5  # to the cost of a neighbour that explains already
 FINALISTS = 3  # that are simulated on long segments
 FAR_OFF = 4.0  # mean square misfit over the expected one: with more, laws are simulated as read from the free force
 MAX_EARLY_PART = 0.5  # of the linear model's cost for the first moments: with more, they say little about a law
@@ -113,7 +113,7 @@ def _fit_first_moments(problem: LawFitProblem, laws: Sequence[Law]) -> list[LawF
     """Fit the first moments; of each law those fits that explain most of what nothing linear explains."""
     scored = _fit_scored(problem, laws)
     fits = _simulate_with_neighbours(problem, [fit for law in laws for fit in _of_law(law, scored)[:SIMULATED]])
-    good = [fit for fit in fits if fit.cost < min(MAX_EARLY_PART * problem.linear.cost, HOPELESS * fits[0].cost)]
+    good = [fit for fit in fits if fit.cost < min(MAX_EARLY_PART * problem.linear.cost, MAX_COST_RATIO * fits[0].cost)]
     return [fit for law in laws for fit in _of_law(law, good)[:SIMULATED]]
 
 
@@ -133,7 +133,7 @@ def _simulate_with_neighbours(problem: LawFitProblem, starts: Iterable[LawFit]) 
 
 def _finish(problem: LawFitProblem, finalists: Iterable[LawFit]) -> list[LawFit]:
     """Fit to the long segments, the best until it converges; the smallest cost first."""
-    fits = _simulate(problem, _first_of_each(finalists), hopeless=HOPELESS_LONG)
+    fits = _simulate(problem, _first_of_each(finalists), max_ratio=MAX_COST_RATIO_LONG)
     _search_neighbours(problem, fits)
     if fits:
         least = min(fit.cost for fit in fits)
@@ -209,13 +209,13 @@ def _free_force_starts(problem: LawFitProblem, laws: Sequence[Law]) -> list[LawS
 
 
 def _simulate(
-    problem: LawFitProblem, fits: Sequence[LawFit], *, hopeless: float = HOPELESS, least: float = np.inf
+    problem: LawFitProblem, fits: Sequence[LawFit], *, max_ratio: float = MAX_COST_RATIO, least: float = np.inf
 ) -> list[LawFit]:
-    """Fit by simulation; those that are hopeless after a few steps, against the least cost, only so far."""
+    """Fit by simulation; those whose cost after a few steps is too far above the least, only so far."""
     simulated = [problem.fit_output_error(fit, FIRST_STEPS) for fit in fits]
     least = min(least, *(fit.cost for fit in simulated)) if simulated else least
     return [
-        fit if fit.converged or fit.cost > hopeless * least else problem.fit_output_error(fit, MORE_STEPS)
+        fit if fit.converged or fit.cost > max_ratio * least else problem.fit_output_error(fit, MORE_STEPS)
         for fit in simulated
     ]
 
@@ -270,8 +270,8 @@ def _search_neighbours(problem: LawFitProblem, fits: list[LawFit]) -> None:
             return
         fitted |= {(best.law.name, location) for location in new}
         moved = [_move_law(problem, best, location) for location in new]
-        hopeless = HOPELESS_NEIGHBOUR if best.cost < best.n_rows else HOPELESS
-        fits += _simulate(problem, moved, hopeless=hopeless, least=best.cost)
+        max_ratio = MAX_COST_RATIO_NEIGHBOUR if best.cost < best.n_rows else MAX_COST_RATIO
+        fits += _simulate(problem, moved, max_ratio=max_ratio, least=best.cost)
 
 
 def _move_law(problem: LawFitProblem, fit: LawFit, location: int) -> LawFit:

@@ -39,13 +39,13 @@ class Location:
 
     Parameters
     ----------
-    entry : mapping
+    entries : mapping
         As in `diagnosis.json`.
     ends : tuple of Dof
         The DOF whose motion drives the law; for a spring its first and second end: second minus first drives it.
     """
 
-    entry: Mapping[str, object]
+    entries: Mapping[str, object]
     ends: tuple[Dof, ...]
 
     @property
@@ -247,7 +247,7 @@ def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Locati
     }
     locations = [
         Location(
-            entry={"nodes": [dof.node]} | ({"springs": [grounded[dof.node]]} if dof.node in grounded else {}),
+            entries={"nodes": [dof.node]} | ({"springs": [grounded[dof.node]]} if dof.node in grounded else {}),
             ends=(dof,),
         )
         for dof in moving
@@ -257,7 +257,7 @@ def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Locati
             for direction in sorted(directions):
                 ends = tuple(Dof(node, direction) for node in part.nodes)
                 if free.issuperset(ends):
-                    locations.append(Location(entry={"springs": [part.name]}, ends=ends))
+                    locations.append(Location(entries={"springs": [part.name]}, ends=ends))
     return tuple(locations)
 
 
