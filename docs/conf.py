@@ -12,7 +12,7 @@ import frf_ipz
 
 project = "frf_ipz"
 author = "the frf_ipz authors"
-copyright = "2026, the frf_ipz authors"  # noqa: A001  the name that Sphinx reads
+copyright = "2026, the frf_ipz authors"
 version = release = frf_ipz.__version__
 
 extensions = [

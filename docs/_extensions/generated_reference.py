@@ -13,6 +13,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
+from frf_ipz.ingest.campaign_keys import CampaignFileKeys
 from numpydoc.docscrape import NumpyDocString
 from typer.main import get_command
 
@@ -56,7 +57,7 @@ def write_reference(folder: Path) -> None:
 
 def files_reference() -> dict[str, str]:
     """Give the text of every page by the name of its file."""
-    models = "\n".join(_file("model.toml", kind, f"kind = \"{name}\"") for name, kind in FILE_TYPES.items())
+    models = "\n".join(_file("model.toml", kind, f'kind = "{name}"') for name, kind in FILE_TYPES.items())
     return {
         "test_toml.md": _file("test.toml", CampaignFileKeys),
         "model_toml.md": models,
@@ -166,7 +167,7 @@ def _values(hint: Any) -> str:
         limits = [text for part in arguments[1:] for text in _limits(part)]
         return f"{_values(arguments[0])}{', ' if limits else ''}{', '.join(limits)}"
     if origin is Literal:
-        return " \\| ".join(f"`\"{value}\"`" if isinstance(value, str) else f"`{value}`" for value in arguments)
+        return " \\| ".join(f'`"{value}"`' if isinstance(value, str) else f"`{value}`" for value in arguments)
     if origin in {typing.Union, types.UnionType}:
         return " or ".join(dict.fromkeys(_values(part) for part in arguments if part is not type(None)))
     if origin is tuple:
@@ -203,7 +204,7 @@ def _default(item: Any) -> str:
         return f"`{str(value).lower()}`"
     if isinstance(value, tuple | dict):
         return "empty" if not value else f"`{list(value)}`"
-    return "empty" if value == "" else f"`\"{value}\"`" if isinstance(value, str) else f"`{value:g}`"
+    return "empty" if value == "" else f'`"{value}"`' if isinstance(value, str) else f"`{value:g}`"
 
 
 def _cell(text: str) -> str:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
-    from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.runs.results import Results
 
 
 def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
@@ -43,7 +43,7 @@ def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
     serve(folder, _run, _read, port=port, announce=announce)
 
 
-def _run(path: Path, out: Path, *, progress: Progress) -> RunFolder:
+def _run(path: Path, out: Path, *, progress: Progress) -> Results:
     """Run a pipeline; the stages are imported with the first change, so that the page is there at once."""
     from frf_ipz.pipeline.run import run_pipeline
 

@@ -9,20 +9,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline.stage_runner import StageRunner
-from frf_ipz.pipeline.stages import measurement, mismatch, modelling, results
+from frf_ipz.pipeline.stages import measurement, mismatch, modelling, outputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frf_ipz.pipeline.inputs import PipelineInputs
+    from frf_ipz.pipeline.stage_runner import RunStore
     from frf_ipz.progress import Progress
-    from frf_ipz.runs.folder import RunFolder
 
 STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
 
 
 def chain(
-    inputs: PipelineInputs, folder: RunFolder, *, until: str, diagnosing: bool, progress: Progress
+    inputs: PipelineInputs, store: RunStore, *, until: str, diagnosing: bool, progress: Progress
 ) -> Iterator[str]:
     """Run the stages one after another.
 
@@ -30,7 +30,7 @@ def chain(
     ----------
     inputs : PipelineInputs
         What to work on.
-    folder : RunFolder
+    store : RunStore
         Where results are kept.
     until : str
         The last stage that is wanted. A diagnosis is looked at: one that is the last has its page.
@@ -44,11 +44,11 @@ def chain(
     str
         The name of each stage when it is done.
     """
-    runner = StageRunner(inputs=inputs, folder=folder, progress=progress)
+    runner = StageRunner(inputs=inputs, store=store, progress=progress)
     recordings = measurement.ingest(runner)
     yield "ingest"
-    frfs, model = recordings.frfs, inputs.model
-    options = inputs.pipeline.file.diagnose
+    frfs, model = recordings.frfs, inputs.fe_model
+    options = inputs.options.diagnose
     diagnosis = None
     if model is not None and diagnosing and options is not None and options.apply:
         diagnosis = mismatch.diagnose(runner, model, frfs)
@@ -62,16 +62,16 @@ def chain(
                 mismatch.diagnose(runner, model, frfs)
             mismatch.levels(runner, fit, recordings.frfs)
             if until == "diagnose":
-                results.report(runner)
+                outputs.report(runner)
             yield "diagnose"
         reduced = modelling.reduce(runner, model, fit, corrected_by=diagnosis)
         pairs = modelling.pair(runner, fit, reduced)
         yield "pair"
         updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
         yield "update"
-        results.predict(runner, updated, fit, frfs)
+        outputs.predict(runner, updated, fit, frfs)
         yield "predict"
-        results.export(runner, updated, fit, corrected_by=diagnosis)
+        outputs.export(runner, updated, fit, corrected_by=diagnosis)
         yield "export"
-    results.report(runner)
+    outputs.report(runner)
     yield "report"

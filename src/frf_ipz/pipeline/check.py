@@ -34,10 +34,12 @@ def describe_setup(inputs: PipelineInputs) -> str:
         A drawing of the structure with sensors, inputs and points of interest, and what was read.
     """
     test = inputs.test
-    lines = [inputs.pipeline.name, ""]
-    if inputs.model is not None:
-        lines += [*draw(inputs.model.geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
-        lines.append(f"model       {inputs.model.name} ({inputs.model.kind}), {len(inputs.model.dofs)} free DOFs")
+    lines = [inputs.name, ""]
+    if inputs.fe_model is not None:
+        lines += [*draw(inputs.fe_model.geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
+        lines.append(
+            f"model       {inputs.fe_model.name} ({inputs.fe_model.kind}), {len(inputs.fe_model.dofs)} free DOFs"
+        )
     lines += [
         f"test        {test.name} ({test.kind}), {len(test.files)} files",
         f"sensors  S  {_names(test.output_dofs)}",

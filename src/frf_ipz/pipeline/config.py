@@ -37,7 +37,30 @@ class PipelineSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PipelineFile:
+class StageOptions:
+    """What the user chose for each stage.
+
+    Parameters
+    ----------
+    ingest, fit, reduce, update, predict, export : options
+        One a stage.
+    diagnose : DiagnoseOptions, optional
+        None where nothing is stated: then a run does not diagnose.
+    """
+
+    __pydantic_config__ = STRICT
+
+    ingest: IngestOptions = field(default_factory=IngestOptions)
+    fit: FitOptions = field(default_factory=FitOptions)
+    diagnose: DiagnoseOptions | None = None
+    reduce: ReduceOptions = field(default_factory=ReduceOptions)
+    update: UpdateOptions = field(default_factory=UpdateOptions)
+    predict: PredictOptions = field(default_factory=PredictOptions)
+    export: ExportOptions = field(default_factory=ExportOptions)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PipelineFile(StageOptions):
     """All sections of ``pipeline.toml``.
 
     Parameters
@@ -53,13 +76,6 @@ class PipelineFile:
     __pydantic_config__ = STRICT
 
     pipeline: PipelineSection
-    ingest: IngestOptions = field(default_factory=IngestOptions)
-    fit: FitOptions = field(default_factory=FitOptions)
-    diagnose: DiagnoseOptions | None = None
-    reduce: ReduceOptions = field(default_factory=ReduceOptions)
-    update: UpdateOptions = field(default_factory=UpdateOptions)
-    predict: PredictOptions = field(default_factory=PredictOptions)
-    export: ExportOptions = field(default_factory=ExportOptions)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

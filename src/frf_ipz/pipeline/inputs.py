@@ -1,63 +1,76 @@
-"""What a command is to work on: the files of the user, read and checked before anything is computed."""
+"""What a run is to work on, checked before anything is computed: from the user's files, or from what is in memory."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
-from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.campaign_file import read_test
-from frf_ipz.pipeline.config import Pipeline, read_pipeline
+from frf_ipz.pipeline.config import StageOptions, read_pipeline
 from frf_ipz.pipeline.reference import read_reference
 from frf_ipz.pipeline.sensors import without_sensors
 from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+    from collections.abc import Mapping, Sequence
 
     from frf_ipz.frf import FrfSet
+    from frf_ipz.ingest.campaign import VibrationTest
+    from frf_ipz.pipeline.config import Pipeline
     from frf_ipz.structure import StructuralModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PipelineInputs:
-    """A pipeline with its test and model.
+    """A test, an FE model, points of interest, and what the user chose for each stage.
 
     Parameters
     ----------
-    pipeline : Pipeline
-        The pipeline file.
+    name : str
+        What the run is called.
+    source : str
+        Where it was described, for messages: the pipeline file, or the campaign.
+    folder : Path
+        Where paths of users' own effects start.
+    options : StageOptions
+        What the user chose for each stage.
     test : VibrationTest
-        The test.
-    model : StructuralModel, optional
+        The test, without sensors that are hidden.
+    fe_model : StructuralModel, optional
         The FE model with the sensors' known masses; None where the run ends with the fit.
     points : tuple of Dof
         Points of interest.
     digests : mapping of str to str
-        Digest of every file that the user handed in.
-    model_files : tuple of Path
-        Those that the model was read from.
+        Digest of everything that the user handed in, by its name.
+    model_names : tuple of str
+        Those of `digests` that the FE model was made from.
     reference : FrfSet, optional
         FRFs that a prediction is judged by.
+    reference_name : str
+        Its name in `digests`.
     """
 
-    pipeline: Pipeline
+    name: str
+    source: str
+    folder: Path
+    options: StageOptions
     test: VibrationTest
-    model: StructuralModel | None
-    points: tuple[Dof, ...]
-    digests: Mapping[str, str]
-    model_files: tuple[Path, ...] = ()
+    fe_model: StructuralModel | None = None
+    points: tuple[Dof, ...] = ()
+    digests: Mapping[str, str] = field(default_factory=dict)
+    model_names: tuple[str, ...] = ()
     reference: FrfSet | None = None
+    reference_name: str = ""
 
     @property
     def model_key(self) -> list[object]:
         """What the FE model was made from."""
-        files = [self.digests[str(file)] for file in self.model_files]
+        files = [self.digests[name] for name in self.model_names]
         return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
 
 
@@ -80,31 +93,64 @@ def read_inputs(path: Path) -> PipelineInputs:
         On the first thing that is wrong: which file, which place, what was expected.
     """
     pipeline = read_pipeline(path)
-    test = _test(pipeline)
-    points = _points(pipeline)
-    model = None if pipeline.model_path is None else _model(pipeline.model_path, test, points)
-    if model is None and points:
+    test = _read_test(pipeline)
+    points = _read_points(pipeline)
+    fe_model = None if pipeline.model_path is None else _read_model(pipeline.model_path, test, points)
+    if fe_model is None and points:
         raise FileFormatError(
             pipeline.path,
             "points of interest need an FE model; name it as [pipeline] model",
             where="key 'predict.points'",
         )
-    of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
+    files_of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
     aside = pipeline.reference_path
-    reference = None if aside is None else read_reference(aside, test.labels[0].quantity)
-    files = [pipeline.path, pipeline.test_path, *test.files, *of_model, *([] if aside is None else [aside])]
+    files = [pipeline.path, pipeline.test_path, *test.files, *files_of_model, *([] if aside is None else [aside])]
     return PipelineInputs(
-        pipeline=pipeline,
+        name=pipeline.name,
+        source=str(pipeline.path),
+        folder=pipeline.path.parent,
+        options=pipeline.file,
         test=test,
-        model=model,
+        fe_model=fe_model,
         points=points,
         digests={str(file): digest_file(file) for file in dict.fromkeys(files)},
-        model_files=of_model,
-        reference=reference,
+        model_names=tuple(str(file) for file in files_of_model),
+        reference=None if aside is None else read_reference(aside, test.labels[0].quantity),
+        reference_name="" if aside is None else str(aside),
     )
 
 
-def _test(pipeline: Pipeline) -> VibrationTest:
+def complete_model(fe_model: StructuralModel, test: VibrationTest, points: Sequence[Dof]) -> StructuralModel:
+    """Add to an FE model what the test knows of it: the sensors' masses, and damping where the model states none.
+
+    Parameters
+    ----------
+    fe_model : StructuralModel
+        As the user handed it in.
+    test : VibrationTest
+        The test.
+    points : sequence of Dof
+        Points of interest.
+
+    Returns
+    -------
+    StructuralModel
+        The model that measurements are held against.
+
+    Raises
+    ------
+    InputError
+        If it lacks a DOF of the test or a point of interest, or holds it.
+    """
+    for dof in (*test.output_dofs, *test.input_dofs, *points):
+        try:
+            fe_model.index(dof)
+        except InputError as error:
+            raise InputError(f"{error}; it is needed for '{dof}' of the test or of [predict]") from None
+    return with_point_masses(with_default_damping(fe_model, test.nominal_damping_ratio), test.sensor_masses)
+
+
+def _read_test(pipeline: Pipeline) -> VibrationTest:
     test = read_test(pipeline.test_path)
     try:
         return without_sensors(test, pipeline.file.ingest.hide)
@@ -112,18 +158,16 @@ def _test(pipeline: Pipeline) -> VibrationTest:
         raise FileFormatError(pipeline.path, str(error), where="key 'ingest.hide'") from None
 
 
-def _points(pipeline: Pipeline) -> tuple[Dof, ...]:
+def _read_points(pipeline: Pipeline) -> tuple[Dof, ...]:
     try:
         return tuple(parse_dof(text) for text in pipeline.file.predict.points)
     except InputError as error:
         raise FileFormatError(pipeline.path, str(error), where="key 'predict.points'") from None
 
 
-def _model(path: Path, test: VibrationTest, points: tuple[Dof, ...]) -> StructuralModel:
-    model = read_model(path)
-    for dof in (*test.output_dofs, *test.input_dofs, *points):
-        try:
-            model.index(dof)
-        except InputError as error:
-            raise FileFormatError(path, f"{error}; it is needed for '{dof}' of the test or of [predict]") from None
-    return with_point_masses(with_default_damping(model, test.nominal_damping_ratio), test.sensor_masses)
+def _read_model(path: Path, test: VibrationTest, points: Sequence[Dof]) -> StructuralModel:
+    fe_model = read_model(path)
+    try:
+        return complete_model(fe_model, test, points)
+    except InputError as error:
+        raise FileFormatError(path, str(error)) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from frf_ipz import __version__
@@ -13,27 +14,35 @@ from frf_ipz.pipeline.chain import STAGES, chain
 from frf_ipz.pipeline.inputs import PipelineInputs, read_inputs
 from frf_ipz.progress import Progress, silent
 from frf_ipz.runs.digests import plain
-from frf_ipz.runs.folder import RunFolder, open_run, read_run
+from frf_ipz.runs.folder import open_run
+from frf_ipz.runs.memory import RunMemory
+from frf_ipz.runs.results import Results, open_results
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from frf_ipz.pipeline.stage_runner import RunStore
 
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "control")
 
 
 def run_pipeline(
-    path: Path, out: Path, *, until: str = "report", diagnosing: bool | None = None, progress: Progress = silent
-) -> RunFolder:
+    path: str | Path,
+    out: str | Path,
+    *,
+    until: str = "report",
+    diagnosing: bool | None = None,
+    progress: Progress = silent,
+) -> Results:
     """Run the chain of a pipeline file, re-using what the folder holds.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         ``pipeline.toml``.
-    out : Path
+    out : str or Path
         The run's folder; made where there is none. A run that fails leaves what was there.
     until : str
-        The last stage to run, one of `chain.STAGES`.
+        The last stage to run: ``ingest``, ``fit``, ``diagnose``, ``pair``, ``update``, ``predict``, ``export`` or
+        ``report``.
     diagnosing : bool, optional
         Look for what the model left out; where it is left out, if the file has a section ``[diagnose]``.
     progress : Progress
@@ -41,26 +50,87 @@ def run_pipeline(
 
     Returns
     -------
-    RunFolder
-        What the folder holds now: ``run.load("fit")`` gives a stage's result.
+    Results
+        What the folder holds now.
 
     Raises
     ------
     InputError
         If the input is wrong; the message says what to do.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> results = frf_ipz.run_pipeline("pipelines/cantilever.toml", "results/cantilever")  # doctest: +SKIP
+    >>> results.state_space.nstates  # doctest: +SKIP
+    16
     """
+    _require_stage(until)
+    inputs = read_inputs(Path(path))
+    with open_run(Path(out)) as folder:
+        run_chain(inputs, folder, until=until, diagnosing=diagnosing, progress=progress)
+    return open_results(out)
+
+
+def run_in_memory(
+    inputs: PipelineInputs, *, until: str = "report", diagnosing: bool | None = None, progress: Progress = silent
+) -> Results:
+    """Run the chain without a folder.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        What to work on.
+    until, diagnosing, progress
+        As for `run_pipeline`.
+
+    Returns
+    -------
+    Results
+        Of all stages.
+
+    Raises
+    ------
+    InputError
+        If the input is wrong.
+    """
+    _require_stage(until)
+    memory = RunMemory()
+    run_chain(inputs, memory, until=until, diagnosing=diagnosing, progress=progress)
+    return Results(memory)
+
+
+def run_chain(
+    inputs: PipelineInputs, store: RunStore, *, until: str, diagnosing: bool | None, progress: Progress
+) -> None:
+    """Run the chain into a folder or into memory.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        What to work on.
+    store : RunFolder or RunMemory
+        Where results are kept.
+    until, diagnosing, progress
+        As for `run_pipeline`.
+
+    Raises
+    ------
+    InputError
+        If a stage needs an FE model and there is none.
+    """
+    is_diagnosing = inputs.options.diagnose is not None if diagnosing is None else diagnosing
+    if inputs.fe_model is None and until not in {"ingest", "fit", "report"}:
+        raise InputError(f"{inputs.source}: the stage '{until}' needs an FE model; name it as [pipeline] model")
+    store.manifest.update(_provenance(inputs))
+    for stage in chain(inputs, store, until=until, diagnosing=is_diagnosing, progress=progress):
+        if stage == until:
+            break
+
+
+def _require_stage(until: str) -> None:
     if until not in STAGES:
         raise InputError(f"there is no stage '{until}'; {did_you_mean(until, STAGES)}")
-    inputs = read_inputs(path)
-    is_diagnosing = inputs.pipeline.file.diagnose is not None if diagnosing is None else diagnosing
-    if inputs.model is None and until not in {"ingest", "fit", "report"}:
-        raise InputError(f"{path}: the stage '{until}' needs an FE model; name it as [pipeline] model")
-    with open_run(out) as folder:
-        folder.manifest.update(_provenance(inputs))
-        for stage in chain(inputs, folder, until=until, diagnosing=is_diagnosing, progress=progress):
-            if stage == until:
-                break
-    return read_run(out)
 
 
 def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
@@ -69,8 +139,8 @@ def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: version(name) for name in PACKAGES},
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
-        "pipeline": str(inputs.pipeline.path),
-        "name": inputs.pipeline.name,
-        "configuration": plain(inputs.pipeline.file),
+        "pipeline": inputs.source,
+        "name": inputs.name,
+        "configuration": plain(inputs.options),
         "inputs": dict(inputs.digests),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from frf_ipz import __version__
 from frf_ipz.runs.digests import digest
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder, Writers
+    from frf_ipz.runs.memory import RunMemory
+
+    RunStore: TypeAlias = RunFolder | RunMemory
 
 Result = TypeVar("Result")
 
@@ -38,7 +41,7 @@ class StageRunner:
     ----------
     inputs : PipelineInputs
         What to work on.
-    folder : RunFolder
+    store : RunFolder or RunMemory
         Where results are kept.
     progress : Progress
         Called with the fraction done and what is being done.
@@ -47,7 +50,7 @@ class StageRunner:
     """
 
     inputs: PipelineInputs
-    folder: RunFolder
+    store: RunStore
     progress: Progress
     keys: dict[str, str] = field(default_factory=dict)
 
@@ -77,9 +80,9 @@ class StageRunner:
             The result.
         """
         key = self.make_key(name, depends)
-        result = self.folder.stage(name, key, lambda: compute(self.stage_progress(name)), files)
-        if name in self.folder.computed:
-            self.folder.mark_stale(dependents(name))
+        result = self.store.stage(name, key, lambda: compute(self.stage_progress(name)), files)
+        if name in self.store.computed:
+            self.store.mark_stale(dependents(name))
         return result
 
     def make_key(self, name: str, depends: Mapping[str, object]) -> str:

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.runs.results import Results
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 MOST_MODES = 12
 
 
-def summarise(run: RunFolder) -> str:
-    """Sum up what a run's folder holds.
+def summarise(results: Results) -> str:
+    """Sum up what a run has found.
 
     Parameters
     ----------
-    run : RunFolder
+    results : Results
         The run.
 
     Returns
@@ -37,25 +37,24 @@ def summarise(run: RunFolder) -> str:
     str
         At most a screen of text.
     """
-    writers: dict[str, Callable[[Any], list[tuple[str, str]]]] = {
-        "ingest": estimate_lines,
-        "fit": fit_lines,
-        "diagnose": diagnosis_lines,
-        "reduce": reduced_lines,
-        "pair": pairs_lines,
-        "update": update_lines,
-        "predict": prediction_lines,
+    writers: dict[str, tuple[object, Callable[[Any], list[tuple[str, str]]]]] = {
+        "ingest": (results.estimate, estimate_lines),
+        "fit": (results.fit, fit_lines),
+        "diagnose": (results.diagnosis, diagnosis_lines),
+        "reduce": (results.reduced_model, reduced_lines),
+        "pair": (results.pairs, pairs_lines),
+        "update": (results.updated_model, update_lines),
+        "predict": (results.prediction, prediction_lines),
     }
-    lines = [f"{run.manifest.get('name', '')}"]
-    for stage, write in writers.items():
-        result = run.load(stage) if stage in run.manifest.get("stages", {}) else None
+    lines = [results.name]
+    for stage, (result, write) in writers.items():
         if result is not None:
-            stale = " (stale: made before the last change; run it again)" if run.is_stale(stage) else ""
+            stale = " (stale: made before the last change; run it again)" if stage in results.stale else ""
             lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
-    seconds = sum(entry.get("seconds", 0.0) for entry in run.manifest.get("stages", {}).values())
-    lines.append(f"{'results':<12}{run.path}  ({seconds:.1f} s of computing)")
-    if "report" in run.manifest.get("stages", {}) and not run.is_stale("report"):
-        lines.append(f"{'page':<12}{run.path / 'report.html'}")
+    seconds = sum(entry.get("seconds", 0.0) for entry in results.manifest.get("stages", {}).values())
+    lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
+    if results.path is not None and "report" in results.stages and "report" not in results.stale:
+        lines.append(f"{'page':<12}{results.path / 'report.html'}")
     return "\n".join(lines)
 
 

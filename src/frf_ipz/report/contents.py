@@ -10,7 +10,7 @@ import pandas as pd
 
 from frf_ipz.fe.response import model_frfs
 from frf_ipz.plotting.targets import Target, target_rows
-from frf_ipz.structure import Geometry, StructuralModel
+from frf_ipz.structure import Geometry
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.runs.results import Results
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -153,12 +153,12 @@ class RunContents:
         return target_rows(self.updated, self.pairs, self.labels)
 
 
-def read_contents(folder: RunFolder) -> RunContents:
+def read_contents(results: Results) -> RunContents:
     """Read all results of a run.
 
     Parameters
     ----------
-    folder : RunFolder
+    results : Results
         The run.
 
     Returns
@@ -171,21 +171,18 @@ def read_contents(folder: RunFolder) -> RunContents:
     FileFormatError
         If a file is damaged.
     """
-    stages = folder.manifest.get("stages", {})
-    has_model = "reduce" in stages
-    model = folder.load("model") if "model" in stages else None
     return RunContents(
-        manifest=folder.manifest,
-        estimate=folder.load("ingest"),
-        fit=folder.load("fit"),
-        reduced=folder.load("reduce") if has_model else None,
-        pairs=folder.load("pair") if has_model else None,
-        updated=folder.load("update") if has_model else None,
-        prediction=folder.load("predict") if has_model else None,
-        state_space=folder.load("export") if has_model else None,
-        diagnosis=folder.load("diagnose"),
-        levels=folder.load("levels"),
-        geometry=model.geometry if isinstance(model, StructuralModel) else model,
-        reference=folder.load("reference"),
-        stale=frozenset(name for name in stages if folder.is_stale(name)),
+        manifest=results.manifest,
+        estimate=results.estimate,
+        fit=results.fit,
+        reduced=results.reduced_model,
+        pairs=results.pairs,
+        updated=results.updated_model,
+        prediction=results.prediction,
+        state_space=results.state_space_arrays,
+        diagnosis=results.diagnosis,
+        levels=results.level_dependence,
+        geometry=results.geometry,
+        reference=results.reference,
+        stale=results.stale,
     )

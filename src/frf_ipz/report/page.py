@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.runs.folder import RunFolder
+    from frf_ipz.runs.results import Results
 
 Build: TypeAlias = "Callable[[RunContents], Section | None]"
 
@@ -58,12 +58,12 @@ SECTIONS: tuple[Build, ...] = (
 WIDE = 30.0  # ratio of the ends of the band from which the frequency axis starts logarithmic
 
 
-def write_report(folder: RunFolder, path: Path, *, progress: Progress = silent) -> None:
+def write_report(results: Results, path: Path, *, progress: Progress = silent) -> None:
     """Put everything that a run holds on one page.
 
     Parameters
     ----------
-    folder : RunFolder
+    results : Results
         The run.
     path : Path
         File to write.
@@ -77,7 +77,7 @@ def write_report(folder: RunFolder, path: Path, *, progress: Progress = silent) 
     OSError
         If the page cannot be written.
     """
-    run = read_contents(folder)
+    run = read_contents(results)
     sections = []
     for number, build in enumerate(SECTIONS):
         progress(number / len(SECTIONS), "drawing")

@@ -54,6 +54,11 @@ class RunFolder:
     computed: list[str] = field(default_factory=list)
     abandoned: set[str] = field(default_factory=set)
 
+    @property
+    def name(self) -> str:
+        """Where the results are, for people."""
+        return str(self.path)
+
     def stage(self, name: str, key: str, compute: Callable[[], Result], files: Callable[[Result], Writers]) -> Result:
         """Give the result of a stage: the one in the folder where the key agrees, else a new one.
 

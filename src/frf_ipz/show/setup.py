@@ -44,7 +44,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
         empty = RunContents(manifest={"name": pipeline.stem})
         return empty, Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
     run = RunContents(
-        manifest={"name": inputs.pipeline.name}, geometry=None if inputs.model is None else inputs.model.geometry
+        manifest={"name": inputs.name}, geometry=None if inputs.fe_model is None else inputs.fe_model.geometry
     )
     marks = Marks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
     drawing = draw_structure(run.geometry, marks)
@@ -54,7 +54,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
 
 
 def _what_was_read(inputs: PipelineInputs) -> Table:
-    test, model = inputs.test, inputs.model
+    test, model = inputs.test, inputs.fe_model
     model_text = "none: the run ends with the fit"
     if model is not None:
         model_text = f"{model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.contents import RunContents, read_contents
-from frf_ipz.runs.folder import MANIFEST, RunFolder, read_manifest, read_run
+from frf_ipz.runs.folder import MANIFEST, read_manifest
+from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
@@ -29,7 +30,7 @@ STOP_S = 5.0  # how long a run gets to notice that the server ends
 class Run(Protocol):
     """Runs a pipeline file into a folder, as `pipeline.run.run_pipeline` does."""
 
-    def __call__(self, path: Path, out: Path, *, progress: Progress) -> RunFolder:
+    def __call__(self, path: Path, out: Path, *, progress: Progress) -> Results:
         """Run.
 
         Parameters
@@ -43,7 +44,7 @@ class Run(Protocol):
 
         Returns
         -------
-        RunFolder
+        Results
             What the folder holds then.
         """
 
@@ -108,7 +109,7 @@ class Workbench:
         """
         stamp = self.stamp
         if self._read is None or self._read[0] != stamp:
-            self._read = stamp, read_contents(read_run(self.folder))
+            self._read = stamp, read_contents(open_results(self.folder))
         return self._read[1]
 
     def text(self) -> str:

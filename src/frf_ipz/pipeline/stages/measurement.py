@@ -35,8 +35,10 @@ def ingest(runner: StageRunner) -> FrfEstimate:
     FrfEstimate
         FRFs and the table of records.
     """
-    options = runner.inputs.pipeline.file.ingest
-    files = {name: value for name, value in runner.inputs.digests.items() if name in map(str, runner.inputs.test.files)}
+    options = runner.inputs.options.ingest
+    files = {
+        name: value for name, value in runner.inputs.digests.items() if name in set(map(str, runner.inputs.test.files))
+    }
     return runner.stage(
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
@@ -67,7 +69,7 @@ def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = N
     ModalFit
         The fitted model.
     """
-    options = runner.inputs.pipeline.file.fit
+    options = runner.inputs.options.fit
     return runner.stage(
         "fit",
         {"options": asdict(options), "after": runner.after("ingest"), "corrected": corrections(corrected_by)},

@@ -45,13 +45,13 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagn
         The verdict and what it rests on.
     """
     inputs = runner.inputs
-    options = inputs.pipeline.file.diagnose or DiagnoseOptions()
-    ingest_options = inputs.pipeline.file.ingest
-    band = {"fit": [inputs.pipeline.file.fit.band_hz, inputs.pipeline.file.fit.exclude_hz]}
+    options = inputs.options.diagnose or DiagnoseOptions()
+    ingest_options = inputs.options.ingest
+    band = {"fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz]}
 
     def compute(progress: Progress) -> Diagnosis:
-        observations = observe(inputs.test, ingest_options, frfs, fit=inputs.pipeline.file.fit)
-        return find_mismatch(model, observations, options, folder=inputs.pipeline.path.parent, progress=progress)
+        observations = observe(inputs.test, ingest_options, frfs, fit=inputs.options.fit)
+        return find_mismatch(model, observations, options, folder=inputs.folder, progress=progress)
 
     return runner.stage(
         "diagnose",
@@ -78,11 +78,11 @@ def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     LevelDependence
         Empty where there is one level only.
     """
-    file = runner.inputs.pipeline.file
+    options = runner.inputs.options
     return runner.stage(
         "levels",
         {"after": runner.after("ingest", "fit")},
-        lambda _: compare_levels(observe(runner.inputs.test, file.ingest, frfs, fit=file.fit), fit),
+        lambda _: compare_levels(observe(runner.inputs.test, options.ingest, frfs, fit=options.fit), fit),
     )
 
 
@@ -126,8 +126,7 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
     dict of str to Effect
         By name.
     """
-    pipeline = runner.inputs.pipeline
-    return select_effects(pipeline.file.diagnose or DiagnoseOptions(), pipeline.path.parent)
+    return select_effects(runner.inputs.options.diagnose or DiagnoseOptions(), runner.inputs.folder)
 
 
 def corrections(diagnosis: Diagnosis | None) -> str:

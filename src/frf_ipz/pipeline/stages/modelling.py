@@ -73,7 +73,7 @@ def reduce(
         The reduced model.
     """
     inputs = runner.inputs
-    options = inputs.pipeline.file.reduce
+    options = inputs.options.reduce
     return runner.stage(
         "reduce",
         {
@@ -159,13 +159,13 @@ def update(
     InputError
         If the parameters are to be those of a diagnosis that is not applied.
     """
-    options, stated = runner.inputs.pipeline.file.update, runner.inputs.pipeline.file.diagnose
+    options, stated = runner.inputs.options.update, runner.inputs.options.diagnose
     tolerance = stated.position_tolerance_m_per_m if stated and corrected_by else 0.0
     sensors = unweighed_sensors(runner.inputs.test, modal_fit.labels)
-    nominal = runner.inputs.model
+    nominal = runner.inputs.fe_model
     if options.parameters == "diagnosis" and corrected_by is None:
         raise InputError(
-            f"{runner.inputs.pipeline.path}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
+            f"{runner.inputs.source}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
             "[diagnose] apply = true, or leave parameters out"
         )
 

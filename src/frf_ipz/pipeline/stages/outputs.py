@@ -17,6 +17,7 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.report.page import write_report
+from frf_ipz.runs.results import Results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,9 +56,7 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
     """
     inputs = runner.inputs
     if inputs.reference is not None:
-        runner.stage(
-            "reference", {"file": inputs.digests[str(inputs.pipeline.reference_path)]}, lambda _: inputs.reference
-        )
+        runner.stage("reference", {"file": inputs.digests[inputs.reference_name]}, lambda _: inputs.reference)
     lines = frfs.frequency_hz[frfs.in_band(modal_fit.band_hz)]
     return runner.stage(
         "predict",
@@ -89,7 +88,7 @@ def export(
         With named inputs and outputs.
     """
     inputs = runner.inputs
-    options = inputs.pipeline.file.export
+    options = inputs.options.export
     delays = known_delays(modal_fit, corrected_by)
     return runner.stage(
         "export",
@@ -112,8 +111,8 @@ def report(runner: StageRunner) -> None:
     """
     key = runner.make_key("report", {"after": sorted(runner.keys.values())})
     progress = runner.stage_progress("report")
-    runner.folder.page(
-        "report", key, {"report.html": lambda path: write_report(runner.folder, path, progress=progress)}
+    runner.store.page(
+        "report", key, {"report.html": lambda path: write_report(Results(runner.store), path, progress=progress)}
     )
 
 

@@ -1,0 +1,204 @@
+"""What a run found: the results of all stages by their names, from memory or from a folder."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from frf_ipz.export.state_space import to_control
+from frf_ipz.runs.folder import read_run
+from frf_ipz.structure import StructuralModel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import control
+
+    from frf_ipz.diagnosis.measured.levels import LevelDependence
+    from frf_ipz.diagnosis.result import Diagnosis
+    from frf_ipz.export.state_space import StateSpaceModel
+    from frf_ipz.frf import FrfSet
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.pairing.pairs import Pairs
+    from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.structure import Geometry, ReducedModel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+
+class Store(Protocol):
+    """Where results of stages are kept: a `RunFolder` or a `RunMemory`."""
+
+    manifest: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Where that is, for people."""
+
+    def load(self, name: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
+        """Give the result of a stage, or None where it has not run.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+
+        Returns
+        -------
+        object
+            The result.
+        """
+
+    def is_stale(self, name: str) -> bool:
+        """Tell whether the result of a stage was made from something older.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+
+        Returns
+        -------
+        bool
+            True where it is out of date.
+        """
+
+
+class Results:
+    """Results of a run; each is None where its stage has not run.
+
+    Parameters
+    ----------
+    store : Store
+        Where they are kept.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> results = frf_ipz.open_results("results/cantilever")  # doctest: +SKIP
+    >>> results.fit.n_modes  # doctest: +SKIP
+    4
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __repr__(self) -> str:
+        stages = ", ".join(self.stages) or "no stage"
+        return f"Results of '{self.name}' ({self._store.name}): {stages}"
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """What ``run.json`` says: versions, digests of the inputs, options, times of the stages."""
+        return self._store.manifest
+
+    @property
+    def name(self) -> str:
+        """What the run is called."""
+        return str(self.manifest.get("name", "")) or "run"
+
+    @property
+    def path(self) -> Path | None:
+        """The folder; None for a run in memory."""
+        return getattr(self._store, "path", None)
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Stages that have run, in the order of the chain."""
+        return tuple(self.manifest.get("stages", {}))
+
+    @property
+    def stale(self) -> frozenset[str]:
+        """Stages whose result was made before the last change."""
+        return frozenset(stage for stage in self.stages if self._store.is_stale(stage))
+
+    @cached_property
+    def estimate(self) -> FrfEstimate | None:
+        """FRFs with the table of records that they were made from."""
+        return self._load("ingest")  # type: ignore[no-any-return]
+
+    @property
+    def frfs(self) -> FrfSet | None:
+        """The measured FRFs."""
+        return None if self.estimate is None else self.estimate.frfs
+
+    @cached_property
+    def fit(self) -> ModalFit | None:
+        """Poles, residues and zeros with their covariance."""
+        return self._load("fit")  # type: ignore[no-any-return]
+
+    @cached_property
+    def geometry(self) -> Geometry | None:
+        """Where the nodes of the FE model are."""
+        model = self._load("model")
+        return model.geometry if isinstance(model, StructuralModel) else model
+
+    @cached_property
+    def reduced_model(self) -> ReducedModel | None:
+        """The FE model in a few physical DOFs."""
+        return self._load("reduce")  # type: ignore[no-any-return]
+
+    @cached_property
+    def pairs(self) -> Pairs | None:
+        """Measured poles and zeros against those of the model."""
+        return self._load("pair")  # type: ignore[no-any-return]
+
+    @cached_property
+    def updated_model(self) -> UpdatedModel | None:
+        """The reduced model after updating."""
+        return self._load("update")  # type: ignore[no-any-return]
+
+    @cached_property
+    def prediction(self) -> Prediction | None:
+        """FRFs at the points of interest with their 90 % band."""
+        return self._load("predict")  # type: ignore[no-any-return]
+
+    @cached_property
+    def reference(self) -> FrfSet | None:
+        """Measured FRFs at points of interest that were kept aside."""
+        return self._load("reference")  # type: ignore[no-any-return]
+
+    @cached_property
+    def state_space_arrays(self) -> StateSpaceModel | None:
+        """The state space as arrays with names and units."""
+        return self._load("export")  # type: ignore[no-any-return]
+
+    @cached_property
+    def state_space(self) -> control.StateSpace | None:
+        """The state space for python-control, with the names of inputs, outputs and states."""
+        return None if self.state_space_arrays is None else to_control(self.state_space_arrays)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis | None:
+        """What the FE model left out."""
+        return self._load("diagnose")  # type: ignore[no-any-return]
+
+    @cached_property
+    def level_dependence(self) -> LevelDependence | None:
+        """Modes and FRFs at weak beside strong levels of excitation."""
+        return self._load("levels")  # type: ignore[no-any-return]
+
+    def _load(self, stage: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
+        return self._store.load(stage) if stage in self.stages else None
+
+
+def open_results(path: str | Path) -> Results:
+    """Open the results of a run.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its folder.
+
+    Returns
+    -------
+    Results
+        Read when they are asked for.
+
+    Raises
+    ------
+    InputError
+        If no run has been made there, or it was made by a version whose results cannot be read.
+    """
+    return Results(read_run(Path(path)))
