@@ -26,11 +26,11 @@ def true_frfs(labels: tuple[frf_ipz.FrfLabel, ...], lines_hz: np.ndarray) -> np.
     return np.stack(columns, axis=1)
 
 
-def compare(run: frf_ipz.RunFolder) -> pd.DataFrame:
+def compare(run: frf_ipz.Results) -> pd.DataFrame:
     """Agreement with the FRFs kept aside: nominal, with measured poles on nominal shapes, updated."""
-    prediction, nominal = run.load("predict"), run.load("update").nominal
+    prediction, nominal = run.prediction, run.updated_model.nominal
     s = 2j * np.pi * prediction.frequency_hz
-    shifted = frf_ipz.with_measured_poles(nominal, run.load("pair"))
+    shifted = frf_ipz.with_measured_poles(nominal, run.pairs)
     models = {
         "before updating": prediction.nominal,
         "measured poles, nominal shapes": frf_ipz.model_frfs(shifted, prediction.labels, s),

@@ -54,7 +54,7 @@ class Plant(NamedTuple):
 
 def main(out: Path) -> None:
     run = frf_ipz.run_pipeline(HERE / "poi_controller.toml", out, until="pair")
-    fit, updated = run.load("fit"), update(run)
+    fit, updated = run.fit, update(run)
     real, members = true_plant(), plants_of_ensemble(updated, fit.labels)
     nominal = replace(updated, model=updated.nominal)
     designs = {
@@ -66,7 +66,7 @@ def main(out: Path) -> None:
     print(pd.DataFrame(rows).T.to_string(float_format="{:.3g}".format))
 
 
-def update(run: frf_ipz.RunFolder) -> UpdatedModel:
+def update(run: frf_ipz.Results) -> UpdatedModel:
     """Update with parts, masses and the sensor's own mass: the demo's accelerometer is not in its model."""
     fit, reduced, pairs = (run.load(stage) for stage in ("fit", "reduce", "pair"))
     full = frf_ipz.read_model(HERE.parent / "data" / "raw" / "cantilever" / "model.toml")

@@ -13,7 +13,6 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-from frf_ipz.ingest.campaign_keys import CampaignFileKeys
 from numpydoc.docscrape import NumpyDocString
 from typer.main import get_command
 

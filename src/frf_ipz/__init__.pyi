@@ -43,8 +43,8 @@ from .prediction.agreement import compare_frfs as compare_frfs
 from .prediction.agreement import with_measured_poles as with_measured_poles
 from .prediction.predict import predict_frfs as predict_frfs
 from .quantities import FrfQuantity as FrfQuantity
-from .runs.folder import RunFolder as RunFolder
-from .runs.folder import read_run as read_run
+from .runs.results import Results as Results
+from .runs.results import open_results as open_results
 from .updating.options import UpdateOptions as UpdateOptions
 from .updating.parameters import structural_basis as structural_basis
 from .updating.update import update_model as update_model

@@ -43,6 +43,32 @@ class Dof:
         return f"{self.node}:{self.direction}"
 
 
+def as_dof(dof: Dof | str) -> Dof:
+    """Take a DOF, or read its label.
+
+    Parameters
+    ----------
+    dof : Dof or str
+        A DOF, or a label such as ``18:+z``.
+
+    Returns
+    -------
+    Dof
+        The DOF.
+
+    Raises
+    ------
+    InputError
+        If a text is no such label.
+
+    Examples
+    --------
+    >>> as_dof("18:z") == as_dof(Dof(18, "z"))
+    True
+    """
+    return dof if isinstance(dof, Dof) else parse_dof(dof)
+
+
 def parse_dof(text: str) -> Dof:
     """Read a label such as ``18:+z``, ``20:-z`` or ``7:rz``.
 

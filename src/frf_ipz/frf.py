@@ -6,17 +6,20 @@ The one container that leaves ingest, and the only measured data that fitting, p
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
-from frf_ipz.dofs import Dof
-from frf_ipz.errors import InputError
+from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.errors import InputError, QuantityError, ShapeError, did_you_mean
 from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
 
 ARRAYS = ("frequency_hz", "values", "variance", "coherence", "averages")
 
@@ -110,6 +113,93 @@ class FrfSet:
         require_finite("the FRFs' values", self.values)
         for name in ARRAYS:
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        frequency_hz: ArrayLike,
+        values: ArrayLike,
+        *,
+        outputs: Sequence[Dof | str],
+        inputs: Sequence[Dof | str],
+        quantity: FrfQuantity | str = FrfQuantity.ACCELERANCE,
+        variance: ArrayLike | None = None,
+        coherence: ArrayLike | None = None,
+        averages: int = 0,
+        unknown_scale: str = "none",
+    ) -> FrfSet:
+        """Make a set of FRFs from arrays, and check it.
+
+        Parameters
+        ----------
+        frequency_hz : (n_lines,) array
+            Frequencies, ascending, Hz.
+        values : (n_lines, n_outputs, n_inputs) complex array
+            FRFs in SI units of the quantity, for the time convention exp(+i omega t). A pair of output and input that
+            was not measured is NaN on all lines and left out.
+        outputs, inputs : sequence of Dof or str
+            DOFs of the sensors and of the forces, such as ``"18:+z"``.
+        quantity : FrfQuantity or str
+            ``accelerance``, ``mobility`` or ``receptance``.
+        variance : array, optional
+            E of the squared modulus of the error, half in each part, of the shape of `values`.
+        coherence : array, optional
+            From 0 to 1, of the shape of `values`.
+        averages : int
+            Records behind each FRF; 0 where unknown.
+        unknown_scale : str
+            ``none``, ``common`` or ``per_channel``: gains that are not known and may be fitted.
+
+        Returns
+        -------
+        FrfSet
+            Its FRFs output by output.
+
+        Raises
+        ------
+        ShapeError
+            If shapes disagree, frequencies do not ascend, or a measured FRF holds a value that is not finite.
+        QuantityError
+            If there is no such quantity.
+        InputError
+            If a label is none, a pair is named twice, or nothing was measured.
+
+        Examples
+        --------
+        >>> f = np.array([1.0, 2.0, 3.0])
+        >>> FrfSet.from_arrays(f, np.ones((3, 2, 1)), outputs=["1:+x", "2:+x"], inputs=["2:+x"]).n_frfs
+        2
+        """
+        lines = np.atleast_1d(np.asarray(frequency_hz, float))
+        outputs_given, inputs_given = [[as_dof(dof) for dof in side] for side in (outputs, inputs)]
+        shape = (len(lines), len(outputs_given), len(inputs_given))
+        blocks = {
+            "values": _block("values", values, shape, np.complex128),
+            "variance": _block("variance", variance, shape, np.float64),
+            "coherence": _block("coherence", coherence, shape, np.float64),
+        }
+        _require_lines(lines)
+        measured = np.argwhere(~np.isnan(blocks["values"]).all(axis=0))
+        if not len(measured):
+            raise InputError("the FRFs' values are NaN throughout; give at least one FRF that was measured")
+        kind = _quantity(quantity)
+        labels = tuple(
+            FrfLabel(outputs_given[row], inputs_given[column], kind, f"output {outputs_given[row]}",
+                     f"input {inputs_given[column]}")
+            for row, column in measured
+        )  # fmt: skip
+        if len(set(labels)) < len(labels):
+            raise InputError("a pair of output and input is named twice; each FRF has DOFs of its own")
+        rows, columns = measured.T
+        return cls(
+            frequency_hz=lines,
+            values=blocks["values"][:, rows, columns],
+            labels=labels,
+            variance=blocks["variance"][:, rows, columns],
+            coherence=blocks["coherence"][:, rows, columns],
+            averages=np.full(len(labels), averages, np.int64),
+            unknown_scale=unknown_scale,
+        )
 
     @property
     def n_lines(self) -> int:
@@ -224,3 +314,26 @@ class FrfSet:
             values[:, *entry] = self.values[:, index]
             measured[entry] = True
         return values, measured
+
+
+def _block(
+    name: str, values: ArrayLike | None, shape: tuple[int, int, int], dtype: type[np.complex128 | np.float64]
+) -> npt.NDArray[Any]:
+    """Take an array of the shape of the FRFs; NaN where there is none."""
+    block = np.full(shape, np.nan, dtype) if values is None else np.asarray(values, dtype)
+    require_shape(f"the FRFs' {name} [frequency, output, input]", block, shape)
+    return block
+
+
+def _require_lines(frequency_hz: FloatArray) -> None:
+    require_finite("the frequencies", frequency_hz)
+    if len(frequency_hz) < 2 or frequency_hz[0] < 0 or (np.diff(frequency_hz) <= 0).any():
+        raise ShapeError("the frequencies must ascend from 0 Hz or above, each once; sort the lines")
+
+
+def _quantity(quantity: FrfQuantity | str) -> FrfQuantity:
+    try:
+        return FrfQuantity(quantity)
+    except ValueError:
+        known = [kind.value for kind in FrfQuantity]
+        raise QuantityError(f"'{quantity}' is no quantity of FRFs; {did_you_mean(str(quantity), known)}") from None

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.report.page import write_report
+from frf_ipz.runs.results import Results
 from hostile_run import HOSTILE, hostile_folder
 from synthetic_run import Folder, many_frfs, synthetic_folder
 
@@ -41,7 +42,7 @@ def errors(browser):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "report.html"
-    write_report(synthetic_folder(diagnosed=True), path)
+    write_report(Results(synthetic_folder(diagnosed=True)), path)
     return path
 
 
@@ -197,7 +198,9 @@ def test_no_picture_is_wider_than_the_paper_when_printed(page):
 
 def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
     path = tmp_path / "big.html"
-    write_report(Folder(results={"ingest": many_frfs(100, 50_000)}, manifest={"stages": {}}, stale=()), path)
+    write_report(
+        Results(Folder(results={"ingest": many_frfs(100, 50_000)}, manifest={"stages": {"ingest": {}}}, stale=())), path
+    )
     page = open_page(browser, path)
     assert page.find_element("id", "shown").text == "6 of 100"
     assert errors(page) == []

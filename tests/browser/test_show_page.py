@@ -178,7 +178,7 @@ def test_nodes_picked_on_the_drawing_are_what_the_model_is_reduced_to(page, demo
     page.wait_for_results(stamp)
     assert read_pipeline(demo / "pipeline.toml").file.reduce.dofs == tuple(selected)
     run = run_pipeline(demo / "pipeline.toml", demo / "out")
-    assert [dof.name for dof in run.load("reduce").dofs] == selected
+    assert [dof.name for dof in run.reduced_model.dofs] == selected
     assert "reduced to" in page.find("#choices").text
 
 

@@ -48,7 +48,7 @@ def test_the_point_of_interest_is_predicted(demo, run):
 
 
 def test_the_bands_hold_the_truth_on_most_lines(demo, run):
-    prediction = run.load("predict")
+    prediction = run.prediction
     truth = np.abs(demo.true_frfs(prediction.labels, prediction.frequency_hz))
     inside = (truth >= prediction.magnitude_low) & (truth <= prediction.magnitude_high)
     assert inside.mean() > 0.7  # 90 % bands; neighbouring lines err together
@@ -74,7 +74,7 @@ def test_the_model_file_holds_matrices_and_dofs(run):
 
 
 def test_the_state_space_reproduces_the_prediction(run):
-    prediction = run.load("predict")
+    prediction = run.prediction
     system = frf_ipz.load_state_space(run.path / "statespace.json")
     label = prediction.labels[0]
     output = next(index for index, name in enumerate(system.output_labels) if str(label.output_dof) in name)

@@ -9,8 +9,8 @@ import pytest
 
 from frf_ipz.cli import main as command
 from frf_ipz.export.state_space_files import load_ensemble, load_state_space, read_weights
-from frf_ipz.report.findings import plain_signs
-from frf_ipz.runs.folder import read_run
+from frf_ipz.report.findings import typeset
+from frf_ipz.runs.results import open_results
 from small_campaign import write_campaign
 
 FILES = {
@@ -96,7 +96,7 @@ def test_an_update_changes_what_the_diagnosis_has_found_and_nothing_else(tmp_pat
     options = '[diagnose]\napply = true\neffects = ["global_stiffness"]\n[update]\nparameters = "diagnosis"\n'
     pipeline.write_text(pipeline.read_text() + options)
     stage(monkeypatch, "update", pipeline, tmp_path / "out")
-    updated = read_run(tmp_path / "out").load("update")
+    updated = open_results(tmp_path / "out").updated_model
     before, change = updated.nominal.stiffness, updated.model.stiffness - updated.nominal.stiffness
     factor = np.vdot(before, change) / np.vdot(before, before)
     assert factor != 0
@@ -110,6 +110,6 @@ def test_a_diagnosis_alone_has_a_page_that_shows_it_on_the_structure(tmp_path, m
     assert set(keys(tmp_path / "out")) == {"ingest", "fit", "model", "diagnose", "levels", "report"}
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["findings"][0]["statement"]
-    assert f'<p class="verdict">{escape(plain_signs(said))}</p>' in page
+    assert f'<p class="verdict">{escape(typeset(said))}</p>' in page
     assert "Position, m" in page
     assert "No model gives positions" not in page

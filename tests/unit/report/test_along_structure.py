@@ -9,6 +9,7 @@ import pytest
 from frf_ipz.report.along_structure import picture_of_parts, pictures_of_flexibility
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.sections.updating import build
+from frf_ipz.runs.results import Results
 from synthetic_run import parts_of, synthetic_folder
 
 FACTOR = 0.8
@@ -16,7 +17,7 @@ FACTOR = 0.8
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(synthetic_folder())
+    return read_contents(Results(synthetic_folder()))
 
 
 def trace(picture, name):

@@ -13,12 +13,13 @@ from frf_ipz.report.picture import Picture
 from frf_ipz.report.section import Table
 from frf_ipz.report.sections.diagnosis import build
 from frf_ipz.report.sections.overview import build as overview
+from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder
 
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(synthetic_folder(diagnosed=True))
+    return read_contents(Results(synthetic_folder(diagnosed=True)))
 
 
 def block(run, kind, name):

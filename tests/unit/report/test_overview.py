@@ -10,12 +10,13 @@ from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.sections.overview import build, verdict
 from frf_ipz.report.wording import number
+from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder
 
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(synthetic_folder())
+    return read_contents(Results(synthetic_folder()))
 
 
 def card(run, title):

@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 import pytest
 
 from frf_ipz.report.page import SECTIONS, write_report
+from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import nothing_to_do
 from synthetic_run import Folder, many_frfs, synthetic_folder
 
@@ -35,7 +36,7 @@ class Reader(HTMLParser):
 
 def page_of(folder, tmp_path):
     path = tmp_path / "report.html"
-    write_report(folder, path)
+    write_report(Results(folder), path)
     return path.read_text(encoding="utf-8")
 
 
@@ -152,7 +153,7 @@ def test_results_made_before_the_last_change_are_named(tmp_path):
 
 def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
     recordings = many_frfs(100, 50_000)
-    text = page_of(Folder(results={"ingest": recordings}, manifest={"stages": {}}, stale=()), tmp_path)
+    text = page_of(Folder(results={"ingest": recordings}, manifest={"stages": {"ingest": {}}}, stale=()), tmp_path)
     assert len(text.encode()) < MOST_BYTES
     data = data_of(text)
     drawn = [trace for trace in data["pictures"]["frf"]["data"] if "yaxis" not in trace and "fill" not in trace]

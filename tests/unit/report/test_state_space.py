@@ -8,6 +8,7 @@ import pytest
 
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.sections.state_space import build
+from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder
 
 PORTS = ("dt", "state_names", "input_names", "input_units", "output_names", "output_units")
@@ -15,7 +16,7 @@ PORTS = ("dt", "state_names", "input_names", "input_units", "output_names", "out
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(synthetic_folder())
+    return read_contents(Results(synthetic_folder()))
 
 
 def poles(run):

@@ -11,6 +11,7 @@ from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.section import pictures_of
+from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.marks import with_choices, with_retained
 from frf_ipz.show.page import SHOW, page_sections
@@ -33,7 +34,7 @@ CHOICES = PipelineFile(
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(synthetic_folder())
+    return read_contents(Results(synthetic_folder()))
 
 
 def html_of(run, choices=CHOICES):
@@ -89,7 +90,7 @@ def test_the_list_of_records_shows_what_was_chosen_and_what_is_used(run):
     ids=["no model", "no fit", "nothing"],
 )
 def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
-    html = html_of(read_contents(synthetic_folder(without=without)))
+    html = html_of(read_contents(Results(synthetic_folder(without=without))))
     forms = {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "record-choices"}
     assert {form for form in forms if f'id="{form}"' not in html} == missing
 
