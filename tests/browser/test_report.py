@@ -208,7 +208,7 @@ def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
 
 def test_hostile_names_are_drawn_as_text(browser, tmp_path):
     path = tmp_path / "hostile.html"
-    write_report(hostile_folder(), path)
+    write_report(Results(hostile_folder()), path)
     page = open_page(browser, path)
     assert page.execute_script("return window.hacked") is None
     assert page.execute_script("return document.querySelectorAll('img').length") == 0

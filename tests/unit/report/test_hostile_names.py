@@ -11,6 +11,7 @@ from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import run_values, write_report
+from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.page import SHOW, page_sections
 from hostile_run import HOSTILE, hostile_folder
@@ -44,13 +45,13 @@ def read(text):
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("hostile") / "report.html"
-    write_report(hostile_folder(), path)
+    write_report(Results(hostile_folder()), path)
     return path.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def workbench():
-    run = read_contents(hostile_folder())
+    run = read_contents(Results(hostile_folder()))
     file = PipelineFile(
         pipeline=PipelineSection(name=HOSTILE, test=HOSTILE),
         ingest=IngestOptions(keep=(HOSTILE,), drop=(HOSTILE,), hide=(HOSTILE,)),
