@@ -6,19 +6,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from frf_ipz.dofs import Dof
-from frf_ipz.frf import FrfLabel
+import numpy as np
+
+from frf_ipz.arrays import FloatArray, read_only, require_finite, require_shape
+from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.errors import InputError, QuantityError, did_you_mean
+from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.units import numerator_of
-from frf_ipz.quantities import frf_quantity_of
+from frf_ipz.quantities import RESPONSES, frf_quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+UNITS = dict(zip(RESPONSES, ("m", "m/s", "m/s^2"), strict=True))
+ROTATIONAL_UNITS = dict(zip(RESPONSES, ("rad", "rad/s", "rad/s^2"), strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +82,81 @@ class TestSetup:
     files: tuple[Path, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """A recording in memory: a force and the responses to it, in SI units, at a constant rate.
+
+    Parameters
+    ----------
+    force : (n_samples,) array
+        N, or N m where the input is a rotation.
+    responses : (n_outputs, n_samples) array
+        m, m/s or m/s^2 (rad, rad/s, rad/s^2 at rotations), as `quantity` says.
+    sample_rate_hz : float
+        Hz.
+    input_dof : Dof or str
+        Where the force acts, such as ``"18:+z"``.
+    output_dofs : sequence of Dof or str
+        Where the sensors sit, one a row of `responses`.
+    quantity : str
+        ``acceleration``, ``velocity`` or ``displacement``.
+
+    Raises
+    ------
+    ShapeError
+        If shapes disagree or a value is not finite.
+    QuantityError
+        If there is no such quantity.
+    InputError
+        If a label is none, or the rate is not positive.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) / 1000
+    >>> one = Recording(
+    ...     force=(time < 0.002) * 50.0,
+    ...     responses=np.exp(-3 * time)[None] * np.sin(300 * time),
+    ...     sample_rate_hz=1000.0,
+    ...     input_dof="18:+z",
+    ...     output_dofs=["20:+z"],
+    ... )
+    >>> VibrationTest.from_recordings([one]).labels[0].unit
+    'm/s^2/N'
+    """
+
+    force: FloatArray
+    responses: FloatArray
+    sample_rate_hz: float
+    input_dof: Dof | str
+    output_dofs: Sequence[Dof | str]
+    quantity: str = "acceleration"
+
+    def __post_init__(self) -> None:
+        force, responses = np.asarray(self.force, float), np.atleast_2d(np.asarray(self.responses, float))
+        require_shape("the force of a recording", force, (None,))
+        require_shape("the responses of a recording", responses, (len(self.output_dofs), len(force)))
+        require_finite("the force of a recording", force)
+        require_finite("the responses of a recording", responses)
+        if self.quantity not in RESPONSES:
+            raise QuantityError(f"'{self.quantity}' is no response; {did_you_mean(self.quantity, RESPONSES)}")
+        if not 0 < self.sample_rate_hz < np.inf:
+            raise InputError(f"the rate of a recording is {self.sample_rate_hz:g} Hz; it is positive")
+        changed = {
+            "force": read_only(force),
+            "responses": read_only(responses),
+            "input_dof": as_dof(self.input_dof),
+            "output_dofs": tuple(as_dof(dof) for dof in self.output_dofs),
+        }
+        for name, value in changed.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def table(self) -> FloatArray:
+        """Time in s, force and responses as columns, (n_samples, 2 + n_outputs) array."""
+        time = np.arange(len(self.force)) / self.sample_rate_hz
+        return np.column_stack([time, self.force, self.responses.T])
+
+
 @dataclass(frozen=True, kw_only=True)
 class VibrationTest:
     """A test: what was measured, where, and in which files.
@@ -81,7 +164,7 @@ class VibrationTest:
     Parameters
     ----------
     path : Path
-        ``test.toml``.
+        ``test.toml``; a name where the test is in memory.
     name : str
         What the user calls it.
     kind : str
@@ -98,6 +181,10 @@ class VibrationTest:
         Files with FRFs, of kind ``frf``.
     labels : tuple of FrfLabel
         The FRFs that the test gives, each once.
+    signals : mapping of Path to (n_samples, 2 + n_outputs) array
+        Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
+    frfs : FrfSet, optional
+        FRFs that are in memory.
     """
 
     path: Path
@@ -109,6 +196,113 @@ class VibrationTest:
     setups: tuple[TestSetup, ...]
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
+    signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
+    frfs: FrfSet | None = field(default=None, repr=False)
+
+    @classmethod
+    def from_recordings(
+        cls,
+        recordings: Sequence[Recording],
+        *,
+        kind: str = "hammer",
+        name: str = "test",
+        nominal_damping_ratio: float | None = None,
+        unknown_scale: str = "none",
+    ) -> VibrationTest:
+        """Make a test from recordings in memory.
+
+        Parameters
+        ----------
+        recordings : sequence of Recording
+            All with the same number of outputs of the same quantity; sensors may rove.
+        kind : str
+            ``hammer`` or ``random`` (shaker, long records).
+        name : str
+            What it is called.
+        nominal_damping_ratio : float, optional
+            For models that state no damping.
+        unknown_scale : str
+            ``none``, ``common`` or ``per_channel``.
+
+        Returns
+        -------
+        VibrationTest
+            As if it had been read from files.
+
+        Raises
+        ------
+        InputError
+            If there is no recording, there is no such kind, or the recordings do not fit each other.
+        """
+        if kind not in {"hammer", "random"}:
+            raise InputError(f"'{kind}' is no kind of test; {did_you_mean(kind, ('hammer', 'random'))}")
+        layouts = {(len(recording.output_dofs), recording.quantity) for recording in recordings}
+        if len(layouts) != 1:
+            raise InputError(
+                "recordings of one test have the same number of outputs of the same quantity, at least one"
+            )
+        ((count, quantity),) = layouts
+        channels = [Channel(column="force", role="input", quantity="force", unit="N")]
+        channels += [
+            Channel(column=f"output {place + 1}", role="output", quantity=quantity, unit=UNITS[quantity])
+            for place in range(count)
+        ]
+        paths = [Path(f"recording {place + 1}") for place in range(len(recordings))]
+        layout_files: dict[tuple[Dof, tuple[Dof, ...]], list[Path]] = {}
+        for path, recording in zip(paths, recordings, strict=True):
+            layout_files.setdefault(
+                (as_dof(recording.input_dof), tuple(map(as_dof, recording.output_dofs))), []
+            ).append(path)
+        setups = tuple(
+            TestSetup(input_dof=force, output_dofs=sensors, files=tuple(files))
+            for (force, sensors), files in layout_files.items()
+        )
+        labels = dict.fromkeys(label for setup in setups for label in setup_labels(tuple(channels), setup))
+        return cls(
+            path=Path(name),
+            name=name,
+            kind=kind,
+            nominal_damping_ratio=nominal_damping_ratio,
+            unknown_scale=unknown_scale,
+            channels=tuple(channels),
+            setups=setups,
+            frf_sources=(),
+            labels=tuple(labels),
+            signals={path: recording.table for path, recording in zip(paths, recordings, strict=True)},
+        )
+
+    @classmethod
+    def from_frfs(
+        cls, frfs: FrfSet, *, name: str = "test", nominal_damping_ratio: float | None = None
+    ) -> VibrationTest:
+        """Make a test from FRFs in memory.
+
+        Parameters
+        ----------
+        frfs : FrfSet
+            The FRFs.
+        name : str
+            What it is called.
+        nominal_damping_ratio : float, optional
+            For models that state no damping.
+
+        Returns
+        -------
+        VibrationTest
+            As if they had been read from a file.
+        """
+        return cls(
+            path=Path(name),
+            name=name,
+            kind="frf",
+            nominal_damping_ratio=nominal_damping_ratio,
+            unknown_scale=frfs.unknown_scale,
+            channels=(),
+            setups=(),
+            frf_sources=(),
+            labels=frfs.labels,
+            frfs=frfs,
+        )
 
     @property
     def input_channel(self) -> Channel:
@@ -138,7 +332,7 @@ class VibrationTest:
     @property
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
-        recordings = [path for _, path in self.recordings]
+        recordings = [path for _, path in self.recordings if path not in self.signals]
         return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources)]))
 
     @cached_property

@@ -47,8 +47,8 @@ class PipelineInputs:
         Points of interest.
     digests : mapping of str to str
         Digest of everything that the user handed in, by its name.
-    model_names : tuple of str
-        Those of `digests` that the FE model was made from.
+    measurement_names, model_names : tuple of str
+        Those of `digests` that the FRFs and the FE model are made from.
     reference : FrfSet, optional
         FRFs that a prediction is judged by.
     reference_name : str
@@ -63,6 +63,7 @@ class PipelineInputs:
     fe_model: StructuralModel | None = None
     points: tuple[Dof, ...] = ()
     digests: Mapping[str, str] = field(default_factory=dict)
+    measurement_names: tuple[str, ...] = ()
     model_names: tuple[str, ...] = ()
     reference: FrfSet | None = None
     reference_name: str = ""
@@ -114,6 +115,7 @@ def read_inputs(path: Path) -> PipelineInputs:
         fe_model=fe_model,
         points=points,
         digests={str(file): digest_file(file) for file in dict.fromkeys(files)},
+        measurement_names=tuple(str(file) for file in test.files),
         model_names=tuple(str(file) for file in files_of_model),
         reference=None if aside is None else read_reference(aside, test.labels[0].quantity),
         reference_name="" if aside is None else str(aside),

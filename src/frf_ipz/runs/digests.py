@@ -7,10 +7,13 @@ import json
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from scipy import sparse
+
 from frf_ipz.errors import FileFormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
 
@@ -51,6 +54,32 @@ def plain(options: Any) -> Any:  # noqa: ANN401  options are trees of dataclasse
     return options if isinstance(options, str | int | float | bool | None) else str(options)
 
 
+def digest_arrays(arrays: Iterable[Any]) -> str:
+    """Digest the content of arrays.
+
+    Parameters
+    ----------
+    arrays : iterable of array
+        Dense or sparse.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+
+    Examples
+    --------
+    >>> digest_arrays([np.zeros(2)]) == digest_arrays([np.zeros((2, 1))])
+    False
+    """
+    total = hashlib.sha256()
+    for array in arrays:
+        for part in map(np.asarray, _dense_parts(array)):
+            total.update(f"{part.dtype.str} {part.shape}".encode())
+            total.update(np.ascontiguousarray(part).tobytes())
+    return total.hexdigest()
+
+
 def digest_file(path: Path) -> str:
     """Digest a file's content.
 
@@ -74,3 +103,7 @@ def digest_file(path: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
+
+
+def _dense_parts(array: Any) -> list[Any]:  # noqa: ANN401  arrays, sparse ones among them
+    return [array.data, array.indices, array.indptr] if sparse.issparse(array) else [array]

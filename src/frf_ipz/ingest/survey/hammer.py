@@ -57,7 +57,7 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     for position, index in enumerate(indices):
         progress(0.5 + 0.5 * position / len(indices), f"checking {index.path.name}")
         records += _check_file(files, index, usual_length)
-    file_names = [record_name(files.test, path, 1, 1) for path in files.test.files]
+    file_names = [record_name(files.test, path, 1, 1) for _, path in files.test.recordings]
     check_names([*file_names, *(record.name for record in records if "#" in record.name)], options)
     selection = select_records(records, options)
     used = [record for record in selection.records if record.used]
@@ -81,7 +81,7 @@ def _index_files(files: RecordingFiles, options: IngestOptions, progress: Progre
     test, indices = files.test, []
     dropped_files = [text for text in options.drop if "#" not in text]
     for position, (setup, path) in enumerate(test.recordings):
-        progress(0.5 * position / len(test.files), f"reading {path.name}")
+        progress(0.5 * position / len(test.recordings), f"reading {path.name}")
         try:
             indices.append(index_file(files, setup, path, find_impacts=True))
         except InputError:

@@ -59,10 +59,10 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
     InputError
         If a file cannot be used, or the user's choice makes no sense.
     """
-    check_names([record_name(files.test, path, 1, 1) for path in files.test.files], options)
+    check_names([record_name(files.test, path, 1, 1) for _, path in files.test.recordings], options)
     records: list[RecordInfo] = []
     for position, (setup, path) in enumerate(files.test.recordings):
-        progress(0.5 * position / len(files.test.files), f"reading {path.name}")
+        progress(0.5 * position / len(files.test.recordings), f"reading {path.name}")
         records.append(_check_file(files, index_file(files, setup, path, find_impacts=False)))
     selection = select_records(records, options)
     survey = Survey(

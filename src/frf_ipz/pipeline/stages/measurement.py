@@ -36,9 +36,7 @@ def ingest(runner: StageRunner) -> FrfEstimate:
         FRFs and the table of records.
     """
     options = runner.inputs.options.ingest
-    files = {
-        name: value for name, value in runner.inputs.digests.items() if name in set(map(str, runner.inputs.test.files))
-    }
+    files = {name: runner.inputs.digests[name] for name in runner.inputs.measurement_names}
     return runner.stage(
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
