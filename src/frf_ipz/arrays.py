@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,13 @@ from frf_ipz.errors import ShapeError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from scipy import sparse
+
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"  # sparse, as the matrices of an FE model are
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

@@ -17,11 +17,12 @@ Every message says what was given, what was needed, and what to try.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
 
@@ -86,6 +87,35 @@ class PairingError(NumericalError):
 
 class IllConditionedError(NumericalError):
     """A matrix is too close to singular to be used."""
+
+
+@contextmanager
+def errors_of_file(path: Path | str, *, where: str = "") -> Iterator[None]:
+    """Say in which file an input error was met.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    where : str, optional
+        The place in the file: a line, a column or a key.
+
+    Yields
+    ------
+    None
+        While the file's content is worked on.
+
+    Raises
+    ------
+    FileFormatError
+        In the place of an `InputError` that names no file.
+    """
+    try:
+        yield
+    except FileFormatError:
+        raise
+    except InputError as error:
+        raise FileFormatError(path, str(error), where=where) from None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

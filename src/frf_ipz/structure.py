@@ -8,16 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.arrays import BoolArray, FloatArray, IntArray, require_shape
-from frf_ipz.dofs import Dof
-from frf_ipz.errors import InputError
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
+from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.errors import InputError, ShapeError
+from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
+from frf_ipz.numerics.neighbours import lines_between_neighbours
 
-Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,6 +138,82 @@ class StructuralModel:
             if getattr(self, name).shape != (n_all, n_all):
                 raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {n_all} DOFs")
         require_shape("the marks of held DOFs", self.fixed, (n_all,))
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike | Matrix,
+        stiffness: ArrayLike | Matrix,
+        damping: ArrayLike | Matrix | None = None,
+        *,
+        dofs: Sequence[Dof | str],
+        coordinates: Mapping[int, Sequence[float]] | ArrayLike | None = None,
+        modal_damping: float | Sequence[float] = (),
+        name: str = "model",
+    ) -> StructuralModel:
+        """Make a model from matrices, and check it.
+
+        Parameters
+        ----------
+        mass, stiffness : (n, n) array, dense or sparse
+            kg and N/m (and their rotational counterparts), symmetric, without rows of held DOFs.
+        damping : (n, n) array, dense or sparse, optional
+            Viscous damping, N s/m.
+        dofs : sequence of Dof or str
+            One a row, such as ``"1:x"``.
+        coordinates : mapping of int to (3,) sequence, or (n_nodes, 3) array, optional
+            Positions of the nodes, m: by node number, or in the order in which `dofs` names the nodes first. Without
+            them the nodes are drawn in a row.
+        modal_damping : float or sequence of float
+            Damping ratios of the elastic modes besides `damping`; the last one holds for all further modes.
+        name : str
+            What it is called.
+
+        Returns
+        -------
+        StructuralModel
+            The model.
+
+        Raises
+        ------
+        ShapeError
+            If shapes disagree.
+        InputError
+            If a matrix is not symmetric, the mass is not positive definite, stiffness or damping is indefinite, a DOF
+            is named twice, or a node has no position.
+
+        Examples
+        --------
+        >>> stiffness = [[30.0, -10.0], [-10.0, 10.0]]
+        >>> model = StructuralModel.from_matrices(np.diag([2.0, 1.0]), stiffness, dofs=["1:x", "2:x"])
+        >>> [dof.name for dof in model.dofs]
+        ['1:x', '2:x']
+        """
+        rows = tuple(as_dof(dof).unsigned for dof in dofs)
+        mass_matrix = _symmetric_matrix("mass", mass, len(rows))
+        require_positive_definite_mass(mass_matrix, rows)
+        stiffness_matrix = _symmetric_matrix("stiffness", stiffness, len(rows))
+        require_semidefinite(stiffness_matrix, rows, "stiffness")
+        none = sparse.csr_array(mass_matrix.shape, dtype=np.float64)
+        damping_matrix = none if damping is None else _symmetric_matrix("damping", damping, len(rows))
+        require_semidefinite(damping_matrix, rows, "damping")
+        nodes, positions = _positions(rows, coordinates)
+        return cls(
+            name=name,
+            kind="matrices",
+            all_dofs=rows,
+            fixed=np.zeros(len(rows), bool),
+            mass_all=mass_matrix,
+            stiffness_all=stiffness_matrix,
+            damping_all=damping_matrix,
+            modal_damping=_damping_ratios(modal_damping),
+            geometry=Geometry(
+                nodes=nodes,
+                coordinates_m=positions,
+                lines=lines_between_neighbours(stiffness_matrix, rows, nodes, positions),
+                is_schematic=coordinates is None,
+            ),
+        )
 
     @property
     def dofs(self) -> tuple[Dof, ...]:
@@ -290,3 +373,45 @@ class ReducedModel:
                 f"the reduced model does not know the DOF {dof.name}; add it to [predict] points"
             ) from None
         return np.asarray(dof.sign * self.expansion[row])
+
+
+def _symmetric_matrix(what: str, matrix: ArrayLike | Matrix, order: int) -> Matrix:
+    """Take a matrix, dense or sparse, as a symmetric sparse one."""
+    given: Any = matrix if sparse.issparse(matrix) else np.atleast_2d(np.asarray(matrix))
+    if given.shape != (order, order):
+        raise ShapeError(f"the {what} matrix is {given.shape}, but {order} DOFs are named; one row a DOF is needed")
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"the {what} matrix holds {given.dtype} values; real ones are needed")
+    try:
+        return symmetrise(sparse.csr_array(given, dtype=np.float64))
+    except InputError as error:
+        raise InputError(f"the {what} matrix {error}") from None
+
+
+def _positions(
+    dofs: Sequence[Dof], coordinates: Mapping[int, Sequence[float]] | ArrayLike | None
+) -> tuple[IntArray, FloatArray]:
+    """Give the nodes, ascending, and the position of each."""
+    named = list(dict.fromkeys(dof.node for dof in dofs))
+    if coordinates is None:
+        position_of = {node: (SPACING_M * place, 0.0, 0.0) for place, node in enumerate(sorted(named))}
+    elif isinstance(coordinates, Mapping):
+        position_of = {int(node): tuple(map(float, position)) for node, position in coordinates.items()}  # type: ignore[misc]
+    else:
+        table = np.asarray(coordinates, float)
+        require_shape("the coordinates", table, (len(named), 3))
+        position_of = dict(zip(named, map(tuple, table.tolist()), strict=True))
+    missing = [node for node in named if len(position_of.get(node, ())) != 3]
+    if missing:
+        raise InputError(f"node {missing[0]} has no position; coordinates need x, y and z of every node, in m")
+    nodes = np.array(sorted(named), np.int64)
+    positions = np.array([position_of[node] for node in nodes.tolist()], float)
+    require_finite("the coordinates", positions)
+    return nodes, positions
+
+
+def _damping_ratios(ratios: float | Sequence[float]) -> FloatArray:
+    given = np.atleast_1d(np.asarray(ratios, float))
+    if not ((given >= 0) & (given < 1)).all():
+        raise InputError(f"modal_damping is {ratios}; damping ratios lie from 0 to below 1")
+    return given

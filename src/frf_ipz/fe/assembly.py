@@ -12,8 +12,9 @@ from frf_ipz.arrays import FloatArray, IntArray
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from frf_ipz.arrays import Matrix
     from frf_ipz.fe.model_options import DampingSection
-    from frf_ipz.structure import Matrix, Part
+    from frf_ipz.structure import Part
 
 
 def multiply(matrix: Matrix, vectors: FloatArray) -> FloatArray:

@@ -16,8 +16,9 @@ from frf_ipz.fe.beam_elements import deflection_polynomials, geometric_stiffness
 from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, beam_elements, element_parts
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import Matrix
     from frf_ipz.fe.kinds.beam import Formulation
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.structure import StructuralModel
 
 
 def with_formulation(model: StructuralModel, formulation: Formulation) -> StructuralModel:

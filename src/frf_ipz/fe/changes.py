@@ -16,8 +16,9 @@ from frf_ipz.structure import Part
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frf_ipz.arrays import Matrix
     from frf_ipz.dofs import Dof
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.structure import StructuralModel
 
 TRANSLATIONS = ("x", "y", "z")
 

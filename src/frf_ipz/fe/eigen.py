@@ -17,12 +17,13 @@ from scipy.sparse import linalg as sparse_linalg
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
-from frf_ipz.fe.factorization import DENSE_ORDER, Factorization, factorize
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
+from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
 
 if TYPE_CHECKING:
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.arrays import Matrix
+    from frf_ipz.structure import StructuralModel
 
 EPS = float(np.finfo(float).eps)
 SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding

@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
-from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 

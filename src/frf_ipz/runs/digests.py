@@ -106,4 +106,4 @@ def digest_file(path: Path) -> str:
 
 
 def _dense_parts(array: Any) -> list[Any]:  # noqa: ANN401  arrays, sparse ones among them
-    return [array.data, array.indices, array.indptr] if sparse.issparse(array) else [array]
+    return [getattr(array, name) for name in ("data", "indices", "indptr")] if sparse.issparse(array) else [array]

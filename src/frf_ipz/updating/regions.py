@@ -12,7 +12,8 @@ from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
-    from frf_ipz.structure import Matrix, Part, ReducedModel, StructuralModel
+    from frf_ipz.arrays import Matrix
+    from frf_ipz.structure import Part, ReducedModel, StructuralModel
 
 MAX_REGIONS = 150  # finer than any number of poles and zeros can tell apart
 

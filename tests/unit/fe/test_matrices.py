@@ -10,10 +10,10 @@ from fe_models import beam, export
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.eigen import solve_modes
-from frf_ipz.fe.matrices import neighbours
-from frf_ipz.fe.matrices.definiteness import DENSE_ORDER
-from frf_ipz.fe.matrices.neighbours import lines_between_neighbours
 from frf_ipz.fe.model_file import model_files, read_model
+from frf_ipz.numerics import neighbours
+from frf_ipz.numerics.definiteness import DENSE_ORDER
+from frf_ipz.numerics.neighbours import lines_between_neighbours
 
 PRINTED = 1e-12  # 17 digits are printed
 GROUPS = """

@@ -16,10 +16,10 @@ from scipy import linalg, sparse
 from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import FloatArray, Matrix
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
     from frf_ipz.diagnosis.model.modes import Modes
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.structure import StructuralModel
 
 LEAST_SQUARE = 0.01  # of the model's: a mode below the band is pulled wherever lines above it want, but stays stable
 

@@ -18,14 +18,15 @@ from scipy import linalg
 from frf_ipz.arrays import FloatArray
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
-from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import generalised_eigh
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.arrays import Matrix
     from frf_ipz.diagnosis.model.change import Change
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.structure import StructuralModel
 
 MODES_UP_TO = 4.0  # times the highest frequency: modes that are kept
 MIN_MODES = 12

@@ -16,7 +16,8 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
-    from frf_ipz.structure import Matrix, StructuralModel
+    from frf_ipz.arrays import Matrix
+    from frf_ipz.structure import StructuralModel
 
 
 Transfer = Callable[[ComplexArray], ComplexArray]

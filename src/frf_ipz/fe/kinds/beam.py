@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -14,10 +15,10 @@ from frf_ipz.fe.assembly import assemble_mass_and_stiffness, stated_damping
 from frf_ipz.fe.beam_elements import BeamElements, mass_matrices, shear_coefficient, stiffness_matrices
 from frf_ipz.fe.model_options import Count, DampingSection, ModelSection, Node, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
-from frf_ipz.toml_files import STRICT
+from frf_ipz.toml_files import STRICT, to_options
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Sequence
 
     from frf_ipz.arrays import BoolArray, IntArray
 
@@ -198,6 +199,78 @@ def read(file: BeamFile, path: Path) -> StructuralModel:
     if model.fixed.all():
         raise FileFormatError(path, "the supports hold every DOF of the beam; use more elements", where="key 'beam'")
     return model
+
+
+def make_beam(
+    *,
+    length_m: float,
+    width_m: float,
+    thickness_m: float,
+    youngs_modulus_Pa: float,
+    density_kg_m3: float,
+    elements: int = 100,
+    formulation: Formulation = "timoshenko",
+    poisson_ratio: float = 0.3,
+    left: End = "free",
+    right: End = "free",
+    section: Sequence[BeamSection] = (),
+    point_mass: Sequence[BeamPointMass] = (),
+    point_spring: Sequence[BeamPointSpring] = (),
+    modal_ratio: float | Sequence[float] | None = None,
+    name: str = "beam",
+) -> StructuralModel:
+    """Build a straight beam along x that bends in z.
+
+    Parameters
+    ----------
+    length_m, width_m, thickness_m : float
+        m; the beam bends about its width.
+    youngs_modulus_Pa, density_kg_m3, poisson_ratio : float
+        Material.
+    elements : int
+        Elements of equal length; nodes are 1 to elements + 1 from the left.
+    formulation : str
+        ``timoshenko`` or ``euler-bernoulli``.
+    left, right : str
+        How an end is held: ``clamped``, ``pinned``, ``sliding`` or ``free``.
+    section : sequence of BeamSection
+        Other cross-sections of some elements.
+    point_mass, point_spring : sequence of BeamPointMass and of BeamPointSpring
+        At nodes.
+    modal_ratio : float or sequence of float, optional
+        Damping ratios of the modes that are no rigid-body motion; the last one holds for all further modes.
+    name : str
+        What it is called.
+
+    Returns
+    -------
+    StructuralModel
+        DOFs ``z`` and ``ry`` of every node.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range, or an element or a node does not exist.
+
+    Examples
+    --------
+    >>> beam = make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, left="clamped"
+    ... )
+    >>> beam.dofs[-2].name
+    '101:z'
+    """
+    options = {
+        "length_m": length_m, "width_m": width_m, "thickness_m": thickness_m, "youngs_modulus_Pa": youngs_modulus_Pa,
+        "density_kg_m3": density_kg_m3, "elements": elements, "formulation": formulation,
+        "poisson_ratio": poisson_ratio, "left": left, "right": right, "section": tuple(section),
+        "point_mass": tuple(point_mass), "point_spring": tuple(point_spring),
+    }  # fmt: skip
+    table: dict[str, object] = {"model": {"kind": KIND, "name": name}, "beam": options}
+    if modal_ratio is not None:
+        table["damping"] = {"modal_ratio": modal_ratio}
+    source = Path("make_beam")
+    return read(to_options(table, BeamFile, source), source)
 
 
 def build_beam(file: BeamFile) -> StructuralModel:

@@ -10,20 +10,20 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import IntArray
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.assembly import stated_damping
-from frf_ipz.fe.matrices.definiteness import require_positive_definite_mass, require_semidefinite
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
 from frf_ipz.fe.matrices.matrix_market import read_symmetric
-from frf_ipz.fe.matrices.neighbours import lines_between_neighbours
 from frf_ipz.fe.model_options import DampingSection, ModelSection, Name
+from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite
+from frf_ipz.numerics.neighbours import lines_between_neighbours
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.structure import Matrix
+    from frf_ipz.arrays import Matrix
 
 KIND = "matrices"
 SUM_TOLERANCE = 1e-6  # of a diagonal entry: rounding of printed groups may add up to that
@@ -144,13 +144,16 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     options, folder = file.matrices, path.parent
     table = read_dof_table(folder / options.dofs)
     mass = _matrix(folder / options.mass, table, options)
-    require_positive_definite_mass(mass, table.dofs, folder / options.mass)
+    with errors_of_file(folder / options.mass):
+        require_positive_definite_mass(mass, table.dofs)
     stiffness = _matrix(folder / options.stiffness, table, options)
-    require_semidefinite(stiffness, table.dofs, folder / options.stiffness, "stiffness")
+    with errors_of_file(folder / options.stiffness):
+        require_semidefinite(stiffness, table.dofs, "stiffness")
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
     if options.damping is not None:
         exported = _matrix(folder / options.damping, table, options)
-        require_semidefinite(exported, table.dofs, folder / options.damping, "damping")
+        with errors_of_file(folder / options.damping):
+            require_semidefinite(exported, table.dofs, "damping")
         damping = sparse.csr_array(damping + exported)
     return StructuralModel(
         name=file.model.name,

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import io, sparse
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, errors_of_file
+from frf_ipz.numerics.definiteness import symmetrise
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.structure import Matrix
-
-SYMMETRY_TOLERANCE = 1e-6  # of the geometric mean of the two diagonal entries: exports with six digits still pass
+    from frf_ipz.arrays import Matrix
 
 
 def read_symmetric(path: Path, order: int, ordered_by: str) -> Matrix:
@@ -40,7 +39,7 @@ def read_symmetric(path: Path, order: int, ordered_by: str) -> Matrix:
     ------
     FileFormatError
         If there is no such file, it is no Matrix Market file, not real, not square, of another size, holds values that
-        are not finite, or is not symmetric to `SYMMETRY_TOLERANCE`.
+        are not finite, or is not symmetric to six digits.
     """
     matrix = _read(path)
     rows, columns = matrix.shape
@@ -50,11 +49,8 @@ def read_symmetric(path: Path, order: int, ordered_by: str) -> Matrix:
         raise FileFormatError(
             path, f"is {rows} x {columns}, but {ordered_by} names {order} DOFs; one row a DOF is needed"
         )
-    if not np.isfinite(matrix.data).all():
-        raise FileFormatError(path, "holds values that are not finite; export it again")
-    _require_symmetry(matrix, path)
-    symmetric: Any = (matrix + matrix.T) / 2
-    return sparse.csr_array(symmetric)
+    with errors_of_file(path):
+        return symmetrise(matrix)
 
 
 def _read(path: Path) -> Matrix:
@@ -71,19 +67,3 @@ def _read(path: Path) -> Matrix:
         raise FileFormatError(path, f"cannot be read as a Matrix Market file: {error}") from None
     matrix: Matrix = sparse.csr_array(loaded, dtype=np.float64)
     return matrix
-
-
-def _require_symmetry(matrix: Matrix, path: Path) -> None:
-    difference = sparse.coo_array(matrix - matrix.T)
-    diagonal = np.abs(matrix.diagonal())
-    allowed = SYMMETRY_TOLERANCE * np.sqrt(diagonal[difference.row] * diagonal[difference.col])
-    excess = np.abs(difference.data) - allowed
-    if excess.size and excess.max() > 0:
-        worst = int(np.argmax(excess))
-        row, column = int(difference.row[worst]), int(difference.col[worst])
-        raise FileFormatError(
-            path,
-            f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g}; export the full matrix, "
-            "or mark it as symmetric in its first line",
-            where=f"rows {row + 1} and {column + 1}",
-        )

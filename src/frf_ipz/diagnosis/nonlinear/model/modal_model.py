@@ -18,7 +18,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, damping_ratios, solve_basis
-from frf_ipz.fe.factorization import DENSE_ORDER
+from frf_ipz.numerics.factorization import DENSE_ORDER
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, Sensor

@@ -9,9 +9,9 @@ from scipy.sparse import linalg as linalg_sparse
 from fe_models import structural_model
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import IllConditionedError
-from frf_ipz.fe import factorization
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.fe.factorization import DENSE_ORDER, factorize, is_positive_definite
+from frf_ipz.numerics import factorization
+from frf_ipz.numerics.factorization import DENSE_ORDER, factorize, is_positive_definite
 
 SOLVED = 1e-10  # relative error of a solution: condition numbers here are below 1e4
 NODES_ACROSS, NODES_ALONG, PER_NODE = 15, 30, 2

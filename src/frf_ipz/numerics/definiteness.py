@@ -1,33 +1,67 @@
-"""Whether mass and stiffness matrices can be those of a structure."""
+"""Whether mass, stiffness and damping matrices can be those of a structure."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from frf_ipz.errors import FileFormatError
-from frf_ipz.fe.factorization import is_positive_definite
+from frf_ipz.errors import InputError
+from frf_ipz.numerics.factorization import is_positive_definite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import FloatArray, Matrix
     from frf_ipz.dofs import Dof
-    from frf_ipz.structure import Matrix
 
 DENSE_ORDER = 1000  # up to here all eigenvalues are computed, and the message can name the worst DOF
 SINGULAR_MASS = (
     1e-12  # smallest eigenvalue of the mass matrix scaled to a diagonal of ones: that of a singular one after rounding
 )
 NEGATIVE_STIFFNESS = 1e-10  # of the largest eigenvalue: allowed for rounding of printed digits
+SYMMETRY_TOLERANCE = 1e-6  # of the geometric mean of the two diagonal entries: exports with six digits still pass
 ESTIMATE_TOLERANCE = 1e-2  # of the largest eigenvalue, which is only a yardstick
 
 
-def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof], path: Path) -> None:
+def symmetrise(matrix: Matrix) -> Matrix:
+    """Average out small asymmetries, as they come from few printed digits.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+        Real.
+
+    Returns
+    -------
+    (n, n) sparse array
+        Symmetric.
+
+    Raises
+    ------
+    InputError
+        If it holds values that are not finite, or is not symmetric to `SYMMETRY_TOLERANCE`.
+    """
+    if not np.isfinite(matrix.data).all():
+        raise InputError("holds values that are not finite; export it again")
+    difference = sparse.coo_array(matrix - matrix.T)
+    diagonal = np.abs(matrix.diagonal())
+    allowed = SYMMETRY_TOLERANCE * np.sqrt(diagonal[difference.row] * diagonal[difference.col])
+    excess = np.abs(difference.data) - allowed
+    if excess.size and excess.max() > 0:
+        worst = int(np.argmax(excess))
+        row, column = int(difference.row[worst]), int(difference.col[worst])
+        raise InputError(
+            f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g} in rows {row + 1} and "
+            f"{column + 1}; give the full symmetric matrix, or one triangle of it marked as symmetric"
+        )
+    symmetric: Any = (matrix + matrix.T) / 2
+    return sparse.csr_array(symmetric)
+
+
+def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof]) -> None:
     """Refuse a mass matrix that is not positive definite.
 
     Parameters
@@ -36,22 +70,19 @@ def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof], path: Path
         Symmetric.
     dofs : sequence of Dof
         Its rows.
-    path : Path
-        Its file, for the message.
 
     Raises
     ------
-    FileFormatError
+    InputError
         If a DOF has no mass, or a motion has none or a negative one.
     """
     diagonal = mass.diagonal()
     if (diagonal <= 0).any():
         worst = int(np.argmin(diagonal))
-        raise FileFormatError(
-            path,
-            f"the DOF {dofs[worst].name} has the mass {diagonal[worst]:.4g}, and {np.count_nonzero(diagonal <= 0)} "
-            "DOFs have none above 0; condense massless DOFs in the FE program, or give them their (rotary) inertia",
-            where=f"row {worst + 1}",
+        raise InputError(
+            f"the DOF {dofs[worst].name} (row {worst + 1}) has the mass {diagonal[worst]:.4g}, and "
+            f"{np.count_nonzero(diagonal <= 0)} DOFs have none above 0; condense massless DOFs in the FE "
+            "program, or give them their (rotary) inertia",
         )
     scale = sparse.diags_array(1 / np.sqrt(diagonal))
     scaled = sparse.csr_array(scale @ mass @ scale)
@@ -61,14 +92,13 @@ def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof], path: Path
     else:
         is_definite, where = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(dofs)), ""
     if not is_definite:
-        raise FileFormatError(
-            path,
+        raise InputError(
             f"the mass matrix is not positive definite: a motion has no mass or a negative one{where}; "
             "export the mass matrix that the FE program computes modes with",
         )
 
 
-def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], path: Path, what: str) -> None:
+def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str) -> None:
     """Refuse a stiffness or damping matrix that gives off energy.
 
     Parameters
@@ -77,14 +107,12 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], path: Path, what: 
         Symmetric.
     dofs : sequence of Dof
         Its rows.
-    path : Path
-        Its file, for the message.
     what : str
         ``stiffness`` or ``damping``.
 
     Raises
     ------
-    FileFormatError
+    InputError
         If an eigenvalue is below -1e-10 times the largest one.
     """
     if matrix.shape[0] <= DENSE_ORDER:
@@ -95,8 +123,7 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], path: Path, what: 
         shifted = _shifted(matrix, NEGATIVE_STIFFNESS * _largest_eigenvalue(matrix))
         is_semidefinite, where = matrix.nnz == 0 or is_positive_definite(shifted, _nodes(dofs)), ""
     if not is_semidefinite:
-        raise FileFormatError(
-            path,
+        raise InputError(
             f"the {what} matrix is indefinite: it has a negative eigenvalue{where}; 0 is allowed, and -1e-10 times the "
             "largest one. Check units and signs of what was exported",
         )

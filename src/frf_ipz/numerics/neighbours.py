@@ -12,8 +12,8 @@ from frf_ipz.arrays import FloatArray, IntArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.arrays import Matrix
     from frf_ipz.dofs import Dof
-    from frf_ipz.structure import Matrix
 
 FEW_NEIGHBOURS = 6.0  # on average: frames and grids, whose couplings are all drawn
 NEAREST = 30  # neighbours of a node that are considered: an eight-node brick has 26

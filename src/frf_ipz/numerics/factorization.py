@@ -20,7 +20,7 @@ from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import IllConditionedError
 
 if TYPE_CHECKING:
-    from frf_ipz.structure import Matrix
+    from frf_ipz.arrays import Matrix
 
 DENSE_ORDER = 600  # below, LAPACK on full matrices is faster than any sparse factor
 POSITIVE_DEFINITE = 2  # PARDISO's name for real, symmetric, positive definite
