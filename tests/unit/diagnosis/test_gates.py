@@ -42,4 +42,4 @@ def test_records_that_begin_within_the_ringing_of_a_blow_are_named(strike, dropp
     source = split_data(replace(strike(), records=tuple(records)))
     said = [text for text in list_warnings(source, run_data_checks(source, None)) if "ringing" in text]
     assert len(said) == is_late
-    assert all(text.startswith("blow 100 N, ") for text in said)
+    assert all(text.startswith("impact 100 N, ") for text in said)
