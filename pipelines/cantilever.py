@@ -51,7 +51,7 @@ def compare(run: frf_ipz.Results) -> pd.DataFrame:
 def main(out: Path) -> None:
     """Run the chain and say how well the point of interest was predicted."""
     run = frf_ipz.run_pipeline(HERE / "cantilever.toml", out)
-    print(frf_ipz.summarise(run))
+    print(run.summary())
     print("\nPoint of interest against the FRF that was kept aside:")
     print(compare(run).to_string(index=False, float_format="{:.4f}".format))
     print(f"\nOpen {out / 'report.html'} in a browser.")

@@ -85,7 +85,7 @@ def main(folder: Path, out: Path) -> None:
     case = CASES[folder.name]
     test = frf_ipz.read_test(folder / "test.toml")
     model = frf_ipz.read_model(folder / "model.toml")
-    frfs = replace(frf_ipz.estimate_frfs(test, frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
+    frfs = replace(frf_ipz.estimate_frfs(test, options=frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
     frfs = with_drift(frfs.select_lines(frfs.in_band(case.band_hz)), case.drift)
     kept = [location for location, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
     fits, problem = find_components(frfs.select_frfs(kept), model, case)

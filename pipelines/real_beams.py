@@ -22,7 +22,7 @@ from frf_ipz.updating.parameters import structural_basis
 
 
 def main(test: Path, model: Path, band_hz: tuple[float, float], side: str, nodes: list[int]) -> None:
-    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(test), frf_ipz.IngestOptions()).frfs
+    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(test), options=frf_ipz.IngestOptions()).frfs
     full = frf_ipz.read_model(model)
     there = sorted({_node(label, side) for label in frfs.labels})
     if set(nodes) - set(there):

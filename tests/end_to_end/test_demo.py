@@ -91,4 +91,4 @@ def test_a_second_run_computes_nothing(run):
 
 
 def test_the_summary_fits_a_screen(run):
-    assert len(frf_ipz.summarise(run).splitlines()) <= 40
+    assert len(run.summary().splitlines()) <= 40

@@ -76,7 +76,7 @@ def test_an_exponential_window_is_taken_back_exactly_for_any_structure(structure
         signals = impact(structure, n_samples=n_samples, step_s=STEP_S, at_s=at_s, length_s=1.6e-3)
         write_csv(Path(folder) / "hits" / "1.csv", signals, STEP_S)
         options = IngestOptions(exponential_window_s=1 / decay_1_s)
-        frfs = estimate_frfs(read_test(write_test(Path(folder), HIT)), options).frfs
+        frfs = estimate_frfs(read_test(write_test(Path(folder), HIT)), options=options).frfs
     band = frfs.in_band((5.0, 150.0))
     truth = structure.accelerance(frfs.s[band])
     # a mode's FRF is as high as its decay rate is small, and what is cut off stands against its first swing
@@ -94,7 +94,7 @@ def test_units_do_not_change_frfs(force, acc):
             scaled = signals / np.array([UNITS["force"][force_unit]] + [UNITS["acc"][unit]] * 2)[:, None]
             write_csv(campaign / "hits" / "1.csv", scaled, STEP_S)
             test = read_test(write_test(campaign, HIT, force_unit=force_unit, unit=unit))
-            values.append(estimate_frfs(test, IngestOptions(exponential_window_s=0.1)).frfs.values)
+            values.append(estimate_frfs(test, options=IngestOptions(exponential_window_s=0.1)).frfs.values)
     assert np.abs(values[1] - values[0]).max() <= ROUNDING * np.abs(values[0]).max()
 
 
@@ -113,7 +113,7 @@ def test_every_impact_of_a_file_is_found(gaps, heights, sign):
     )
     with tempfile.TemporaryDirectory() as folder:
         write_csv(Path(folder) / "hits" / "1.csv", impact(Structure(), force=force, step_s=STEP_S), STEP_S)
-        result = estimate_frfs(read_test(write_test(Path(folder), HIT)), IngestOptions())
+        result = estimate_frfs(read_test(write_test(Path(folder), HIT)), options=IngestOptions())
     expected = sign * np.array(heights[: len(at_s)])
     np.testing.assert_allclose(result.records.peak_force_N, expected, rtol=0.05)  # samples beside the top
 

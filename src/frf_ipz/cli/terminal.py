@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from frf_ipz.pipeline.run import run_pipeline
-from frf_ipz.pipeline.summary import summarise
 
 
 def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool | None, quiet: bool) -> None:
@@ -42,4 +41,4 @@ def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool
 
         run = run_pipeline(pipeline, out, until=until, diagnosing=diagnosing, progress=show)
     if not quiet:
-        Console(highlight=False, soft_wrap=True).print(summarise(run), markup=False)
+        Console(highlight=False, soft_wrap=True).print(run.summary(), markup=False)

@@ -7,25 +7,27 @@ from typing import TYPE_CHECKING
 from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
 from frf_ipz.ingest.estimation.hammer import estimate_hammer
 from frf_ipz.ingest.estimation.random import estimate_random
+from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
-    from frf_ipz.ingest.options import IngestOptions
 
 KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
 
 
-def estimate_frfs(test: VibrationTest, options: IngestOptions, *, progress: Progress = silent) -> FrfEstimate:
+def estimate_frfs(
+    test: VibrationTest, *, options: IngestOptions | None = None, progress: Progress = silent
+) -> FrfEstimate:
     """Estimate the FRFs of a test.
 
     Parameters
     ----------
     test : VibrationTest
         What was measured, from `read_test`.
-    options : IngestOptions
-        The user's choice.
+    options : IngestOptions, optional
+        How recordings become FRFs.
     progress : Progress
         Called with the share of the work that is done.
 
@@ -38,7 +40,14 @@ def estimate_frfs(test: VibrationTest, options: IngestOptions, *, progress: Prog
     ------
     InputError
         If a recording cannot be used: which file, which line, what to do.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> test = frf_ipz.read_test("data/raw/cantilever/test.toml")  # doctest: +SKIP
+    >>> frf_ipz.estimate_frfs(test).frfs.n_frfs  # doctest: +SKIP
+    2
     """
-    result = KINDS[test.kind](test, options, progress)
+    result = KINDS[test.kind](test, options or IngestOptions(), progress)
     progress(1.0, "FRFs estimated")
     return result

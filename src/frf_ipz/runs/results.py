@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.export.state_space import to_control
 from frf_ipz.runs.folder import read_run
+from frf_ipz.runs.summary import summarise
 from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
@@ -112,6 +114,19 @@ class Results:
     def stale(self) -> frozenset[str]:
         """Stages whose result was made before the last change."""
         return frozenset(stage for stage in self.stages if self._store.is_stale(stage))
+
+    def summary(self) -> str:
+        """Sum up what was found.
+
+        Returns
+        -------
+        str
+            At most a screen of text.
+        """
+        return summarise(self)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
 
     @cached_property
     def estimate(self) -> FrfEstimate | None:

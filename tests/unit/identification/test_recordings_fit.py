@@ -22,7 +22,7 @@ DEMO_DAMPING = np.array([0.015, 0.0036, 0.0024, 0.0021])  # data/README.md
 
 
 def frfs_of(path):
-    return estimate_frfs(read_test(path), IngestOptions()).frfs
+    return estimate_frfs(read_test(path), options=IngestOptions()).frfs
 
 
 def frequencies(fit):

@@ -27,7 +27,7 @@ SAME = 0.5  # half widths within which two poles are one mode
 def recorded(folder):
     """Read a test, or the tables of receptances that the milling tool comes as."""
     if (folder / "test.toml").is_file():
-        return estimate_frfs(read_test(folder / "test.toml"), IngestOptions()).frfs
+        return estimate_frfs(read_test(folder / "test.toml"), options=IngestOptions()).frfs
     tables = [np.loadtxt(path) for path in sorted(folder.glob("EMA_Point_*.txt"))]
     values = np.stack([table[:, 1] + 1j * table[:, 2] for table in tables], axis=1)
     return frf_set(tables[0][:, 0], values, labels_of(len(tables), 1, FrfQuantity.RECEPTANCE))

@@ -25,7 +25,7 @@ def change(path, old, new, count=-1):
 
 def message(path, **options):
     with pytest.raises(InputError) as caught:
-        estimate_frfs(read_test(path), IngestOptions(**options))
+        estimate_frfs(read_test(path), options=IngestOptions(**options))
     text = str(caught.value)
     assert "\n" not in text
     assert "Traceback" not in text
@@ -157,7 +157,7 @@ def test_files_that_are_no_recordings(path, content, says):
 
 def test_a_recording_that_is_a_folder_is_no_recording(path):
     (path.parent / "hits" / "p7_04.csv").mkdir()
-    assert len(estimate_frfs(read_test(path), IngestOptions()).records) == 3
+    assert len(estimate_frfs(read_test(path), options=IngestOptions()).records) == 3
 
 
 def test_recordings_of_unequal_length(path):

@@ -80,7 +80,7 @@ def test_equal_tests_have_equal_reprs(roving):
 
 
 def test_traces_are_drawn_of_every_force_and_some_responses(roving):
-    result = estimate_frfs(read_test(roving), IngestOptions())
+    result = estimate_frfs(read_test(roving), options=IngestOptions())
     assert isinstance(result, FrfEstimate)
     assert all(isinstance(trace, Trace) for trace in result.traces)
     forces = [trace for trace in result.traces if trace.unit == "N"]

@@ -21,7 +21,7 @@ GRAVITY = 9.80665
 
 def read(folder, *entries):
     body = "".join(f"[[frf]]\n{entry}\n" for entry in entries)
-    return estimate_frfs(read_test(write_test(folder, body, kind="frf")), IngestOptions())
+    return estimate_frfs(read_test(write_test(folder, body, kind="frf")), options=IngestOptions())
 
 
 def message(folder, *entries):
@@ -220,7 +220,7 @@ def test_only_common_lines_are_used_and_reported(tmp_path):
 def test_masses_and_scale_are_handed_on(tmp_path):
     long_csv(tmp_path)
     path = write_test(tmp_path, f"[[frf]]\n{entry()}\n", kind="frf", head='unknown_scale = "common"')
-    assert estimate_frfs(read_test(path), IngestOptions()).frfs.unknown_scale == "common"
+    assert estimate_frfs(read_test(path), options=IngestOptions()).frfs.unknown_scale == "common"
 
 
 @pytest.mark.parametrize(

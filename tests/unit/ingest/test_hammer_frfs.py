@@ -18,7 +18,7 @@ BAND_HZ = (5.0, 400.0)
 
 
 def estimate(path, **options):
-    return estimate_frfs(read_test(path), IngestOptions(**options))
+    return estimate_frfs(read_test(path), options=IngestOptions(**options))
 
 
 def errors(result, structure, columns=slice(None)):
@@ -121,7 +121,7 @@ def test_an_impact_at_the_beginning_of_a_file_does_not_shorten_the_lead_of_those
         heights += pulse(len(heights), step_s, at_s=start * step_s)
     write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=heights), step_s)
     test = read_test(write_test(tmp_path, HIT))
-    result = estimate_frfs(test, IngestOptions())
+    result = estimate_frfs(test, options=IngestOptions())
     first, *later = result.records.trigger_s
     assert first < 40 * step_s
     assert min(later) > 0.9 * CELL * step_s

@@ -19,7 +19,7 @@ BAND_HZ = (10.0, 250.0)
 
 
 def estimate(path, **options):
-    return estimate_frfs(read_test(path), IngestOptions(**options))
+    return estimate_frfs(read_test(path), options=IngestOptions(**options))
 
 
 def smooth_noise(rng, n_samples):

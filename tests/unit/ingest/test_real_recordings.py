@@ -12,7 +12,7 @@ HAND_SCATTER = 2.0  # times: no two impacts by hand are quite alike, so that fiv
 
 
 def estimate(path, **options):
-    return estimate_frfs(read_test(path), IngestOptions(**options))
+    return estimate_frfs(read_test(path), options=IngestOptions(**options))
 
 
 def write(folder, text):

@@ -16,7 +16,7 @@ NOISE = 0.02
 
 
 def estimate(path, **options):
-    return estimate_frfs(read_test(path), IngestOptions(**options))
+    return estimate_frfs(read_test(path), options=IngestOptions(**options))
 
 
 def noisy(rng, **of_record):

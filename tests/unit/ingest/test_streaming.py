@@ -25,7 +25,7 @@ def campaign(folder, n_records):
 
 def peak_bytes(test):
     tracemalloc.start()
-    estimate_frfs(test, IngestOptions())
+    estimate_frfs(test, options=IngestOptions())
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     return peak
@@ -34,7 +34,9 @@ def peak_bytes(test):
 def test_memory_does_not_grow_with_the_number_of_records(tmp_path, monkeypatch):
     monkeypatch.setattr("frf_ipz.ingest.recording_files.BUDGET", 3 * BYTES_OF_A_RECORD)
     small, large = campaign(tmp_path / "small", 8), campaign(tmp_path / "large", 16)
-    estimate_frfs(small, IngestOptions())  # what is loaded once does not count; 8 records give all responses to draw
+    estimate_frfs(
+        small, options=IngestOptions()
+    )  # what is loaded once does not count; 8 records give all responses to draw
     assert peak_bytes(large) - peak_bytes(small) < 3 * BYTES_OF_A_RECORD  # 8 of them are what it would grow by
 
 
@@ -54,7 +56,7 @@ def test_impacts_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
 def test_progress_rises_to_the_end(tmp_path):
     reports = []
     test = read_test(hammer_campaign(tmp_path, n_samples=1024))
-    estimate_frfs(test, IngestOptions(), progress=lambda fraction, text: reports.append((fraction, text)))
+    estimate_frfs(test, options=IngestOptions(), progress=lambda fraction, text: reports.append((fraction, text)))
     fractions = [fraction for fraction, _ in reports]
     assert fractions == sorted(fractions)
     assert (fractions[0], fractions[-1]) == (0.0, 1.0)

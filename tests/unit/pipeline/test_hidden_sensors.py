@@ -21,6 +21,9 @@ def campaign(tmp_path):
     return tmp_path
 
 
+BAND = FitOptions(band_hz=(20.0, 200.0))
+
+
 def hiding(folder, *dofs):
     text = f'[pipeline]\ntest = "test.toml"\n[ingest]\nhide = {list(dofs)}\n'
     (folder / "pipeline.toml").write_text(text.replace("'", '"'), encoding="utf-8")
@@ -33,17 +36,17 @@ def sensors(frfs):
 
 def test_the_frfs_of_the_others_stay_as_they_were(campaign):
     test = read_test(campaign / "test.toml")
-    whole_frfs = estimate_frfs(test, OPTIONS).frfs
-    remaining = estimate_frfs(read_inputs(hiding(campaign, "1:z")).test, OPTIONS).frfs
+    whole_frfs = estimate_frfs(test, options=OPTIONS).frfs
+    remaining = estimate_frfs(read_inputs(hiding(campaign, "1:z")).test, options=OPTIONS).frfs
     assert (sensors(whole_frfs), sensors(remaining)) == (["1:+z", "2:+z"], ["2:+z"])
     assert (remaining.values[:, 0] == whole_frfs.values[:, 1]).all()
 
 
 def test_a_diagnosis_sees_records_without_it(campaign):
     test = without_sensors(read_test(campaign / "test.toml"), ["1:+z"])
-    observations = observe(test, OPTIONS, estimate_frfs(test, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    observations = observe(test, OPTIONS, estimate_frfs(test, options=OPTIONS).frfs, fit=BAND)
     whole = read_test(campaign / "test.toml")
-    unreduced = observe(whole, OPTIONS, estimate_frfs(whole, OPTIONS).frfs, fit=FitOptions(band_hz=(20.0, 200.0)))
+    unreduced = observe(whole, OPTIONS, estimate_frfs(whole, options=OPTIONS).frfs, fit=BAND)
     assert [[sensor.channel for sensor in record.sensors] for record in observations.records] == [["acc_2"]] * 3
     assert (observations.records[0].responses[0] == unreduced.records[0].responses[1]).all()
 
@@ -59,7 +62,7 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
     head = "frequency_hz,output_dof,input_dof,real,imag"
     (tmp_path / "frf.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
     write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
-    frfs = estimate_frfs(read_inputs(hiding(tmp_path, "1:-z")).test, OPTIONS).frfs
+    frfs = estimate_frfs(read_inputs(hiding(tmp_path, "1:-z")).test, options=OPTIONS).frfs
     assert sensors(frfs) == ["2:+z"]
     assert frfs.values[0, 0] == 2.0
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.result import Ambiguity
-from frf_ipz.pipeline.summary import diagnosis_lines
 from frf_ipz.report.contents import read_contents
 from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, typeset, verdict_of
 from frf_ipz.report.picture import Picture
@@ -14,6 +13,7 @@ from frf_ipz.report.section import Table
 from frf_ipz.report.sections.diagnosis import build
 from frf_ipz.report.sections.overview import build as overview
 from frf_ipz.runs.results import Results
+from frf_ipz.runs.summary import diagnosis_lines
 from synthetic_run import synthetic_folder
 
 

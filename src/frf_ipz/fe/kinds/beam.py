@@ -201,7 +201,7 @@ def read(file: BeamFile, path: Path) -> StructuralModel:
     return model
 
 
-def make_beam(
+def make_beam(  # noqa: PLR0913 - one argument a key of [beam]
     *,
     length_m: float,
     width_m: float,

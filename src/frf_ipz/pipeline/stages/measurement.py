@@ -40,7 +40,7 @@ def ingest(runner: StageRunner) -> FrfEstimate:
     return runner.stage(
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
-        lambda progress: estimate_frfs(runner.inputs.test, options, progress=progress),
+        lambda progress: estimate_frfs(runner.inputs.test, options=options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
             "records.parquet": partial(

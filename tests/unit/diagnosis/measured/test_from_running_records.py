@@ -31,7 +31,7 @@ def running(folder, n, structure, noise, seed):
         signals[1:] += noise * rng.standard_normal(signals[1:].shape)
         write_csv(folder / "records" / f"{number}.csv", signals, STEP_S)
     test = read_test(write_test(folder, RECORD, kind="random"))
-    frfs = estimate_frfs(test, IngestOptions()).frfs
+    frfs = estimate_frfs(test, options=IngestOptions()).frfs
     return observe(test, IngestOptions(), frfs, fit=FitOptions(band_hz=(15.0, 250.0)))
 
 

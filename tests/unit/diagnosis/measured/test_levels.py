@@ -26,7 +26,7 @@ PEAK = 0.05  # relative: the largest force falls between two samples
 
 def observed(path):
     test = read_test(path)
-    return observe(test, IngestOptions(), estimate_frfs(test, IngestOptions()).frfs, fit=BAND)
+    return observe(test, IngestOptions(), estimate_frfs(test, options=IngestOptions()).frfs, fit=BAND)
 
 
 def observed_and_fitted(path):
