@@ -74,9 +74,9 @@ def test_the_trivial_answer_has_the_measured_poles():
     assert_allclose(np.sqrt(np.sort(values)[:4]), np.abs(case.targets[:4]), rtol=1e-9)
 
 
-@pytest.mark.parametrize("blow", ["88:z", "89:z"])
-def test_it_meets_the_targets_of_section_5(blow):
-    case = build_section_5(blow)
+@pytest.mark.parametrize("excited", ["88:z", "89:z"])
+def test_it_meets_the_targets_of_section_5(excited):
+    case = build_section_5(excited)
     updated = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions())
     assert updated.status is UpdateStatus.CONVERGED
     assert_allclose(updated.after.imag, case.targets.imag, rtol=PRINTED)

@@ -24,7 +24,7 @@ from printed_digits import cut
 
 DATA = Path(frf_testbench.updating.__file__).parent / "paper_tables"
 # The first pole is printed as 16.6 and comes out as 16.7 Hz, the third as 292 and 293.05: the paper's own beam is up to
-# 0.2 % off the properties of its table 4. The blow is one node closer to the clamp than its text says.
+# 0.2 % off the properties of its table 4. The impact is one node closer to the clamp than its text says.
 SECTION_5 = 0.008
 
 
@@ -50,9 +50,9 @@ def reduced(model, dofs, residual, actuator, sensor, point, band_hz):
     return reduce_model(model, options, band_hz=band_hz, **ends)
 
 
-def zeros(model, output, blow):
+def zeros(model, output, excited):
     roots = damped_zeros(
-        model.mass, model.damping, model.stiffness, model.row(parse_dof(output)), model.row(parse_dof(blow))
+        model.mass, model.damping, model.stiffness, model.row(parse_dof(output)), model.row(parse_dof(excited))
     ).values
     seen = roots[(roots.imag > 0) & (np.abs(roots.real) < 0.1 * np.abs(roots))]
     return seen[np.argsort(seen.imag)]
@@ -110,8 +110,8 @@ def test_poles_and_zeros_of_section_5(section_5):
     rows = table(5)
     printed = rows.query("kind == 'pole'")["numerical_imag"].to_numpy()
     assert_allclose(model_poles(section_5)[:4].imag / (2 * np.pi), printed, rtol=SECTION_5)
-    found = zeros(section_5, "101:z", "88:z")[:3].imag / (2 * np.pi)
-    assert_allclose(found, rows.query("kind == 'zero'")["numerical_imag"].to_numpy(), rtol=SECTION_5)
+    zeros_hz = zeros(section_5, "101:z", "88:z")[:3].imag / (2 * np.pi)
+    assert_allclose(zeros_hz, rows.query("kind == 'zero'")["numerical_imag"].to_numpy(), rtol=SECTION_5)
 
 
 def test_reduced_poles_and_zeros_of_section_5_are_those_of_the_whole_beam(cantilever, section_5):
@@ -125,5 +125,5 @@ def test_reduced_poles_and_zeros_of_section_5_are_those_of_the_whole_beam(cantil
         points=[parse_dof(dof) for dof in dofs],
         band_hz=(10.0, 700.0),
     )
-    # the third zero lies at 610 of 700 Hz, and the first mode left out at 1411 Hz
+    # the third zero lies at 610 of 700 Hz, and the first mode beyond at 1411 Hz
     assert_allclose(zeros(section_5, "101:z", "89:z")[:3], zeros(whole, "101:z", "89:z")[:3], rtol=3e-3)

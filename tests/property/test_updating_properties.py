@@ -29,39 +29,39 @@ def updated(seed, *, parts, mass=False):
 @EXAMPLES
 @given(SEEDS, st.booleans(), st.booleans())
 def test_an_update_keeps_a_structure_a_structure(seed, parts, mass):
-    case, found = updated(seed, parts=parts, mass=mass)
-    assert found.status in {UpdateStatus.CONVERGED, UpdateStatus.MAX_ITERATIONS, UpdateStatus.NOTHING_TO_DO}
-    for members in ((found.model.mass, found.model.damping, found.model.stiffness), *found.ensemble):
+    case, update = updated(seed, parts=parts, mass=mass)
+    assert update.status in {UpdateStatus.CONVERGED, UpdateStatus.MAX_ITERATIONS, UpdateStatus.NOTHING_TO_DO}
+    for members in ((update.model.mass, update.model.damping, update.model.stiffness), *update.ensemble):
         for matrix in members:
             assert np.array_equal(matrix, matrix.T)
             assert np.linalg.eigvalsh(matrix)[0] >= -ROUNDING * np.abs(matrix).max() * len(matrix)
     nominal = undamped_poles(case.reduced_model.mass, case.reduced_model.stiffness).values.real
     rigid = int(np.count_nonzero(nominal < 1e-6 * np.abs(case.fit.model.poles[0]) ** 2))
-    after = undamped_poles(found.model.mass, found.model.stiffness).values.real
+    after = undamped_poles(update.model.mass, update.model.stiffness).values.real
     assert np.all(after[:rigid] < 1e-5 * np.abs(case.fit.model.poles[0]) ** 2)
 
 
 @EXAMPLES
 @given(SEEDS)
 def test_an_update_is_reciprocal_and_its_export_the_same_model(seed):
-    case, found = updated(seed, parts=True)
+    case, update = updated(seed, parts=True)
     first = case.labels[0]
     back = FrfLabel(first.input_dof, first.output_dof, first.quantity)
     s = 2j * np.pi * np.linspace(*case.fit.band_hz, 20)
-    there, again = model_frfs(found.model, [first, back], s).T
-    assert np.abs(there - again).max() < ROUNDING * np.abs(there).max()
-    exported = to_control(to_state_space(found, case.labels, case.structure.points))(s)
+    forward, updated_again = model_frfs(update.model, [first, back], s).T
+    assert np.abs(forward - updated_again).max() < ROUNDING * np.abs(forward).max()
+    exported = to_control(to_state_space(update, case.labels, case.structure.points))(s)
     row = exported.reshape(-1, exported.shape[-1])[0]
-    assert np.abs(row - there).max() < 1e-6 * np.abs(there).max()
+    assert np.abs(row - forward).max() < 1e-6 * np.abs(forward).max()
 
 
 @EXAMPLES
 @given(SEEDS, st.sampled_from([1e-3, 1e3]))
 def test_units_do_not_matter(seed, factor):
     """Masses and stiffnesses in other units are the same structure: poles and zeros stay, and so do the ratios."""
-    case, found = updated(seed, parts=False)
+    case, update = updated(seed, parts=False)
     model = case.reduced_model
-    other = type(model)(
+    in_other_units = type(model)(
         mass=factor * model.mass,
         damping=factor * model.damping,
         stiffness=factor * model.stiffness,
@@ -70,5 +70,5 @@ def test_units_do_not_matter(seed, factor):
         expanded_dofs=model.expanded_dofs,
         n_modes=model.n_modes,
     )
-    again = update_model(other, case.fit, case.pairs, UpdateOptions(ensemble=0))
-    assert_allclose(again.after, found.after, rtol=1e-6)
+    updated_again = update_model(in_other_units, case.fit, case.pairs, UpdateOptions(ensemble=0))
+    assert_allclose(updated_again.after, update.after, rtol=1e-6)

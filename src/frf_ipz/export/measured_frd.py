@@ -25,20 +25,20 @@ def measured_frd(frfs: FrfSet) -> control.FRD:
     Returns
     -------
     control.FRD
-        One row a sensor, one column a blow, in the order of `FrfSet.output_dofs` and `FrfSet.input_dofs`, named by
-        their DOFs; rad/s and SI units of each FRF's quantity. NaN where that pair was not measured.
+        One row a sensor, one column an excited DOF, in the order of `FrfSet.output_dofs` and `FrfSet.input_dofs`,
+        named by their DOFs; rad/s and SI units of each FRF's quantity. NaN where that pair was not measured.
 
     Raises
     ------
     InputError
-        If an exponential window has added damping: python-control has no place for it.
+        If an exponential window has added damping, which python-control cannot represent.
     """
     import control  # here, since it takes a second and loads pyplot
 
     if frfs.window_decay_1_s > 0:
         raise InputError(
             f"the FRFs were measured with an exponential window and hold at {frfs.window_decay_1_s:g} + i omega rad/s, "
-            "where python-control takes none; use the fitted or the updated model, which have no window"
+            "which python-control cannot represent; use the fitted or the updated model, which have no window"
         )
     values, measured = frfs.matrix()
     values = np.where(measured, values, complex(np.nan, np.nan))

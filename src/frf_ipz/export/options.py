@@ -10,7 +10,7 @@ from frf_ipz.toml_files import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportOptions:
-    """What the state space looks like.
+    """Form of the exported state space.
 
     Parameters
     ----------
@@ -19,11 +19,11 @@ class ExportOptions:
     residual : str
         Residual flexibility as ``dynamics`` (proper) or as ``feedthrough``.
     pade_order : int
-        Order of the Pade approximant of known delays; 0 leaves them out.
+        Order of the Pade approximant of known delays; 0 omits them.
     sample_time_s : float
         0 for a continuous model, else the sample time of a discrete one (zero-order hold).
     ensemble : int
-        Members of the posterior to write beside it.
+        Number of members of the posterior to write besides.
     """
 
     __pydantic_config__ = STRICT

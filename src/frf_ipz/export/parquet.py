@@ -29,7 +29,7 @@ class Column:
     unit : str
         SI unit, ``1`` for a ratio, empty for what has none.
     meaning : str
-        What the numbers say.
+        Meaning of the numbers.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Inputs and outputs of a state space: which DOFs, in which quantity, how late."""
+"""Inputs and outputs of a state space: their DOFs, quantities and delays."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Output:
     dof : Dof
         Its sign counts.
     quantity : FrfQuantity
-        Says whether it is a displacement, a velocity or an acceleration.
+        Determines whether it is a displacement, a velocity or an acceleration.
     delay_s : float
-        How late it is.
+        Its delay.
     """
 
     dof: Dof
@@ -47,9 +47,9 @@ class Ports:
     Parameters
     ----------
     inputs : tuple of Dof
-        The struck DOFs, each once.
+        The excited DOFs, each once.
     outputs : tuple of Output
-        The sensors, then the points of interest that no sensor sits at.
+        The sensors, then the points of interest without a sensor.
     """
 
     inputs: tuple[Dof, ...]
@@ -64,7 +64,7 @@ class Ports:
 def choose_ports(
     labels: Sequence[FrfLabel], points: Sequence[Dof], options: ExportOptions, delays_s: Mapping[str, float]
 ) -> Ports:
-    """Choose inputs and outputs from what was measured and what is wanted.
+    """Choose inputs and outputs from the measured FRFs, the points of interest and the options.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def choose_ports(
     options : ExportOptions
         Quantity of the outputs.
     delays_s : mapping of str to float
-        Known delay of each late channel. That of a force channel belongs to the recording and not to the plant.
+        Known delay of each delayed channel. That of a force channel belongs to the recording and not to the plant.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def choose_ports(
         If nothing was measured, or a delay is negative or names a channel that does not exist.
     """
     if not labels:
-        raise InputError("a state space needs at least one measured FRF: it says where the actuators and sensors are")
+        raise InputError("a state space needs at least one measured FRF: its label says where actuator and sensor are")
     channels = {name for label in labels for name in (label.output_channel, label.input_channel)}
     for name, delay in delays_s.items():
         if name not in channels:
@@ -97,18 +97,18 @@ def choose_ports(
             )
         if delay < 0:
             raise InputError(f"the delay of the channel '{name}' is {delay:g} s; it cannot be negative")
-    wanted = None if options.outputs == "measured" else frf_quantity_of(options.outputs)
+    common_quantity = None if options.outputs == "measured" else frf_quantity_of(options.outputs)
     sensors = {
         label.output_dof: Output(
             dof=label.output_dof,
-            quantity=wanted or label.quantity,
+            quantity=common_quantity or label.quantity,
             delay_s=delays_s.get(label.output_channel, 0.0),
         )
-        for label in reversed(labels)  # of several FRFs to one sensor the first one says the quantity
+        for label in reversed(labels)  # of several FRFs to one sensor the first one determines the quantity
     }
-    places = dict.fromkeys(label.output_dof for label in labels) | dict.fromkeys(points)
-    elsewhere = wanted or labels[0].quantity
+    output_dofs = dict.fromkeys(label.output_dof for label in labels) | dict.fromkeys(points)
+    point_quantity = common_quantity or labels[0].quantity
     return Ports(
         inputs=tuple(dict.fromkeys(label.input_dof for label in labels)),
-        outputs=tuple(sensors.get(dof) or Output(dof=dof, quantity=elsewhere) for dof in places),
+        outputs=tuple(sensors.get(dof) or Output(dof=dof, quantity=point_quantity) for dof in output_dofs),
     )

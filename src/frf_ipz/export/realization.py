@@ -2,8 +2,8 @@
 
 The states are each mode's displacement times a rate w and its velocity, in mass-normalised coordinates: with
 ``w = omega`` a mode is a rotation, ``[[0, omega], [-omega, -2 zeta omega]]``, and the matrices are of one size, which
-is what the solvers of control design need. The modes are those without damping of the symmetric part; what couples
-them (damping that is not modal, a stiffness that `ipz` has left unsymmetric) stays in the matrices, so nothing is lost.
+is what the solvers of control design need. The modes are those without damping of the symmetric part; their
+coupling (damping that is not modal, an unsymmetric stiffness by `ipz`) stays in the matrices, so nothing is lost.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.structure import ReducedModel
 
-RIGID = 1e-6  # of the highest natural frequency: below it a mode has no rate of its own to be scaled by
+RIGID = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
 
 
 class Matrices(NamedTuple):
@@ -39,7 +39,7 @@ class SecondOrder(NamedTuple):
     """``z'' + G z' + L z = P u``, ``y_j = d^p_j/dt^p_j (Q z)_j``.
 
     ``damping`` (n, n) in 1/s, ``stiffness`` (n, n) in 1/s^2, ``inputs`` (n, n_inputs), ``outputs`` (n_outputs, n), and
-    ``flexibility`` (n_outputs, n_inputs): displacement per force of what has no states.
+    ``flexibility`` (n_outputs, n_inputs): displacement per force of the part without states.
     """
 
     damping: FloatArray
@@ -57,7 +57,7 @@ def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatAr
     model : ReducedModel
         The model.
     input_rows : (n_inputs, r) array
-        Motion of the struck DOFs for unit motions of the retained ones.
+        Motion of the excited DOFs for unit motions of the retained ones.
     output_rows : (n_outputs, r) array
         The same of the outputs.
 
@@ -77,30 +77,30 @@ def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatAr
 
 
 def condense_high_modes(system: SecondOrder, n_modes: int) -> SecondOrder:
-    """Keep the lowest modes; the others follow without inertia and damping.
+    """Retain the lowest modes; the higher ones follow without inertia and damping.
 
     Parameters
     ----------
     system : SecondOrder
         Modes by ascending frequency.
     n_modes : int
-        How many stay.
+        Number of retained modes.
 
     Returns
     -------
     SecondOrder
-        With the others' flexibility.
+        With the flexibility of the higher modes.
     """
     low, high = slice(0, n_modes), slice(n_modes, None)
-    stiff, across = system.stiffness[high, high], system.stiffness[low, high]
-    follows = np.linalg.solve(stiff, system.stiffness[high, low])
-    pushed = np.linalg.solve(stiff, system.inputs[high])
+    high_stiffness, coupling = system.stiffness[high, high], system.stiffness[low, high]
+    by_low = np.linalg.solve(high_stiffness, system.stiffness[high, low])
+    by_inputs = np.linalg.solve(high_stiffness, system.inputs[high])
     return SecondOrder(
         damping=system.damping[low, low],
-        stiffness=system.stiffness[low, low] - across @ follows,
-        inputs=system.inputs[low] - across @ pushed,
-        outputs=system.outputs[:, low] - system.outputs[:, high] @ follows,
-        flexibility=system.flexibility + system.outputs[:, high] @ pushed,
+        stiffness=system.stiffness[low, low] - coupling @ by_low,
+        inputs=system.inputs[low] - coupling @ by_inputs,
+        outputs=system.outputs[:, low] - system.outputs[:, high] @ by_low,
+        flexibility=system.flexibility + system.outputs[:, high] @ by_inputs,
     )
 
 
@@ -124,11 +124,11 @@ def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     InputError
         If there is a flexibility without states and an output is no displacement: its derivative is not proper.
     """
-    wanted = np.asarray(powers)
-    if system.flexibility.any() and wanted.any():
+    power = np.asarray(powers)
+    if system.flexibility.any() and power.any():
         raise InputError(
-            "[export] residual = 'feedthrough' needs outputs = 'displacement': a velocity or an acceleration of what "
-            "has no states is not proper; use residual = 'dynamics', or displacements"
+            "[export] residual = 'feedthrough' needs outputs = 'displacement': a velocity or an acceleration of a "
+            "part without states is not proper; use residual = 'dynamics', or displacements"
         )
     count = len(system.stiffness)
     rates = np.sqrt(np.abs(np.diag(system.stiffness)))
@@ -137,11 +137,11 @@ def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     A[::2, 1::2] = np.diag(rates)
     A[1::2, ::2], A[1::2, 1::2] = -system.stiffness / rates, -system.damping
     B[1::2] = system.inputs
-    C, D = np.zeros((len(wanted), 2 * count)), system.flexibility.copy()
-    C[wanted == 0, ::2] = system.outputs[wanted == 0] / rates
-    C[wanted == 1, 1::2] = system.outputs[wanted == 1]
-    C[wanted == 2] = system.outputs[wanted == 2] @ A[1::2]
-    D[wanted == 2] = system.outputs[wanted == 2] @ system.inputs
+    C, D = np.zeros((len(power), 2 * count)), system.flexibility.copy()
+    C[power == 0, ::2] = system.outputs[power == 0] / rates
+    C[power == 1, 1::2] = system.outputs[power == 1]
+    C[power == 2] = system.outputs[power == 2] @ A[1::2]
+    D[power == 2] = system.outputs[power == 2] @ system.inputs
     return Matrices(A, B, C, D)
 
 
@@ -162,7 +162,7 @@ def pade_delay(delay_s: float, order: int) -> Matrices:
 
     Examples
     --------
-    >>> A, B, C, D = pade(2.0, 1)
+    >>> A, B, C, D = pade_delay(2.0, 1)
     >>> float(A[0, 0]), float(D[0, 0])  # (1 - s) / (1 + s)
     (-1.0, -1.0)
     """
@@ -188,28 +188,28 @@ def with_delays(system: Matrices, delays_s: Sequence[float], order: int) -> Matr
     system : Matrices
         Continuous.
     delays_s : sequence of float
-        Of each output; 0 for none.
+        Delay of each output; 0 for none.
     order : int
-        Of the Pade approximants.
+        Order of the Pade approximants.
 
     Returns
     -------
     Matrices
-        With the states of the approximants after the others.
+        With the states of the approximants at the end.
     """
-    late = [place for place, delay in enumerate(delays_s) if delay > 0]
-    if not late or not order:
+    delayed = [index for index, delay in enumerate(delays_s) if delay > 0]
+    if not delayed or not order:
         return system
-    lines = [pade_delay(delays_s[place], order) for place in late]
-    A, B, C, D = (block_diag(*(line[part] for line in lines)) for part in range(4))
-    own, added = len(system.A), len(A)
-    outputs = np.hstack([system.C, np.zeros((len(system.C), added))])
-    outputs[late] = np.hstack([D @ system.C[late], C])
+    delays = [pade_delay(delays_s[index], order) for index in delayed]
+    A, B, C, D = (block_diag(*(delay[part] for delay in delays)) for part in range(4))
+    n_states, n_added = len(system.A), len(A)
+    outputs = np.hstack([system.C, np.zeros((len(system.C), n_added))])
+    outputs[delayed] = np.hstack([D @ system.C[delayed], C])
     feedthrough = system.D.copy()
-    feedthrough[late] = D @ system.D[late]
+    feedthrough[delayed] = D @ system.D[delayed]
     return Matrices(
-        np.block([[system.A, np.zeros((own, added))], [B @ system.C[late], A]]),
-        np.vstack([system.B, B @ system.D[late]]),
+        np.block([[system.A, np.zeros((n_states, n_added))], [B @ system.C[delayed], A]]),
+        np.vstack([system.B, B @ system.D[delayed]]),
         outputs,
         feedthrough,
     )
@@ -231,7 +231,7 @@ def discretise(system: Matrices, sample_time_s: float) -> Matrices:
         Discrete.
     """
     states, inputs = system.B.shape
-    whole = np.zeros((states + inputs, states + inputs))
-    whole[:states] = np.hstack([system.A, system.B]) * sample_time_s
-    moved = expm(whole)
-    return Matrices(moved[:states, :states], moved[:states, states:], system.C, system.D)
+    augmented = np.zeros((states + inputs, states + inputs))
+    augmented[:states] = np.hstack([system.A, system.B]) * sample_time_s
+    transition = expm(augmented)
+    return Matrices(transition[:states, :states], transition[:states, states:], system.C, system.D)

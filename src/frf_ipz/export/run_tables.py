@@ -1,4 +1,4 @@
-"""The tables of a run: what is in each file of the contract."""
+"""The tables of a run: the columns of each file of the contract."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 FREQUENCY = Column("frequency_hz", "float", "Hz", "frequency line")
 LABEL = (
     Column("output_dof", "text", "", "sensor, with the sign of the test"),
-    Column("input_dof", "text", "", "struck DOF, with the sign of the test"),
+    Column("input_dof", "text", "", "excited DOF, with the sign of the test"),
     Column("quantity", "text", "", "accelerance, mobility or receptance"),
 )
 VALUE = (
@@ -39,11 +39,11 @@ FRF = (
     FREQUENCY,
     *LABEL,
     *VALUE,
-    Column("coherence", "float", "1", "ordinary coherence; null for one blow"),
+    Column("coherence", "float", "1", "ordinary coherence; null for one record"),
     Column(
         "variance", "float", "SI squared", "E of the squared modulus of the error, half in each part; null if unknown"
     ),
-    Column("averages", "int", "1", "blows or segments averaged"),
+    Column("averages", "int", "1", "records or segments averaged"),
 )
 ROOT = (
     Column("frequency_hz", "float", "Hz", "undamped natural frequency |s| / 2 pi"),
@@ -60,7 +60,7 @@ ZERO = (
     Column("zero_id", "int", "", "number of the zero"),
     *LABEL,
     Column("kind", "text", "", "complex, real or quadruple"),
-    Column("identifiable", "flag", "", "false where the data do not support the number"),
+    Column("identifiable", "flag", "", "false where the data do not determine the number"),
     Column("reason", "text", "", "why it is not identifiable"),
     *ROOT,
 )
@@ -70,7 +70,7 @@ PAIR = (
     Column("measured_id", "int", "", "pole_id or zero_id; null if missing in the measurement"),
     Column("verdict", "text", "", "paired, missing in the model, missing in the measurement or ambiguous"),
     Column("reason", "text", "", "why"),
-    Column("distance", "float", "1", "what the assignment minimised"),
+    Column("distance", "float", "1", "cost that the assignment minimised"),
     Column("measured_hz", "float", "Hz", "measured frequency"),
     Column("before_hz", "float", "Hz", "frequency in the model before updating"),
     Column("after_hz", "float", "Hz", "frequency in the model after updating"),
@@ -95,7 +95,7 @@ MODE = (
     Column("mass_normalised", "flag", "", "true where a driving point was measured and the scale is known"),
     Column("mpc", "float", "1", "modal phase collinearity: 1 for a normal mode"),
     Column("mac", "float", "1", "largest modal assurance criterion with another mode"),
-    Column("mac_pole_id", "int", "", "the mode that it is with"),
+    Column("mac_pole_id", "int", "", "the mode of that largest value"),
     Column("quality", "text", "", "good, fair or poor"),
     Column("remarks", "text", "", "why"),
 )
@@ -179,7 +179,7 @@ def mode_table(fit: ModalFit, *, scale_is_known: bool = True) -> pa.Table:
     fit : ModalFit
         The fitted model.
     scale_is_known : bool
-        False where the channels' absolute scale is not.
+        False where the absolute scale of the channels is not.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def mode_table(fit: ModalFit, *, scale_is_known: bool = True) -> pa.Table:
     if fit.n_modes:
         frame["mac"] = np.repeat(assurance.max(axis=1), count)
         frame["mac_pole_id"] = np.repeat(assurance.argmax(axis=1) + 1, count)
-    return frame_table(frame, {column.name: column for column in MODE}, meaning="what the quality rests on")
+    return frame_table(frame, {column.name: column for column in MODE}, meaning="criterion of the quality")
 
 
 def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) -> pa.Table:
@@ -209,7 +209,7 @@ def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) ->
     pairs : Pairs
         The pairing.
     labels : sequence of FrfLabel
-        What the zeros' FRF numbers stand for.
+        Labels of the FRFs to which zeros belong.
     after : (n_targets,) complex array
         Poles and zeros of the model after updating, in the order of `Pairs.targets`; NaN before it.
 
@@ -219,11 +219,11 @@ def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) ->
         ``pairs.parquet``.
     """
     rows = pairs.rows
-    reached = dict(zip(pairs.targets, after, strict=True))
+    updated_values = dict(zip(pairs.targets, after, strict=True))
     stages = {
         "measured": np.array([row.measured_value for row in rows], complex),
         "before": np.array([row.computed_value for row in rows], complex),
-        "after": np.array([reached.get(row, complex(np.nan, np.nan)) for row in rows], complex),
+        "after": np.array([updated_values.get(row, complex(np.nan, np.nan)) for row in rows], complex),
     }
     dofs = [
         ("", "") if row.frf < 0 else (str(labels[row.frf].output_dof), str(labels[row.frf].input_dof)) for row in rows
@@ -231,7 +231,7 @@ def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) ->
     values = {
         "kind": [row.kind for row in rows],
         "output_dof": [output for output, _ in dofs],
-        "input_dof": [struck for _, struck in dofs],
+        "input_dof": [excited for _, excited in dofs],
         "measured_id": [row.measured + 1 if row.measured >= 0 else None for row in rows],
         "verdict": [row.verdict.value for row in rows],
         "reason": [row.reason for row in rows],
@@ -282,7 +282,7 @@ def history_table(updated: UpdatedModel) -> pa.Table:
     known = {
         "phase": Column("phase", "text", "", "stiffness or damping"),
         "iteration": Column("iteration", "int", "", "number of the iteration"),
-        "misfit": Column("misfit", "float", "1", "what is minimised"),
+        "misfit": Column("misfit", "float", "1", "weighted sum of squares that is minimised"),
         "step": Column("step", "float", "1", "size of the step relative to the parameters"),
     }
     return frame_table(updated.history, known, meaning="updating parameter", unit="as the parameter")
@@ -296,9 +296,9 @@ def frame_table(frame: pd.DataFrame, known: dict[str, Column], *, meaning: str, 
     frame : DataFrame
         Columns of floats, ints, texts or flags.
     known : dict of str to Column
-        Columns that are described; others get `meaning` and `unit`.
+        Columns that are described; further ones get `meaning` and `unit`.
     meaning, unit : str
-        Of the columns that are not described.
+        Meaning and unit of the columns that are not described.
 
     Returns
     -------

@@ -62,7 +62,7 @@ class StateSpaceModel:
 
 
 def matrix_shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
-    """Say how large the arrays of a state space are.
+    """Shapes of the arrays of a state space.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def matrix_shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     Returns
     -------
     dict of str to (int, int)
-        Of ``A``, ``B``, ``C`` and ``D``.
+        Shapes of ``A``, ``B``, ``C`` and ``D``.
     """
     states, inputs, outputs = (len(names[f"{end}_names"]) for end in ("state", "input", "output"))
     return {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
@@ -93,13 +93,13 @@ def to_state_space(
     updated : UpdatedModel
         The updated model.
     labels : sequence of FrfLabel
-        What was measured: its blows are the inputs, its sensors the first outputs.
+        What was measured: its excited DOFs are the inputs, its sensors the first outputs.
     points : sequence of Dof
         Points of interest: the further outputs, in the quantity of the first FRF unless the options say another.
     options : ExportOptions, optional
-        What it looks like.
+        Its form.
     delays_s : mapping of str to float, optional
-        Known delay of each late output channel, by its column in the recordings.
+        Known delay of each delayed output channel, by its column in the recordings.
 
     Returns
     -------
@@ -109,11 +109,11 @@ def to_state_space(
     Raises
     ------
     InputError
-        If nothing was measured, a channel or a point is not known, or residual flexibility is wanted as feedthrough of
-        a velocity or an acceleration.
+        If nothing was measured, a channel or a point is not known, or residual flexibility is required as feedthrough
+        of a velocity or an acceleration.
     """
     chosen = options or ExportOptions()
-    return _realise(updated.model, choose_ports(labels, points, chosen, delays_s or {}), chosen)
+    return _to_state_space(updated.model, choose_ports(labels, points, chosen, delays_s or {}), chosen)
 
 
 def to_ensemble(
@@ -135,14 +135,14 @@ def to_ensemble(
     points : sequence of Dof
         Points of interest.
     options : ExportOptions, optional
-        What they look like; `ensemble` says how many.
+        Their form; `ensemble` is their number.
     delays_s : mapping of str to float, optional
-        Known delay of each late output channel.
+        Known delay of each delayed output channel.
 
     Returns
     -------
     tuple of StateSpaceModel
-        Fewer than wanted where the update has drawn fewer, none where its method draws none.
+        At most as many as the update has drawn; none where its method draws none.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def to_ensemble(
     ports = choose_ports(labels, points, chosen, delays_s or {})
     members = updated.ensemble[: chosen.ensemble]
     return tuple(
-        _realise(replace(updated.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
+        _to_state_space(replace(updated.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
         for mass, damping, stiffness in members
     )
 
@@ -182,7 +182,7 @@ def to_control(model: StateSpaceModel) -> control.StateSpace:
     )
 
 
-def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
+def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
     system = modal_form(model, *rows)
@@ -190,10 +190,12 @@ def _realise(model: ReducedModel, ports: Ports, options: ExportOptions) -> State
         system = condense_high_modes(system, model.n_modes)
     matrices = to_first_order(system, [output.quantity.power for output in outputs])
     names = [
-        f"mode {mode + 1} {what}" for mode in range(len(system.stiffness)) for what in ("displacement", "velocity")
+        f"mode {mode + 1} {quantity}"
+        for mode in range(len(system.stiffness))
+        for quantity in ("displacement", "velocity")
     ]
-    late = [output for output in outputs if output.delay_s > 0 and options.pade_order]
-    names += [f"delay of {output.dof} {order + 1}" for output in late for order in range(options.pade_order)]
+    delayed = [output for output in outputs if output.delay_s > 0 and options.pade_order]
+    names += [f"delay of {output.dof} {order + 1}" for output in delayed for order in range(options.pade_order)]
     matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
     if options.sample_time_s > 0:
         matrices = discretise(matrices, options.sample_time_s)

@@ -278,7 +278,7 @@ def _names_for_matlab(model: StateSpaceModel) -> dict[str, np.ndarray]:
 
 
 def _names_in(values: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Take names and units out of what was read from JSON or MATLAB.
+    """Read names and units from the content of a JSON or MATLAB file.
 
     Parameters
     ----------
@@ -305,5 +305,5 @@ def _suffix(path: Path) -> str:
 
 
 def _text_in(text: object) -> object:
-    """Take a text out of the cell that MATLAB files keep it in."""
+    """Unwrap a text from a cell of a MATLAB file."""
     return text.item() if isinstance(text, np.ndarray) and text.size else ("" if isinstance(text, np.ndarray) else text)

@@ -1,7 +1,8 @@
-"""How far the plant may be from its model: a multiplicative uncertainty weight for every output.
+"""Multiplicative uncertainty of the plant: a weight for every output.
 
 A robust design takes every plant ``(1 + w Delta) G`` with ``|Delta| <= 1`` into account. The weight is an upper bound
-of what the members of the posterior do, of second order, stable and without zeros in the right half plane.
+of the relative errors of the members of the posterior, of second order, stable and without zeros in the right half
+plane.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 QUANTILE = 0.95  # of the members
 SMALLEST = 1e-6  # relative error below which a bound would only follow rounding
-BOUND = 1.0 + 1e-9  # so that rounding leaves the bound above
+BOUND = 1.0 + 1e-9  # so that the bound holds despite rounding
 STARTS = ((0.1, 1.0), (1.0, 10.0), (0.1, 10.0), (0.5, 2.0))  # corners of the weight, over the middle of the band
 
 
@@ -69,18 +70,18 @@ class UncertaintyWeights:
 def uncertainty_weights(
     updated: UpdatedModel, labels: Sequence[FrfLabel], points: Sequence[Dof], frequency_hz: FloatArray
 ) -> UncertaintyWeights:
-    """Bound the relative error that the posterior leaves, for every sensor and point of interest.
+    """Bound the relative error of the members of the posterior, for every sensor and point of interest.
 
     Parameters
     ----------
     updated : UpdatedModel
         With an ensemble.
     labels : sequence of FrfLabel
-        What was measured: its blows are the inputs, its sensors the first outputs.
+        What was measured: its excited DOFs are the inputs, its sensors the first outputs.
     points : sequence of Dof
         Points of interest.
     frequency_hz : (n_lines,) array
-        Where the bound has to hold, above 0, Hz.
+        Frequencies at which the bound has to hold, above 0, Hz.
 
     Returns
     -------
@@ -94,7 +95,7 @@ def uncertainty_weights(
     """
     if not len(updated.ensemble):
         raise InputError(
-            f"the update by '{updated.method}' has no ensemble, so nothing is known of its uncertainty; use [update] "
+            f"the update by '{updated.method}' has no ensemble, so its uncertainty is unknown; use [update] "
             "method = 'minimal-change' with ensemble = 200"
         )
     s = 2j * np.pi * np.asarray(frequency_hz, float)
@@ -114,27 +115,27 @@ def uncertainty_weights(
 def _relative_error(updated: UpdatedModel, output: Dof, inputs: Sequence[Dof], s: ComplexArray) -> FloatArray:
     model = updated.model
     lowest = float(np.abs(s).min())
-    mean = ModelEnsemble(ensemble=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
-    members = ModelEnsemble(ensemble=updated.ensemble, lowest_rad_s=lowest)
+    updated_frfs = ModelEnsemble(matrices=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
+    member_frfs = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
     size, distance = np.zeros(len(s)), np.zeros((len(updated.ensemble), len(s)))
     for force in inputs:
         rows = model.row(output), model.row(force)
-        nominal = mean.receptance(*rows, s)
-        size += np.abs(nominal[0]) ** 2
-        distance += np.abs(members.receptance(*rows, s) - nominal) ** 2
+        receptance = updated_frfs.receptance(*rows, s)
+        size += np.abs(receptance[0]) ** 2
+        distance += np.abs(member_frfs.receptance(*rows, s) - receptance) ** 2
     return np.asarray(np.quantile(np.sqrt(distance / size), QUANTILE, axis=0))
 
 
 def _bound(frequency_hz: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the biquadratic weight above the curve that lies closest to it on the mean in dB."""
-    wanted = np.log(np.maximum(error, SMALLEST))
+    """Find the biquadratic weight above the curve that is closest to it on average in dB."""
+    log_error = np.log(np.maximum(error, SMALLEST))
     middle = 2 * np.pi * float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
     s = 2j * np.pi * frequency_hz / middle
 
     def excess(logs: FloatArray) -> FloatArray:
         above, below = _polynomials(logs)
-        shape = np.log(np.abs(np.polyval(above, s) / np.polyval(below, s)))
-        return np.asarray(shape - wanted)
+        log_weight = np.log(np.abs(np.polyval(above, s) / np.polyval(below, s)))
+        return np.asarray(log_weight - log_error)
 
     def cost(logs: FloatArray) -> float:
         gap = excess(logs)
@@ -143,17 +144,17 @@ def _bound(frequency_hz: FloatArray, error: FloatArray) -> tuple[FloatArray, Flo
     starts = [
         np.array([np.log(low), 0.0, np.log(high), 0.0]) for low, high in (*STARTS, *(pair[::-1] for pair in STARTS))
     ]
-    found = min((minimize(cost, start, method="Nelder-Mead") for start in starts), key=lambda result: result.fun)
-    above, below = _polynomials(found.x)
-    gain = BOUND * float(np.exp(-excess(found.x).min()))
+    optimum = min((minimize(cost, start, method="Nelder-Mead") for start in starts), key=lambda result: result.fun)
+    above, below = _polynomials(optimum.x)
+    gain = BOUND * float(np.exp(-excess(optimum.x).min()))
     time = np.array([1 / middle**2, 1 / middle, 1.0])
     return gain * above * time, below * time
 
 
 def _polynomials(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Numerator and denominator from logarithms of corners and damping; all roots in the left half plane."""
-    corner, damping, other, other_damping = np.exp(np.clip(logs, -12, 12))
+    corner, damping, pole_corner, pole_damping = np.exp(np.clip(logs, -12, 12))
     return (
         np.array([1.0, 2 * damping * corner, corner**2]),
-        np.array([1.0, 2 * other_damping * other, other**2]),
+        np.array([1.0, 2 * pole_damping * pole_corner, pole_corner**2]),
     )

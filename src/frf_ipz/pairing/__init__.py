@@ -1,1 +1,1 @@
-"""Which measured pole and zero is which of the model."""
+"""Pairing of measured poles and zeros with those of the model."""

@@ -1,4 +1,4 @@
-"""Poles and zeros of a reduced model, in the order that pairs refer to."""
+"""Poles and zeros of a reduced model, in the order of the indices in pairs."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ MIRRORED = 0.5  # distance of a mirrored zero from its image, over the real part
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModelPoles:
-    """Poles of a model and what each FRF sees of them.
+    """Poles of a model and their amplitudes in each FRF.
 
     Parameters
     ----------
     values : (n,) complex array
         By ascending modulus, one a conjugate pair, rad/s.
     amplitudes : (n, n_frfs) complex array
-        Mass-normalised product of the shape at sensor and blow: the receptance's residue times ``2 i |p|``, 1/kg.
+        Mass-normalised product of the shape at sensor and excitation: the receptance's residue times ``2 i |p|``, 1/kg.
     """
 
     values: ComplexArray
@@ -68,11 +68,10 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     Returns
     -------
     ModelPoles
-        Signs of sensors and blows are in the amplitudes.
+        Signs of sensors and excitations are in the amplitudes.
     """
     roots = damped_poles(model.mass, model.damping, model.stiffness)
-    chosen = _one_of_each_pair(roots.values)
-    roots = roots.take(chosen)
+    roots = roots.take(_one_of_each_pair(roots.values))
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
     products = (outputs @ roots.right_vectors) * (inputs @ roots.left_vectors)
@@ -102,17 +101,17 @@ def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:
     upper = roots.take(np.flatnonzero(roots.values.imag >= -REAL * np.abs(roots.values)))
     order = np.argsort(np.abs(upper.values), kind="stable")
     upper = upper.take(order)
-    kinds, keep = _kinds(upper.values)
-    upper = upper.take(np.flatnonzero(keep))
+    kinds, is_listed = _kinds(upper.values)
+    upper = upper.take(np.flatnonzero(is_listed))
     return ModelZeros(
         values=upper.values,
-        kind=tuple(kind for kind, kept in zip(kinds, keep, strict=True) if kept),
+        kind=tuple(kind for kind, listed in zip(kinds, is_listed, strict=True) if listed),
         slope_sign=_slope_sign(model, upper, output, force),
     )
 
 
 def _one_of_each_pair(values: ComplexArray) -> np.ndarray:
-    """Places of one root a conjugate pair; real ones (rigid-body, overdamped) come in twos as well."""
+    """Select one root a conjugate pair; real ones (rigid-body, overdamped) come in pairs as well."""
     is_real = np.abs(values.imag) <= REAL * np.abs(values)
     real = np.flatnonzero(is_real)
     real = real[np.argsort(np.abs(values[real]))][::2]
@@ -121,26 +120,26 @@ def _one_of_each_pair(values: ComplexArray) -> np.ndarray:
 
 
 def _kinds(values: ComplexArray) -> tuple[list[str], BoolArray]:
-    """Kind of every zero of the upper half plane; of a quadruple only the one in the left half plane is kept."""
+    """Kind of every zero of the upper half plane; of a quadruple only the one in the left half plane is listed."""
     modulus = np.abs(values)
     kinds = [
         "real" if abs(value.imag) <= REAL * size else "complex" for value, size in zip(values, modulus, strict=True)
     ]
-    keep = np.ones(len(values), bool)
-    for place in np.flatnonzero((values.real > UNSTABLE * modulus) & (np.array(kinds) == "complex")):
-        image = -values[place].conj()
-        distance = np.where(keep & (values.real < 0), np.abs(values - image), np.inf)
+    is_listed = np.ones(len(values), bool)
+    for index in np.flatnonzero((values.real > UNSTABLE * modulus) & (np.array(kinds) == "complex")):
+        image = -values[index].conj()
+        distance = np.where(is_listed & (values.real < 0), np.abs(values - image), np.inf)
         twin = int(np.argmin(distance))
-        if distance[twin] <= MIRRORED * values[place].real:
+        if distance[twin] <= MIRRORED * values[index].real:
             kinds[twin] = "quadruple"
-            keep[place] = False
-    return kinds, keep
+            is_listed[index] = False
+    return kinds, is_listed
 
 
 def _slope_sign(model: ReducedModel, zeros: Roots, output: FloatArray, force: FloatArray) -> FloatArray:
     """Sign of dH/d omega at zeros of H(s) = c P(s)^-1 b; 0 where a pole lies on the zero.
 
-    The vectors of a zero are held by the sensor and driven by the blow: P x = a b and y^T P = h c, so
+    The vectors of a zero are held by the sensor and driven by the excitation: P x = a b and y^T P = h c, so
     H' = -c P^-1 P' P^-1 b = -(y^T P' x) / (a h), which needs no inverse of a P that may be singular.
     """
     powers = ((2, model.mass), (1, model.damping), (0, model.stiffness))

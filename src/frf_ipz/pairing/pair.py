@@ -1,6 +1,6 @@
-"""Pairing: which measured pole or zero is which one of the model, with the reason for every verdict.
+"""Pairing of measured poles and zeros with those of the model, with the reason for every verdict.
 
-Sits between identification and updating. Only what is paired beyond doubt becomes a target.
+Sits between identification and updating. Only unambiguous pairs become targets.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from frf_ipz.pairing.matching import Matching
     from frf_ipz.structure import ReducedModel
 
-SURE = 1.0  # rise of the cost, in squared standard deviations, that a second-best assignment must have
-HARDLY_SEEN = 0.05  # amplitude over the mean amplitude, in every FRF, below which a mode need not show
-CANCELLING = 3.0  # standard deviations of distance below which a zero and a pole cannot be told apart
-NOWHERE = complex(np.nan, np.nan)
+MIN_MARGIN = 1.0  # rise of the cost, in squared standard deviations, that a second-best assignment must have
+HARDLY_OBSERVABLE = 0.05  # amplitude over the mean amplitude, in every FRF, below which a mode need not show
+CANCELLING = 3.0  # standard deviations of distance below which a zero and a pole cannot be distinguished
+NO_ROOT = complex(np.nan, np.nan)
 
 
 def pair(fit: ModalFit, model: ReducedModel) -> Pairs:
@@ -45,75 +45,78 @@ def pair(fit: ModalFit, model: ReducedModel) -> Pairs:
         Every measured pole and zero and every one that the model has in the band, each with a verdict and its reason.
     """
     poles = model_poles(model, fit.labels)
-    found = pair_poles(fit, poles)
-    rows = _pole_rows(fit, poles, found)
-    known = _paired_logs(rows)
+    pole_pairing = pair_poles(fit, poles)
+    rows = _pole_rows(fit, poles, pole_pairing)
+    paired_poles = _paired_logs(rows)
     for frf in range(len(fit.labels)):
         zeros = model_zeros(model, fit.labels[frf])
-        matched = pair_zeros(fit, frf, zeros, known, float(found.gains[frf]))
-        rows += _zero_rows(fit, frf, zeros, matched, known)
-    return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, found, fit.labels)))
+        zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
+        rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles)
+    return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
 
 
-def _pole_rows(fit: ModalFit, model: ModelPoles, found: PolePairing) -> list[Pair]:
+def _pole_rows(fit: ModalFit, model: ModelPoles, pairing: PolePairing) -> list[Pair]:
     rows = []
-    for place in range(fit.n_modes):
-        partner = int(found.matching.partner[place])
-        verdict, reason = _verdict(found.matching, place, model.values, "mode")
-        rows.append(_row("pole", -1, place, partner, fit.model.poles[place], model.values, found, verdict, reason))
-    seen = np.abs(model.amplitudes) / np.sqrt(np.mean(np.abs(model.amplitudes) ** 2, axis=0))
+    for mode in range(fit.n_modes):
+        partner = int(pairing.matching.partner[mode])
+        verdict, reason = _verdict(pairing.matching, mode, model.values, "mode")
+        rows.append(_row("pole", -1, mode, partner, fit.model.poles[mode], model.values, pairing, verdict, reason))
+    observability = np.abs(model.amplitudes) / np.sqrt(np.mean(np.abs(model.amplitudes) ** 2, axis=0))
     inside = in_band(model.values, fit.band_hz, _paired_logs(rows))
-    for place in np.setdiff1d(np.flatnonzero(inside), found.matching.partner):
+    for mode in np.setdiff1d(np.flatnonzero(inside), pairing.matching.partner):
         reason = (
-            "the model has its nodes at the measured points: it hardly shows there"
-            if seen[place].max() < HARDLY_SEEN
+            "the mode has its nodes at the measured points and hardly shows there"
+            if observability[mode].max() < HARDLY_OBSERVABLE
             else "the model has a mode here that the measurement does not show"
         )
-        rows.append(_unmeasured("pole", -1, int(place), model.values[place], reason))
+        rows.append(_unmeasured("pole", -1, int(mode), model.values[mode], reason))
     return rows
 
 
 def _zero_rows(
-    fit: ModalFit, frf: int, model: ModelZeros, found: ZeroPairing, known: tuple[FloatArray, FloatArray]
+    fit: ModalFit, frf: int, model: ModelZeros, pairing: ZeroPairing, paired_poles: tuple[FloatArray, FloatArray]
 ) -> list[Pair]:
     rows = []
-    for index, place in enumerate(found.measured):
-        value = fit.zeros.values[place]
-        partner = int(found.matching.partner[index])
-        verdict, reason = _verdict(found.matching, index, model.values, "zero")
-        verdict, reason = _no_target(fit, int(place)) or (verdict, reason)
-        rows.append(_row("zero", frf, int(place), partner, value, model.values, found, verdict, reason, index=index))
-    inside = in_band(model.values, fit.band_hz, known) & (np.array(model.kind) != "real")
-    for place in np.setdiff1d(np.flatnonzero(inside), found.matching.partner):
-        reason = f"the model has a {model.kind[place]} zero here that the measurement does not show"
-        rows.append(_unmeasured("zero", frf, int(place), model.values[place], reason))
+    for row, zero in enumerate(pairing.measured):
+        value = fit.zeros.values[zero]
+        partner = int(pairing.matching.partner[row])
+        verdict, reason = _verdict(pairing.matching, row, model.values, "zero")
+        verdict, reason = _exclusion(fit, int(zero)) or (verdict, reason)
+        rows.append(_row("zero", frf, int(zero), partner, value, model.values, pairing, verdict, reason, row=row))
+    inside = in_band(model.values, fit.band_hz, paired_poles) & (np.array(model.kind) != "real")
+    for zero in np.setdiff1d(np.flatnonzero(inside), pairing.matching.partner):
+        reason = f"the model has a {model.kind[zero]} zero here that the measurement does not show"
+        rows.append(_unmeasured("zero", frf, int(zero), model.values[zero], reason))
     return rows
 
 
-def _verdict(matching: Matching, place: int, computed: np.ndarray, what: str) -> tuple[Verdict, str]:
-    partner, rival = int(matching.partner[place]), int(matching.rival[place])
+def _verdict(matching: Matching, row: int, computed: np.ndarray, what: str) -> tuple[Verdict, str]:
+    partner, rival = int(matching.partner[row]), int(matching.rival[row])
     if partner < 0:
         return Verdict.MISSING_IN_MODEL, f"the model has no {what} near enough in frequency, kind and shape"
-    if matching.margin[place] >= SURE:
-        return Verdict.PAIRED, f"the next best choice is worse by {matching.margin[place]:.1f} squared deviations"
-    other = "to leave it alone" if rival < 0 else f"the one at {abs(computed[rival]) / (2 * np.pi):.5g} Hz"
-    return Verdict.AMBIGUOUS, f"{other} would be as likely (worse by {matching.margin[place]:.1f})"
+    if matching.margin[row] >= MIN_MARGIN:
+        return Verdict.PAIRED, f"the next best choice is worse by {matching.margin[row]:.1f} squared deviations"
+    alternative = "no partner" if rival < 0 else f"the one at {abs(computed[rival]) / (2 * np.pi):.5g} Hz"
+    return Verdict.AMBIGUOUS, f"{alternative} would be as likely (worse by {matching.margin[row]:.1f})"
 
 
-def _no_target(fit: ModalFit, place: int) -> tuple[Verdict, str] | None:
-    """Why a measured zero must not become a target, if so."""
+def _exclusion(fit: ModalFit, zero: int) -> tuple[Verdict, str] | None:
+    """Verdict and reason for a measured zero that must not become a target; None for one that may."""
     zeros = fit.zeros
-    if not zeros.identifiable[place]:
-        return Verdict.AMBIGUOUS, f"not identifiable: {zeros.reason[place]}"
-    if zeros.kind[place] == "real":
+    if not zeros.identifiable[zero]:
+        return Verdict.AMBIGUOUS, f"not identifiable: {zeros.reason[zero]}"
+    if zeros.kind[zero] == "real":
         return Verdict.AMBIGUOUS, "a real zero: no measured line shows where it is"
-    start = 2 * (fit.n_modes + place)
+    start = 2 * (fit.n_modes + zero)
     std = float(np.sqrt(max(fit.covariance[start + 1, start + 1], 0.0)))
     poles = fit.model.poles[: fit.n_modes]
-    distance = np.abs(poles - zeros.values[place])
+    distance = np.abs(poles - zeros.values[zero])
     if len(poles) and distance.min() < CANCELLING * std:
-        near = abs(poles[np.argmin(distance)]) / (2 * np.pi)
-        return Verdict.AMBIGUOUS, f"it nearly cancels the pole at {near:.5g} Hz: the sensor or the blow sits at a node"
+        pole_hz = abs(poles[np.argmin(distance)]) / (2 * np.pi)
+        return (
+            Verdict.AMBIGUOUS,
+            f"it nearly cancels the pole at {pole_hz:.5g} Hz: the sensor or the excitation is at a node of the mode",
+        )
     return None
 
 
@@ -124,11 +127,11 @@ def _row(
     partner: int,
     value: complex,
     computed: np.ndarray,
-    found: PolePairing | ZeroPairing,
+    pairing: PolePairing | ZeroPairing,
     verdict: Verdict,
     reason: str,
     *,
-    index: int | None = None,
+    row: int | None = None,
 ) -> Pair:
     paired = partner >= 0
     return Pair(
@@ -137,20 +140,20 @@ def _row(
         measured=measured,
         computed=partner,
         measured_value=complex(value),
-        computed_value=complex(computed[partner]) if paired else NOWHERE,
-        distance=float(found.costs[measured if index is None else index, partner]) if paired else float("nan"),
+        computed_value=complex(computed[partner]) if paired else NO_ROOT,
+        distance=float(pairing.costs[measured if row is None else row, partner]) if paired else float("nan"),
         verdict=verdict,
         reason=reason,
     )
 
 
-def _unmeasured(kind: str, frf: int, place: int, value: complex, reason: str) -> Pair:
+def _unmeasured(kind: str, frf: int, computed: int, value: complex, reason: str) -> Pair:
     return Pair(
         kind=kind,
         frf=frf,
         measured=-1,
-        computed=place,
-        measured_value=NOWHERE,
+        computed=computed,
+        measured_value=NO_ROOT,
         computed_value=complex(value),
         distance=float("nan"),
         verdict=Verdict.MISSING_IN_MEASUREMENT,
@@ -167,18 +170,18 @@ def _paired_logs(rows: list[Pair]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _warnings(rows: list[Pair], found: PolePairing, labels: Sequence[FrfLabel]) -> list[str]:
+def _warnings(rows: list[Pair], pairing: PolePairing, labels: Sequence[FrfLabel]) -> list[str]:
     texts = []
     poles = [row for row in rows if row.kind == "pole"]
-    lonely = [row for row in poles if row.verdict is Verdict.MISSING_IN_MODEL]
-    if lonely:
-        where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in lonely)
+    unpaired = [row for row in poles if row.verdict is Verdict.MISSING_IN_MODEL]
+    if unpaired:
+        where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in unpaired)
         texts.append(
             f"the model has no counterpart of the measured modes at {where} Hz: something may be missing in it"
         )
     if not any(row.verdict is Verdict.PAIRED for row in poles):
         texts.append("no measured mode could be paired: check units, materials and supports of the FE model")
-    flipped = np.flatnonzero(found.gains < 0)
+    flipped = np.flatnonzero(pairing.gains < 0)
     if len(flipped):
         names = ", ".join(str(labels[int(frf)]) for frf in flipped)
         texts.append(f"the polarity of {names} is opposite to the model's")

@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """What became of a pole or zero."""
+    """Result of pairing a pole or zero."""
 
     PAIRED = "paired"
     MISSING_IN_MODEL = "missing in the model"
@@ -26,14 +26,14 @@ class Pair:
     frf : int
         Which FRF a zero belongs to; -1 for poles.
     measured, computed : int
-        Place among the fit's poles or zeros, and among the model's (by ascending modulus, per FRF for zeros); -1 where
+        Index among the fit's poles or zeros, and among the model's (by ascending modulus, per FRF for zeros); -1 where
         there is none.
     measured_value, computed_value : complex
         rad/s; NaN where there is none.
     distance : float
-        What the assignment minimised: relative frequency error, and what shapes or residues say.
+        Cost that the assignment minimised: of the frequency, and of the mode shape or the slope.
     verdict : Verdict
-        What became of it.
+        Result of the pairing.
     reason : str
         Why, in words.
     """
@@ -66,5 +66,5 @@ class Pairs:
 
     @property
     def targets(self) -> tuple[Pair, ...]:
-        """Those that updating aims at: the paired ones."""
+        """The paired ones, which updating has to meet."""
         return tuple(row for row in self.rows if row.verdict is Verdict.PAIRED)

@@ -1,9 +1,9 @@
-"""Measured poles against those of the model: by frequency and by what every FRF sees of the mode.
+"""Pairing of measured poles with those of the model: by frequency and by the amplitude of the mode in every FRF.
 
 The cost of a pair is a squared distance in standard deviations: of the frequency, after a factor common to all modes
-(a wrong modulus moves them alike), and of the mass-normalised amplitudes in every FRF, after one gain an FRF (its scale
-may not be known). Neither alone is enough: frequencies cannot tell two close modes apart, and shapes at few points
-cannot tell distant ones apart.
+(a wrong modulus shifts them all), and of the mass-normalised amplitudes in every FRF, after one gain an FRF (its scale
+may not be known). Neither alone is enough: frequencies cannot separate two close modes, and shapes at few points
+cannot separate distant ones.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ COMMON_STD = 0.08  # of the logarithm of the common factor
 COMMON_STEPS = 17  # of the search for it, over three standard deviations to each side
 FREQUENCY_GATE = 0.3  # logarithm beyond which two poles are not the same whatever the shapes say
 AMPLITUDE_STD = 0.4  # of an amplitude, over the mean amplitude in its FRF: shapes change with the stiffness
-ALONE = 9.0  # a pole stays alone rather than three standard deviations off
-MAX_SHAPE = 12.0  # many FRFs must not outvote any frequency
-ROUNDS = 3  # of assigning and working out the gains in turn
+UNMATCHED = 9.0  # a pole stays unmatched rather than three standard deviations off
+MAX_SHAPE = 12.0  # many FRFs must not outweigh any frequency
+ROUNDS = 3  # of assigning and estimating the gains in turn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PolePairing:
-    """Poles and who belongs to whom.
+    """Assignment of measured poles to those of the model.
 
     Parameters
     ----------
@@ -109,25 +109,25 @@ def _over_common_factors(
         costs = (gap / FREQUENCY_STD) ** 2 + shapes
         costs[np.abs(measured[:, None] - computed) > FREQUENCY_GATE] = np.inf
         in_band = (computed + offset > band[0]) & (computed + offset < band[1])
-        found = match(costs, np.full(len(measured), ALONE), np.where(in_band, ALONE, 0.0), margins=margins)
-        total = found.cost + (offset / COMMON_STD) ** 2
+        matching = match(costs, np.full(len(measured), UNMATCHED), np.where(in_band, UNMATCHED, 0.0), margins=margins)
+        total = matching.cost + (offset / COMMON_STD) ** 2
         if best is None or total < best[0]:
-            best = total, found, costs
+            best = total, matching, costs
     if best is None:  # the search above is never empty
         raise AssertionError
     return best[1], best[2]
 
 
 def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:
-    """Least-squares gain of each FRF over the modes paired so far; its sign where that is all that is clear."""
+    """Least-squares gain of each FRF over the modes paired so far; only its sign where its size is not clear."""
     rows = np.flatnonzero(partner >= 0)
     if not len(rows):
         return np.ones(measured.shape[1])
-    theirs = computed[partner[rows]]
+    partners = computed[partner[rows]]
     weights = 1 / (noise[rows] ** 2 + np.mean(np.abs(measured[rows]) ** 2, axis=0) * AMPLITUDE_STD**2)
-    inner = np.sum(weights * (measured[rows] * theirs.conj()).real, axis=0)
-    sizes = np.sum(weights * np.abs(theirs) ** 2, axis=0)
-    ratio = np.sqrt(np.mean(np.abs(measured[rows]) ** 2, 0) / np.maximum(np.mean(np.abs(theirs) ** 2, 0), 1e-300))
+    inner = np.sum(weights * (measured[rows] * partners.conj()).real, axis=0)
+    sizes = np.sum(weights * np.abs(partners) ** 2, axis=0)
+    ratio = np.sqrt(np.mean(np.abs(measured[rows]) ** 2, 0) / np.maximum(np.mean(np.abs(partners) ** 2, 0), 1e-300))
     gain = inner / np.maximum(sizes, 1e-300)
     return np.asarray(np.where(np.abs(gain) > ratio / 3, gain, np.copysign(ratio, gain)))
 

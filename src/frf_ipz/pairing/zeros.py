@@ -1,7 +1,7 @@
-"""Measured zeros of one FRF against those of the model, on a frequency axis on which the paired poles agree.
+"""Pairing of the zeros of one FRF with those of the model, on a frequency axis on which the paired poles agree.
 
-A stiffness that is off moves poles and zeros alike, so frequencies are first mapped by the poles; what is left tells
-zeros apart. The slope of the FRF at a zero must have the same sign: two zeros without a pole between them differ in it.
+A wrong stiffness shifts poles and zeros, so frequencies are first mapped by the poles; the remaining distance separates
+the zeros. The slope of the FRF at a zero must have the same sign: two zeros without a pole between them differ in it.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 ZERO_STD = 0.04  # of the logarithm of a zero's frequency, after the mapping by poles
 ZERO_GATE = 0.25  # logarithm beyond which two zeros are not the same
 WRONG_SLOPE = 6.0  # cost of a slope of the other sign
-ALONE = 9.0  # a zero stays alone rather than three standard deviations off
-LONELY = 3.0  # a zero of the model in the band need not show: damping may hide it
+UNMATCHED = 9.0  # a zero stays unmatched rather than three standard deviations off
+UNMEASURED = 3.0  # a zero of the model in the band need not show: damping may hide it
 PAIRABLE = ("complex", "quadruple")  # a real zero is never a target: no measured line shows where it is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ZeroPairing:
-    """Zeros of one FRF and who belongs to whom.
+    """Assignment of the measured zeros of one FRF to those of the model.
 
     Parameters
     ----------
     measured : (n,) int array
-        Places of the FRF's zeros among all that were measured.
+        Indices of the FRF's zeros among all measured ones.
     matching : Matching
         Rows are those, columns the model's zeros.
     costs : (n, m) array
@@ -67,7 +67,7 @@ def pair_zeros(
     Returns
     -------
     ZeroPairing
-        Kinds are kept apart.
+        Zeros of different kinds are never paired.
     """
     measured = np.flatnonzero(fit.zeros.frf == frf)
     values = fit.zeros.values[measured]
@@ -75,16 +75,18 @@ def pair_zeros(
     costs = (gap / ZERO_STD) ** 2
     slopes = measured_slope_sign(fit.model, frf, fit.labels[frf].quantity.power, values) * np.sign(polarity)
     costs += WRONG_SLOPE * (slopes[:, None] * model.slope_sign < 0)
-    kinds = np.array([fit.zeros.kind[place] for place in measured], dtype=object)
-    may = np.isin(kinds.astype(str), PAIRABLE) & fit.zeros.identifiable[measured]
-    same = kinds[:, None] == np.array(model.kind, dtype=object)
-    costs = np.where(may[:, None] & same & (np.abs(gap) < ZERO_GATE), costs, np.inf)
-    lonely = np.where(in_band(model.values, fit.band_hz, poles), LONELY, 0.0)
-    return ZeroPairing(measured=measured, matching=match(costs, np.full(len(values), ALONE), lonely), costs=costs)
+    kinds = np.array([fit.zeros.kind[zero] for zero in measured], dtype=object)
+    is_pairable = np.isin(kinds.astype(str), PAIRABLE) & fit.zeros.identifiable[measured]
+    is_same_kind = kinds[:, None] == np.array(model.kind, dtype=object)
+    costs = np.where(is_pairable[:, None] & is_same_kind & (np.abs(gap) < ZERO_GATE), costs, np.inf)
+    unmeasured = np.where(in_band(model.values, fit.band_hz, poles), UNMEASURED, 0.0)
+    return ZeroPairing(
+        measured=measured, matching=match(costs, np.full(len(values), UNMATCHED), unmeasured), costs=costs
+    )
 
 
 def map_frequency(logs: FloatArray, measured: FloatArray, computed: FloatArray) -> FloatArray:
-    """Move frequencies as the paired poles between them moved.
+    """Map measured frequencies onto the model's axis by the paired poles around them.
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def map_frequency(logs: FloatArray, measured: FloatArray, computed: FloatArray) 
 
 
 def in_band(values: ComplexArray, band_hz: tuple[float, float], poles: tuple[FloatArray, FloatArray]) -> np.ndarray:
-    """Tell which of the model's roots a measurement in the band would show.
+    """Mark the roots of the model that a measurement in the band would show.
 
     Parameters
     ----------

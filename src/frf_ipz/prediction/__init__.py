@@ -1,1 +1,1 @@
-"""FRFs at points that were never measured, with honest bands."""
+"""FRFs at points that were not measured, with their bands."""

@@ -1,4 +1,4 @@
-"""How well predicted FRFs agree with measured or true ones, and what merely shifting resonances would reach.
+"""Agreement of predicted FRFs with measured or true ones, and the agreement by shifting resonances alone.
 
 [Grafe1998] H. Grafe, Model updating of large structural dynamics models using measured response functions, PhD thesis,
 Imperial College London, 1998.
@@ -81,32 +81,32 @@ def compare_frfs(first: ComplexArray, second: ComplexArray) -> Agreement:
     --------
     >>> import numpy as np
     >>> frf = np.array([[1.0 + 1j], [2.0]])
-    >>> found = compare_frfs(frf, 10 * frf)
-    >>> float(found.shape[0]).__round__(12), float(found.median_db[0]).__round__(12)
+    >>> agreement = compare_frfs(frf, 10 * frf)
+    >>> float(agreement.shape[0]).__round__(12), float(agreement.median_db[0]).__round__(12)
     (1.0, 20.0)
     """
     require_shape("the second FRFs", second, first.shape)
     inner = np.abs(np.sum(first.conj() * second, axis=0))
-    one, two = np.sum(np.abs(first) ** 2, axis=0), np.sum(np.abs(second) ** 2, axis=0)
+    first_power, second_power = np.sum(np.abs(first) ** 2, axis=0), np.sum(np.abs(second) ** 2, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0 on a line, or everywhere
         difference = np.abs(20 * np.log10(np.abs(second) / np.abs(first)))
         return Agreement(
-            shape=inner**2 / (one * two),
-            amplitude=2 * inner / (one + two),
+            shape=inner**2 / (first_power * second_power),
+            amplitude=2 * inner / (first_power + second_power),
             median_db=np.asarray(np.nanmedian(difference, axis=0)),
             largest_db=np.asarray(np.nanmax(difference, axis=0)),
         )
 
 
 def with_measured_poles(nominal: ReducedModel, pairs: Pairs) -> ReducedModel:
-    """Give the nominal model the measured poles and leave its mode shapes: what an update has to beat.
+    """Give the nominal model the measured poles with its own mode shapes: the agreement that an update has to beat.
 
     Parameters
     ----------
     nominal : ReducedModel
         Before updating.
     pairs : Pairs
-        Which pole belongs to which.
+        Measured poles with their counterparts.
 
     Returns
     -------
@@ -120,5 +120,5 @@ def with_measured_poles(nominal: ReducedModel, pairs: Pairs) -> ReducedModel:
         if pair.kind == "pole":
             mode = int(np.argmin(np.abs(frequency - abs(pair.computed_value))))
             squares[mode], rates[mode] = abs(pair.measured_value) ** 2, -2 * pair.measured_value.real
-    back = nominal.mass @ shapes
-    return replace(nominal, damping=(back * rates) @ back.T, stiffness=(back * squares) @ back.T)
+    inverse = nominal.mass @ shapes
+    return replace(nominal, damping=(inverse * rates) @ inverse.T, stiffness=(inverse * squares) @ inverse.T)

@@ -1,4 +1,4 @@
-"""FRFs of many models at once: the members of an update's ensemble."""
+"""Modes and FRFs of all members of an update's ensemble at once."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ class ModelEnsemble:
 
     Parameters
     ----------
-    ensemble : (m, 3, r, r) array
+    matrices : (m, 3, r, r) array
         Mass, damping and stiffness of each.
     lowest_rad_s : float
-        The lowest frequency at which FRFs will be asked for.
+        Lowest frequency at which FRFs are evaluated.
     """
 
-    ensemble: FloatArray
+    matrices: FloatArray
     lowest_rad_s: float
 
     @cached_property
     def modes(self) -> tuple[FloatArray, FloatArray]:
         """Squared natural frequencies (m, r), ascending, and mass-normalised shapes (m, r, r)."""
-        mass, stiffness = self.ensemble[:, 0], self.ensemble[:, 2]
+        mass, stiffness = self.matrices[:, 0], self.matrices[:, 2]
         lower = np.linalg.inv(np.linalg.cholesky(mass))
         values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
         return np.maximum(values, (SOFT * self.lowest_rad_s) ** 2), lower.swapaxes(1, 2) @ vectors
@@ -40,15 +40,15 @@ class ModelEnsemble:
         """Poles (m, 2 r), and right and left vectors (m, r, 2 r) whose product is the receptance's residue."""
         squares, shapes = self.modes
         count, order = squares.shape
-        damping = shapes.swapaxes(1, 2) @ self.ensemble[:, 1] @ shapes
+        damping = shapes.swapaxes(1, 2) @ self.matrices[:, 1] @ shapes
         state = np.zeros((count, 2 * order, 2 * order))
         state[:, :order, order:] = np.eye(order)
         diagonal = np.arange(order)
         state[:, order + diagonal, diagonal] = -squares
         state[:, order:, order:] = -damping
         poles, vectors = np.linalg.eig(state)
-        left = shapes @ np.linalg.inv(vectors)[:, :, order:].swapaxes(1, 2)
-        return poles.astype(complex), (shapes @ vectors[:, :order]).astype(complex), left.astype(complex)
+        left_vectors = shapes @ np.linalg.inv(vectors)[:, :, order:].swapaxes(1, 2)
+        return poles.astype(complex), (shapes @ vectors[:, :order]).astype(complex), left_vectors.astype(complex)
 
     def receptance(self, output: FloatArray, force: FloatArray, s: ComplexArray) -> ComplexArray:
         """Evaluate one FRF of every member.
@@ -56,7 +56,7 @@ class ModelEnsemble:
         Parameters
         ----------
         output, force : (r,) array
-            Rows of sensor and blow.
+            Rows of sensor and excitation.
         s : (n_lines,) complex array
             rad/s.
 
@@ -65,19 +65,19 @@ class ModelEnsemble:
         (m, n_lines) complex array
             m/N.
         """
-        poles, right, left = self.roots
-        residues = (output @ right) * (force @ left)
+        poles, right_vectors, left_vectors = self.roots
+        residues = (output @ right_vectors) * (force @ left_vectors)
         return np.stack([(1 / (s[:, None] - p)) @ residue for p, residue in zip(poles, residues, strict=True)])
 
     def amplitudes(self, output: FloatArray, force: FloatArray, count: int) -> FloatArray:
-        """Mass-normalised products of shapes at sensor and blow.
+        """Mass-normalised products of shapes at sensor and excitation.
 
         Parameters
         ----------
         output, force : (r,) array
-            Rows of sensor and blow.
+            Rows of sensor and excitation.
         count : int
-            Modes, from the lowest.
+            Number of modes, from the lowest.
 
         Returns
         -------

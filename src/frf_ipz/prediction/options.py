@@ -14,10 +14,10 @@ class PredictOptions:
     Parameters
     ----------
     points : tuple of str
-        Points of interest as DOF labels: never measured; may be empty.
+        Points of interest as DOF labels, which need no measurement; may be empty.
     reference : str, optional
-        File of FRFs at the points of interest that were kept aside: the report sets the prediction against them, and
-        nothing else uses them.
+        File of FRFs measured at the points of interest: the report compares the prediction with them, and nothing else
+        uses them.
     """
 
     __pydantic_config__ = STRICT

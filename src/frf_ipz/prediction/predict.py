@@ -1,4 +1,4 @@
-"""Prediction: FRFs at points that were never measured, with a band for what the measurements leave open.
+"""Prediction: FRFs at points that were not measured, with a band for what the measurements do not determine.
 
 Sits after updating. The band is that of the update's ensemble: the covariance of the targets, and the null space of the
 update.
@@ -32,23 +32,23 @@ BAND = (0.05, 0.95)
 def predict_frfs(
     updated: UpdatedModel, points: Sequence[Dof], labels: Sequence[FrfLabel], frequency_hz: FloatArray
 ) -> Prediction:
-    """Predict FRFs from every blow of the test to points of interest.
+    """Predict FRFs from every excited DOF of the test to points of interest.
 
     Parameters
     ----------
     updated : UpdatedModel
         The updated model.
     points : sequence of Dof
-        Where; any DOF that the reduced model knows, retained or not. Signs count.
+        Points of interest: any DOF of the reduced model's expansion, retained or not. Signs count.
     labels : sequence of FrfLabel
-        What was measured: its blows are used, and the quantity of its first FRF.
+        What was measured: its excited DOFs are used, and the quantity of its first FRF.
     frequency_hz : (n_lines,) array
         Lines, Hz.
 
     Returns
     -------
     Prediction
-        One FRF a point and blow; bands are NaN where the method of updating says nothing of what remains open.
+        One FRF a point and excited DOF; bands are NaN where the method of updating gives no ensemble.
 
     Raises
     ------
@@ -56,24 +56,24 @@ def predict_frfs(
         If nothing was measured, or the model does not know a point.
     """
     if not labels:
-        raise InputError("a prediction needs at least one measured FRF: it says where the structure is struck")
-    records = tuple(dict.fromkeys(label.input_dof for label in labels))
-    wanted = tuple(FrfLabel(point, blow, labels[0].quantity) for point in points for blow in records)
+        raise InputError("a prediction needs at least one measured FRF: its label says where the structure is excited")
+    input_dofs = tuple(dict.fromkeys(label.input_dof for label in labels))
+    predicted = tuple(FrfLabel(point, dof, labels[0].quantity) for point in points for dof in input_dofs)
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    band = float(np.abs(s[0])), float(np.abs(s[-1]))
+    band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())
-    members = ModelEnsemble(ensemble=updated.ensemble, lowest_rad_s=lowest)
-    low, high = _bands(updated, members, wanted, s)
-    zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, wanted, band)
+    ensemble = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
+    low, high = _magnitude_bands(updated, ensemble, predicted, s)
+    zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
     warnings = tuple(
-        explain_wide_band(stretch, updated.model, members, labels, wanted[stretch.frf], frequency_hz, zeros)
-        for stretch in wide_bands(frequency_hz, low, high)
+        explain_wide_band(band, updated.model, ensemble, labels, predicted[band.frf], frequency_hz, zeros)
+        for band in wide_bands(frequency_hz, low, high)
     )
     return Prediction(
         frequency_hz=np.asarray(frequency_hz, float),
-        labels=wanted,
-        values=_evaluated(updated.model, wanted, s),
-        nominal=_evaluated(updated.nominal, wanted, s),
+        labels=predicted,
+        values=_evaluate(updated.model, predicted, s),
+        nominal=_evaluate(updated.nominal, predicted, s),
         magnitude_low=low,
         magnitude_high=high,
         zeros=zeros,
@@ -82,18 +82,18 @@ def predict_frfs(
     )
 
 
-def _evaluated(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
     """FRFs of a model, (n_lines, n_frfs); there may be no point of interest."""
     return model_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
 
 
-def _bands(
-    updated: UpdatedModel, members: ModelEnsemble, labels: Sequence[FrfLabel], s: ComplexArray
+def _magnitude_bands(
+    updated: UpdatedModel, ensemble: ModelEnsemble, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
         for number, label in enumerate(labels):
             output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)
-            magnitude = np.abs(members.receptance(output, force, s) * s**label.quantity.power)
+            magnitude = np.abs(ensemble.receptance(output, force, s) * s**label.quantity.power)
             bands[:, :, number] = np.quantile(magnitude, BAND, axis=0)
     return bands[0], bands[1]

@@ -1,4 +1,4 @@
-"""What prediction gives: FRFs at points that were never measured."""
+"""What prediction gives: FRFs at points that were not measured."""
 
 from __future__ import annotations
 

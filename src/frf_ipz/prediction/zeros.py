@@ -1,4 +1,4 @@
-"""Zeros of predicted FRFs and how sure they are."""
+"""Zeros of predicted FRFs with their standard deviations."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
     from frf_ipz.structure import ReducedModel
 
-MOST_MEMBERS = 100  # of the ensemble: enough for a standard deviation
-SAME = 0.2  # relative distance within which a member's zero can be the same one
-SEEN = 0.8  # part of the members that must have the zero
-SHARP = 0.05  # relative standard deviation up to which a zero is known
+MAX_MEMBERS = 100  # of the ensemble: enough for a standard deviation
+SAME_ZERO = 0.2  # relative distance within which a member's zero can be the same one
+MIN_SHARE = 0.8  # part of the members that must have the zero
+MAX_STD = 0.05  # relative standard deviation up to which a zero is known
 GAUSSIAN = 0.6745  # median absolute deviation over standard deviation
 
 
@@ -34,7 +34,7 @@ def predicted_zeros(
     model : ReducedModel
         The updated model.
     ensemble : (m, 3, r, r) array
-        What remains open.
+        Models drawn from what targets and prior leave open.
     labels : sequence of FrfLabel
         The FRFs.
     band_rad_s : pair of float
@@ -52,23 +52,23 @@ def predicted_zeros(
     kinds: list[str] = []
     spread: list[tuple[float, float, float]] = []
     for number, label in enumerate(labels):
-        found = model_zeros(model, label)
-        inside = (np.abs(found.values) > band_rad_s[0]) & (np.abs(found.values) < band_rad_s[1])
-        places = np.flatnonzero(inside & (np.array(found.kind) != "real"))
-        values += found.values[places].tolist()
-        kinds += [found.kind[place] for place in places]
-        frf += [number] * len(places)
-        spread += _spread(model, ensemble[:MOST_MEMBERS], label, found.values[places])
+        zeros = model_zeros(model, label)
+        inside = (np.abs(zeros.values) > band_rad_s[0]) & (np.abs(zeros.values) < band_rad_s[1])
+        indices = np.flatnonzero(inside & (np.array(zeros.kind) != "real"))
+        values += zeros.values[indices].tolist()
+        kinds += [zeros.kind[index] for index in indices]
+        frf += [number] * len(indices)
+        spread += _spread(model, ensemble[:MAX_MEMBERS], label, zeros.values[indices])
     std = np.array(spread, float).reshape(-1, 3)
     reasons = tuple(_reason(value, row) for value, row in zip(values, std, strict=True))
-    zeros = ZeroSet(
+    zero_set = ZeroSet(
         values=np.array(values, complex),
         frf=np.array(frf, int),
         kind=tuple(kinds),
         identifiable=np.array([not reason for reason in reasons], bool),
         reason=reasons,
     )
-    return zeros, std[:, :2]
+    return zero_set, std[:, :2]
 
 
 def _spread(
@@ -84,24 +84,25 @@ def _spread(
         roots = roots[roots.imag > 0]
         distance = np.abs(roots[:, None] - values) / np.abs(values)
         best = distance.argmin(axis=0)
-        close = distance[best, np.arange(len(values))] < SAME
-        nearest[member, close] = roots[best[close]]
+        is_same = distance[best, np.arange(len(values))] < SAME_ZERO
+        nearest[member, is_same] = roots[best[is_same]]
     result = []
     for column, value in zip(nearest.T, values, strict=True):
-        off = column[~np.isnan(column)] - value
-        # the median keeps members out in which two zeros have met and left the axis
+        deviation = column[~np.isnan(column)] - value
+        # the median ignores members in which two zeros have met and left the axis
         real, imag = (
-            float(np.median(np.abs(part))) / GAUSSIAN if len(off) else np.nan for part in (off.real, off.imag)
+            float(np.median(np.abs(part))) / GAUSSIAN if len(deviation) else np.nan
+            for part in (deviation.real, deviation.imag)
         )
-        result.append((real, imag, len(off) / len(ensemble)))
+        result.append((real, imag, len(deviation) / len(ensemble)))
     return result
 
 
 def _reason(value: complex, spread: FloatArray) -> str:
     if np.isnan(spread[2]):
         return ""
-    if spread[2] < SEEN:
+    if spread[2] < MIN_SHARE:
         return f"{1 - spread[2]:.0%} of the models that fit the measurements have no such zero"
-    if spread[1] > SHARP * abs(value):
-        return f"the measurements leave it open by {spread[1] / abs(value):.0%} of its frequency"
+    if spread[1] > MAX_STD * abs(value):
+        return f"the measurements determine it to {spread[1] / abs(value):.0%} of its frequency only"
     return ""

@@ -1,1 +1,1 @@
-"""The reduced model brought to the measured poles and zeros."""
+"""Updating of the reduced model to the measured poles and zeros."""

@@ -1,6 +1,6 @@
-"""Where along the structure a change sits: a factor on the stiffness of every part of the FE model.
+"""Change along the structure: a factor on the stiffness of every part of the FE model.
 
-A method that has changed the parts says so itself, with the band that its targets leave open. For one that has changed
+A method that changes the parts gives the factors itself, with the band of its posterior. For one that has changed
 the reduced matrices only, the change is read back as the smallest change of the parts that explains it.
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 BAND = (0.05, 0.95)
-READ_BACK = 0.02  # of the largest entry of a relative change: what need not be explained by parts
+READ_BACK = 0.02  # of the largest entry of a relative change: the part that parts need not explain
 SIGNS = {-1: "softer", 1: "stiffer"}
 COLUMNS = (
     "kind",
@@ -39,14 +39,14 @@ COLUMNS = (
 )
 
 
-def change_along_structure(updated: UpdatedModel, full: StructuralModel) -> pd.DataFrame:
-    """Say how much softer or stiffer every part of the FE model has become.
+def change_along_structure(updated: UpdatedModel, fe_model: StructuralModel) -> pd.DataFrame:
+    """Tabulate the change of stiffness of every part of the FE model.
 
     Parameters
     ----------
     updated : UpdatedModel
         The result of an update, by any method.
-    full : StructuralModel
+    fe_model : StructuralModel
         The FE model that was reduced.
 
     Returns
@@ -58,14 +58,14 @@ def change_along_structure(updated: UpdatedModel, full: StructuralModel) -> pd.D
     """
     if len(updated.parts):
         return updated.parts
-    basis = structural_basis(full, updated.nominal)
+    basis = structural_basis(fe_model, updated.nominal)
     if not basis.regions:
         return pd.DataFrame(columns=COLUMNS)
-    changes = _relative(updated.nominal, np.concatenate([basis.stiffness, [_change(updated)]]))
-    of_parts, wanted = changes[:-1].T, changes[-1]
+    changes = _relative_changes(updated.nominal, np.concatenate([basis.stiffness, [_stiffness_change(updated)]]))
+    by_parts, change = changes[:-1].T, changes[-1]
     root = np.hstack([term.std * term.root for term in basis.terms])
-    noise = (READ_BACK * max(np.abs(wanted).max(), np.finfo(float).tiny)) ** 2 * np.eye(len(wanted))
-    theta = root @ solve_step(of_parts @ root, wanted, noise).mean
+    noise = (READ_BACK * max(np.abs(change).max(), np.finfo(float).tiny)) ** 2 * np.eye(len(change))
+    theta = root @ solve_step(by_parts @ root, change, noise).mean
     return part_table(basis.regions, 1 + theta[: len(basis.regions)])
 
 
@@ -79,21 +79,22 @@ def part_table(regions: Sequence[Region], ratios: FloatArray, draws: FloatArray 
     ratios : (n,) array
         Stiffness of each, updated over nominal.
     draws : (m, n) array, optional
-        The same of models drawn from what remains open.
+        The same of models drawn from the posterior.
 
     Returns
     -------
     DataFrame
         One row a part.
     """
-    none = draws is None or not len(draws)
-    low, high = np.full((2, len(regions)), np.nan) if draws is None or none else np.quantile(draws, BAND, axis=0)
-    places = np.array([region.coordinates_m for region in regions]).reshape(-1, 3)
+    low, high = np.full((2, len(regions)), np.nan)
+    if draws is not None and len(draws):
+        low, high = np.quantile(draws, BAND, axis=0)
+    positions = np.array([region.coordinates_m for region in regions]).reshape(-1, 3)
     values = (
         [region.kind for region in regions],
         [region.name for region in regions],
         [" ".join(str(node) for node in region.nodes) for region in regions],
-        *places.T,
+        *positions.T,
         ratios,
         low,
         high,
@@ -102,7 +103,7 @@ def part_table(regions: Sequence[Region], ratios: FloatArray, draws: FloatArray 
 
 
 def notable_changes(parts: pd.DataFrame) -> tuple[str, ...]:
-    """Name the stretches whose stiffness differs beyond the band, the largest change first.
+    """Describe the segments whose stiffness differs from the model beyond the band, the largest change first.
 
     Parameters
     ----------
@@ -112,39 +113,39 @@ def notable_changes(parts: pd.DataFrame) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        One sentence a stretch of neighbouring rows; none where every band holds 1, or there are no bands.
+        One sentence a segment of neighbouring rows; none where every band holds 1, or there are no bands.
     """
     ratio = parts["stiffness_ratio"].to_numpy(float)
     low, high = parts["stiffness_ratio_low"].to_numpy(float), parts["stiffness_ratio_high"].to_numpy(float)
     sign = np.where(high < 1, -1, np.where(low > 1, 1, 0))
     ends = np.flatnonzero(np.diff(sign)) + 1
-    stretches = [rows for rows in np.split(np.arange(len(sign)), ends) if len(rows) and sign[rows[0]]]
-    stretches.sort(key=lambda rows: -np.abs(np.log(ratio[rows])).max())
-    return tuple(_sentence(parts, rows, int(sign[rows[0]])) for rows in stretches)
+    segments = [rows for rows in np.split(np.arange(len(sign)), ends) if len(rows) and sign[rows[0]]]
+    segments.sort(key=lambda rows: -np.abs(np.log(ratio[rows])).max())
+    return tuple(_sentence(parts, rows, int(sign[rows[0]])) for rows in segments)
 
 
 def _sentence(parts: pd.DataFrame, rows: np.ndarray, sign: int) -> str:
     ratio = parts["stiffness_ratio"].to_numpy(float)
-    most = parts.iloc[int(rows[np.argmax(np.abs(np.log(ratio[rows])))])]
+    largest = parts.iloc[int(rows[np.argmax(np.abs(np.log(ratio[rows])))])]
     first, last = parts.iloc[int(rows[0])], parts.iloc[int(rows[-1])]
     where = f"{first['name']}" if len(rows) == 1 else f"{first['name']} to {last['name']}"
     return (
         f"{where} (nodes {first['nodes'].split()[0]} to {last['nodes'].split()[-1]}): {SIGNS[sign]} than modelled, "
-        f"most at {most['name']}: {most['stiffness_ratio']:.3g} times "
-        f"({most['stiffness_ratio_low']:.3g} to {most['stiffness_ratio_high']:.3g})"
+        f"most at {largest['name']}: {largest['stiffness_ratio']:.3g} times "
+        f"({largest['stiffness_ratio_low']:.3g} to {largest['stiffness_ratio_high']:.3g})"
     )
 
 
-def _change(updated: UpdatedModel) -> FloatArray:
+def _stiffness_change(updated: UpdatedModel) -> FloatArray:
     change = updated.model.stiffness - updated.nominal.stiffness
     return np.asarray((change + change.T) / 2)
 
 
-def _relative(model: ReducedModel, matrices: FloatArray) -> FloatArray:
+def _relative_changes(model: ReducedModel, matrices: FloatArray) -> FloatArray:
     """Upper triangles of changes, relative to ``omega_i omega_j`` in the model's modes: (n, k)."""
     poles = undamped_poles(model.mass, model.stiffness)
     shapes, squares = poles.right_vectors.real, np.maximum(poles.values.real, 0.0)
-    moving = squares > 1e-9 * squares.max()  # rigid-body modes have no stiffness to be relative to
-    scaled = shapes[:, moving] / np.sqrt(squares[moving])
-    inside = scaled.T @ matrices @ scaled
-    return np.asarray(inside[:, *np.triu_indices(inside.shape[1])])
+    elastic = squares > 1e-9 * squares.max()  # rigid-body modes have no stiffness to be relative to
+    scaled = shapes[:, elastic] / np.sqrt(squares[elastic])
+    modal = scaled.T @ matrices @ scaled
+    return np.asarray(modal[:, *np.triu_indices(modal.shape[1])])

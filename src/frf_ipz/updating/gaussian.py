@@ -1,13 +1,13 @@
-"""The linear Gaussian step of an update: the smallest change that meets the targets as far as they deserve.
+"""The linear Gaussian step of an update: the smallest change that meets the targets to within their noise.
 
 With the whitened parameters xi (prior: unit normal), data ``d = G xi + noise`` and the noise covariance R, the mean is
-``G^T (G G^T + R)^-1 d``: the change of least norm for weights that follow from R. How large changes have to be expected
-is not known beforehand; the standard deviations of the prior terms are those of the largest evidence ([MacKay1992],
-doi:10.1162/neco.1992.4.3.415), each with a log-normal prior of its own.
+``G^T (G G^T + R)^-1 d``: the change of least norm for weights that follow from R. The size of the changes is not known
+beforehand; the standard deviations of the prior terms are those of the largest evidence ([MacKay1992],
+doi:10.1162/neco.1992.4.3.415), each with a log-normal prior.
 
 How closely targets are met follows from the discrepancy principle: the weighted misfit must not exceed their number.
-Where the change that is likely does not bring it down so far, the targets contradict one another (or what a reduced
-model can express), and the slack, a variance on top of their covariance, grows until it does.
+Where the most likely change leaves a larger misfit, the targets contradict one another (or a reduced model cannot
+express them), and the slack, a variance on top of their covariance, grows until it does not.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
     from frf_ipz.updating.parameters import PriorTerm
 
-GROWTH = 1.5  # of the slack from try to try
-MAX_TRIES = 40  # up to ten million times the slack
+GROWTH = 1.5  # of the slack from trial to trial
+MAX_TRIALS = 40  # up to ten million times the slack
 MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
-FARTHEST = 6.0  # standard deviations of doubt that the search may try: a line search may leap out of all numbers
+MAX_DEVIATION = 6.0  # standard deviations of a scale's prior within which the search stays: a line search may overflow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GaussianStep:
-    """Mean and what is needed to draw from the posterior.
+    """Posterior mean of a linear step, and the gain that draws from the posterior need.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ class GaussianStep:
         ``G^T (G G^T + R)^-1``.
     misfit : float
         ``(d - G mean)^T R^-1 (d - G mean)``, to be compared with the number of data.
-    freedom : float
-        Data that the prior leaves free to be met: the trace of ``G gain``.
+    n_determined : float
+        Effective number of data that determine parameters against the prior: the trace of ``G gain``.
     """
 
     mean: FloatArray
     gain: FloatArray
     misfit: float
-    freedom: float
+    n_determined: float
 
 
 def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> GaussianStep:
@@ -74,12 +74,12 @@ def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> 
     total = sensitivity @ sensitivity.T + noise
     gain = cho_solve(cho_factor(total), sensitivity).T
     mean = gain @ data
-    left = data - sensitivity @ mean
+    error = data - sensitivity @ mean
     return GaussianStep(
         mean=mean,
         gain=gain,
-        misfit=float(left @ cho_solve(cho_factor(noise), left)),
-        freedom=float(np.einsum("nk,kn->", sensitivity, gain)),
+        misfit=float(error @ cho_solve(cho_factor(noise), error)),
+        n_determined=float(np.einsum("nk,kn->", sensitivity, gain)),
     )
 
 
@@ -99,14 +99,14 @@ def slack_by_discrepancy(
     slack : (n,) array
         Standard deviations of what no parameter explains, for a factor of 1.
     factor : float
-        The most likely factor: the smallest that is tried.
+        The most likely factor, where the search starts.
 
     Returns
     -------
     float
-        The factor by the discrepancy principle, to within its growth from try to try.
+        The factor by the discrepancy principle, to within its growth from trial to trial.
     """
-    for _ in range(MAX_TRIES):
+    for _ in range(MAX_TRIALS):
         if solve_step(sensitivity, data, noise + np.diag((factor * slack) ** 2)).misfit <= len(data):
             break
         factor *= GROWTH
@@ -116,7 +116,7 @@ def slack_by_discrepancy(
 def most_contradicted(
     sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float, *, least: float = 0.0
 ) -> int:
-    """Find the datum that all others and the prior contradict most.
+    """Find the datum that all other data and the prior contradict most.
 
     Parameters
     ----------
@@ -127,14 +127,14 @@ def most_contradicted(
     noise : (n, n) array
         R.
     limit : float
-        Standard deviations from what the others predict beyond which a datum is contradicted.
+        Standard deviations from the prediction by the other data beyond which a datum is contradicted.
     least : float
-        Data of a smaller modulus are not looked at.
+        Data of a smaller modulus are ignored.
 
     Returns
     -------
     int
-        Its place; -1 where none is beyond the limit.
+        Its index; -1 where none is beyond the limit.
     """
     inverse = np.linalg.inv(sensitivity @ sensitivity.T + noise)
     distance = np.where(np.abs(data) >= least, np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse)), 0.0)
@@ -145,7 +145,7 @@ def most_contradicted(
 def draw_posterior(
     step: GaussianStep, sensitivity: FloatArray, noise: FloatArray, rng: np.random.Generator, count: int
 ) -> FloatArray:
-    """Draw whitened parameters from the posterior: a draw of the prior, corrected by what its data would have shown.
+    """Draw whitened parameters from the posterior: a draw of the prior, corrected by its data.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def draw_posterior(
     rng : Generator
         Source of randomness.
     count : int
-        How many.
+        Number of draws.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def most_likely_scales(
     parts : sequence of (n, k_i) arrays
         Sensitivity of the data to each term's unit normal numbers, for a standard deviation of 1.
     terms : sequence of PriorTerm
-        The terms, with what is believed of their standard deviations beforehand.
+        The terms, with the priors of their standard deviations.
     data : (n,) array
         d.
     noise : (n, n) array
@@ -191,30 +191,30 @@ def most_likely_scales(
     Returns
     -------
     (t,) array
-        Standard deviations; those without doubt as they were.
+        Standard deviations; fixed ones as they were.
     """
     free = np.array([term.scale_uncertainty > 0 for term in terms])
     if not free.any() or not len(data):
         return start
     covariances = np.array([part @ part.T for part in parts])
-    believed = np.log([term.std for term in terms])
-    doubt = np.array([term.scale_uncertainty for term in terms])
+    prior_mean = np.log([term.std for term in terms])
+    prior_std = np.array([term.scale_uncertainty for term in terms])
 
     def cost(logs: FloatArray) -> tuple[float, FloatArray]:
-        everything = np.log(start)
-        everything[free] = logs
-        weights = np.exp(2 * everything)
+        log_scales = np.log(start)
+        log_scales[free] = logs
+        weights = np.exp(2 * log_scales)
         factor, _ = cho_factor(np.tensordot(weights, covariances, 1) + noise, lower=True)
         solved = cho_solve((factor, True), data)
         inverse = cho_solve((factor, True), np.eye(len(data)))
-        pull = (logs - believed[free]) / doubt[free]
-        value = 0.5 * data @ solved + np.log(np.diagonal(factor)).sum() + 0.5 * pull @ pull
+        deviation = (logs - prior_mean[free]) / prior_std[free]
+        value = 0.5 * data @ solved + np.log(np.diagonal(factor)).sum() + 0.5 * deviation @ deviation
         traces = np.einsum("tnm,nm->t", covariances, inverse - np.outer(solved, solved))
-        return float(value), (weights * traces)[free] + pull / doubt[free]
+        return float(value), (weights * traces)[free] + deviation / prior_std[free]
 
-    farthest = FARTHEST * doubt[free]
-    low, high = believed[free] - farthest, believed[free] + farthest
-    found = minimize(
+    limit = MAX_DEVIATION * prior_std[free]
+    low, high = prior_mean[free] - limit, prior_mean[free] + limit
+    optimum = minimize(
         cost,
         np.clip(np.log(start)[free], low, high),
         jac=True,
@@ -223,5 +223,5 @@ def most_likely_scales(
         options={"maxiter": MAX_SCALE_STEPS},
     )
     scales = start.copy()
-    scales[free] = np.exp(found.x)
+    scales[free] = np.exp(optimum.x)
     return scales

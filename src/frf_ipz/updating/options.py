@@ -10,21 +10,21 @@ from frf_ipz.toml_files import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdateOptions:
-    """How the reduced model is brought to the measured poles and zeros.
+    """How the reduced model is updated to the measured poles and zeros.
 
     Parameters
     ----------
     method : str
         ``minimal-change`` or ``ipz`` (as published), or the name of a further module in `updating.methods`.
     parameters : str
-        ``parts`` (those of the FE model and what they cannot express) or ``diagnosis`` (what was found missing, and
+        ``parts`` (those of the FE model, and generic changes beyond) or ``diagnosis`` (what a diagnosis has found, and
         nothing else; needs ``[diagnose] apply = true``).
     mass : bool
         Let the mass change too (minimal-change).
     damping : bool
         Change the damping after the stiffness.
     max_iterations : int, optional
-        Stop after that many; the method's own limit where it is left out.
+        Largest number of iterations; by default that of the method.
     alpha, beta, delta : float
         Regularisation, step and stop of ``ipz``, eqs. (15), (19) and (20) of the paper.
     delta_damping : float
@@ -32,9 +32,9 @@ class UpdateOptions:
     cross_sensitivities : bool
         Use the off-diagonal blocks of eq. (14) (``ipz``).
     ensemble : int
-        Models to draw from what targets and prior leave open (minimal-change); bands of predictions come from them.
+        Number of models drawn from the posterior (minimal-change), from which the bands of predictions follow.
     seed : int
-        Of the draws.
+        Seed of the draws.
     """
 
     __pydantic_config__ = STRICT

@@ -1,11 +1,11 @@
-"""What an update may change, and how likely each change is: matrices with a Gaussian prior.
+"""What an update may change, and how likely each change is: parameters with a Gaussian prior.
 
 The metric of a minimal change is the prior's: a change is small where it is likely. Three kinds of parameters are
 built here, and a diagnosis may bring its own.
 
 - Parts of the FE model (elements, springs, groups): the logarithm of a factor on each part's stiffness. A prior term
-  for all parts alike stands for a wrong modulus or thickness, terms whose correlation falls off with the distance for
-  stretches that are softer or stiffer than modelled.
+  common to all parts stands for a wrong modulus or thickness, terms whose correlation falls off with the distance for
+  segments that are softer or stiffer than modelled.
 - Every symmetric change of the reduced stiffness, relative to ``omega_i omega_j`` in mass-normalised modal
   coordinates: what the parts cannot express, and all there is where a model has no parts.
 - Factors on the masses of the parts, where the user lets the mass change.
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.structure import ReducedModel, StructuralModel
 
-GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a modulus or a thickness that is off
-STRETCH_STD = 0.05  # of each term with a correlation length
-STRETCH_LENGTHS = (0.05, 0.2)  # correlation lengths, as parts of the structure's extent
-REST_STD = 0.005  # of a relative change that no part expresses, beside parts
-FREE_STD = 0.05  # of the same where the model has no parts
-SENSOR_KG = 2e-3  # of the mass of a sensor that the model knows nothing of: accelerometers weigh some grams
+GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a wrong modulus or thickness
+SEGMENT_STD = 0.05  # of each term with a correlation length
+SEGMENT_LENGTHS = (0.05, 0.2)  # correlation lengths, as parts of the structure's extent
+GENERIC_STD = 0.005  # of a relative change that no part expresses, beside parts
+GENERIC_STD_ALONE = 0.05  # of the same where the model has no parts
+SENSOR_KG = 2e-3  # of the mass of a sensor that the model does not contain: accelerometers weigh some grams
 MASS_STD = 0.02  # masses are known better than stiffness
 SCALE_UNCERTAINTY = 1.0  # standard deviation of the logarithm of each of these: the data may ask for others
-SAME_PLACE = 1e-9  # two parts at one place differ by this much of their variance, so that it has a root
+SAME_POSITION = 1e-9  # of the variance, by which two parts at one position differ, so that it has a root
 MAX_FREE_MODES = 24  # a change among higher modes hardly moves what was measured
 
 
@@ -79,10 +79,10 @@ class ParameterBasis:
     terms : tuple of PriorTerm
         Their sum is the prior; its mean is 0.
     regions : tuple of Region
-        Where parameters that belong to a place sit: those of the first `len(regions)` parameters.
+        Regions of the first `len(regions)` parameters; empty for parameters without a location.
     is_from_diagnosis : bool
-        True where a diagnosis has named these very parameters; only then do methods with generic parameters of their
-        own use them instead.
+        True where a diagnosis has named these parameters; only then do methods with generic parameters of their own
+        use them instead.
 
     Raises
     ------
@@ -108,7 +108,7 @@ class ParameterBasis:
             require_shape(f"the prior term '{term.name}'", term.root, (count, None))
 
     def amounts(self, theta: FloatArray) -> FloatArray:
-        """How much of each matrix is added.
+        """Factors with which the matrices of the parameters are added.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class ParameterBasis:
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, theta, 0.0)), 1.0)
 
 
-def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = True) -> ParameterBasis:
+def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common: bool = True) -> ParameterBasis:
     """All symmetric changes of the reduced stiffness, relative in mass-normalised modal coordinates.
 
     Parameters
@@ -149,12 +149,12 @@ def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = 
         Of an entry of the change relative to ``omega_i omega_j``; of one on the diagonal it is larger by sqrt 2, so
         that the prior is the same in all rotated coordinates.
     common : bool
-        With a term for a factor on the whole stiffness.
+        Add a term for a factor on the whole stiffness.
 
     Returns
     -------
     ParameterBasis
-        One parameter an entry; rigid-body modes stay, since a change relative to nothing is nothing.
+        One parameter an entry; rigid-body modes do not change, as changes are relative to the stiffness.
     """
     poles = undamped_poles(model.mass, model.stiffness)
     omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:MAX_FREE_MODES]
@@ -181,39 +181,39 @@ def generic_basis(model: ReducedModel, *, std: float = FREE_STD, common: bool = 
 
 
 def structural_basis(
-    full: StructuralModel, model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof] = ()
+    fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof] = ()
 ) -> ParameterBasis:
-    """Factors on the parts of the FE model, sensors that weigh something, and what they cannot express.
+    """Factors on the parts of the FE model, masses of sensors, and generic changes that parts cannot express.
 
     Parameters
     ----------
-    full : StructuralModel
+    fe_model : StructuralModel
         The FE model.
-    model : ReducedModel
-        What it was reduced to.
+    reduced_model : ReducedModel
+        Its reduced model.
     mass : bool
         Let the masses of the parts change too.
     sensors : sequence of Dof
-        Sensors whose own mass is not known: it then sits there during the whole test, and may be estimated.
+        Sensors of unknown mass that are attached during the whole test: the mass is a parameter too.
 
     Returns
     -------
     ParameterBasis
-        The generic one in the place of parts where the model has none, or only one.
+        With generic parameters instead of parts where the model has none, or only one.
     """
-    regions = reduced_regions(full, model)
+    regions = reduced_regions(fe_model, reduced_model)
     if len(regions) < 2:
-        basis = generic_basis(model)
+        basis = generic_basis(reduced_model)
     else:
         basis = _part_basis(regions, stiffness=True)
         if mass:
             basis = join_bases(basis, _part_basis(regions, stiffness=False))
-        basis = join_bases(basis, generic_basis(model, std=REST_STD, common=False))
-    return join_bases(basis, _sensor_basis(model, sensors)) if sensors else basis
+        basis = join_bases(basis, generic_basis(reduced_model, std=GENERIC_STD, common=False))
+    return join_bases(basis, _sensor_basis(reduced_model, sensors)) if sensors else basis
 
 
 def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
-    """Put two sets of parameters together; their priors are independent.
+    """Join two sets of parameters with independent priors.
 
     Parameters
     ----------
@@ -225,9 +225,9 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
     ParameterBasis
         The parameters of the first, then those of the second.
     """
-    above, below = len(first.names), len(second.names)
-    terms = [replace(term, root=np.pad(term.root, ((0, below), (0, 0)))) for term in first.terms]
-    terms += [replace(term, root=np.pad(term.root, ((above, 0), (0, 0)))) for term in second.terms]
+    n_first, n_second = len(first.names), len(second.names)
+    terms = [replace(term, root=np.pad(term.root, ((0, n_second), (0, 0)))) for term in first.terms]
+    terms += [replace(term, root=np.pad(term.root, ((n_first, 0), (0, 0)))) for term in second.terms]
     return ParameterBasis(
         names=first.names + second.names,
         mass=np.concatenate([first.mass, second.mass]),
@@ -262,29 +262,29 @@ def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatAr
 
 
 def _sensor_basis(model: ReducedModel, sensors: Sequence[Dof]) -> ParameterBasis:
-    """Mass of each sensor, kg; one that measures a rotation is left alone."""
-    places = [dof for dof in dict.fromkeys(dof.unsigned for dof in sensors) if not dof.direction.startswith("r")]
-    rows = np.array([model.row(dof) for dof in places]).reshape(len(places), len(model.dofs))
+    """Mass of each sensor, kg; without those that measure a rotation."""
+    dofs = [dof for dof in dict.fromkeys(dof.unsigned for dof in sensors) if not dof.direction.startswith("r")]
+    rows = np.array([model.row(dof) for dof in dofs]).reshape(len(dofs), len(model.dofs))
     mass = np.einsum("ki,kj->kij", rows, rows)
     return ParameterBasis(
-        names=tuple(f"mass of the sensor at {dof.name}" for dof in places),
+        names=tuple(f"mass of the sensor at {dof.name}" for dof in dofs),
         mass=mass,
         damping=np.zeros_like(mass),
         stiffness=np.zeros_like(mass),
-        logarithmic=np.zeros(len(places), bool),
-        terms=(PriorTerm(name="mass of sensors", root=np.eye(len(places)), std=SENSOR_KG),),
+        logarithmic=np.zeros(len(dofs), bool),
+        terms=(PriorTerm(name="mass of sensors", root=np.eye(len(dofs)), std=SENSOR_KG),),
     )
 
 
 def _part_basis(regions: tuple[Region, ...], *, stiffness: bool) -> ParameterBasis:
     matrices = np.array([region.stiffness if stiffness else region.mass for region in regions])
-    nothing = np.zeros_like(matrices)
+    unchanged = np.zeros_like(matrices)
     scale = 1.0 if stiffness else MASS_STD / GLOBAL_STD
     return ParameterBasis(
         names=tuple(f"{'stiffness' if stiffness else 'mass'} of {region.name}" for region in regions),
-        mass=nothing if stiffness else matrices,
-        damping=nothing,
-        stiffness=matrices if stiffness else nothing,
+        mass=unchanged if stiffness else matrices,
+        damping=unchanged,
+        stiffness=matrices if stiffness else unchanged,
         logarithmic=np.ones(len(regions), bool),
         terms=_distance_terms(regions, scale, "stiffness" if stiffness else "mass"),
         regions=regions if stiffness else (),
@@ -293,12 +293,12 @@ def _part_basis(regions: tuple[Region, ...], *, stiffness: bool) -> ParameterBas
 
 def _distance_terms(regions: tuple[Region, ...], scale: float, what: str) -> tuple[PriorTerm, ...]:
     """One factor for all, and fields whose correlation falls off as exp(-distance / length): they may jump."""
-    places = np.array([region.coordinates_m for region in regions])
-    extent = max(float(np.ptp(places, axis=0).max()), np.finfo(float).tiny)
-    distance = cdist(places, places) / extent
+    positions = np.array([region.coordinates_m for region in regions])
+    extent = max(float(np.ptp(positions, axis=0).max()), np.finfo(float).tiny)
+    distance = cdist(positions, positions) / extent
     terms = [PriorTerm(name=f"a factor on the {what}", root=np.ones((len(regions), 1)), std=GLOBAL_STD * scale)]
-    for length in STRETCH_LENGTHS:
-        near = np.exp(-distance / length) + SAME_PLACE * np.eye(len(regions))
-        root = np.asarray(np.linalg.cholesky(near), np.float64)
-        terms.append(PriorTerm(name=f"{what} along {length:.0%} of the structure", root=root, std=STRETCH_STD * scale))
+    for length in SEGMENT_LENGTHS:
+        correlation = np.exp(-distance / length) + SAME_POSITION * np.eye(len(regions))
+        root = np.asarray(np.linalg.cholesky(correlation), np.float64)
+        terms.append(PriorTerm(name=f"{what} along {length:.0%} of the structure", root=root, std=SEGMENT_STD * scale))
     return tuple(terms)

@@ -1,7 +1,7 @@
-"""Sensors and blows that are not exactly where they should be: what that does to zeros.
+"""Effect of position errors of sensors and excitation on zeros.
 
-Poles belong to the structure, wherever it is struck. Zeros depend on both places: where the row of the output or of the
-input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'(z).
+Poles belong to the structure, wherever it is excited. Zeros depend on both positions: where the row of the output or
+of the input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'(z).
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PositionUncertainty:
-    """A place that is not known exactly, along one axis.
+    """Uncertainty of the position of a sensor or an excitation, along one axis.
 
     Parameters
     ----------
     dof : Dof
-        Of the sensor or the blow.
+        DOF of the sensor or the excitation.
     is_output : bool
         True for a sensor.
     row : (r,) array
-        By how much the row of the DOF is off, one standard deviation.
+        Change of the row of the DOF by one standard deviation of the position.
     """
 
     dof: Dof
@@ -38,7 +38,7 @@ class PositionUncertainty:
 
 
 def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[PositionUncertainty, ...]) -> FloatArray:
-    """Add what misplaced sensors and blows do to the covariance of the targets.
+    """Add the effect of position errors to the covariance of the targets.
 
     Parameters
     ----------
@@ -54,25 +54,25 @@ def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[Posit
     """
     if not misplacements:
         return problem.covariance
-    moved = np.zeros((len(problem.values), len(misplacements)), complex)
+    changes = np.zeros((len(problem.values), len(misplacements)), complex)
     for target in np.flatnonzero(problem.frf >= 0).tolist():
-        moved[target] = _moved(problem, target, misplacements)
-    parts = np.stack([moved.real, moved.imag], axis=1).reshape(2 * len(moved), len(misplacements))
+        changes[target] = _zero_changes(problem, target, misplacements)
+    parts = np.stack([changes.real, changes.imag], axis=1).reshape(2 * len(changes), len(misplacements))
     return np.asarray(problem.covariance + parts @ parts.T)
 
 
-def _moved(problem: UpdateProblem, target: int, misplacements: tuple[PositionUncertainty, ...]) -> ComplexArray:
-    """How far a zero moves with each misplacement, rad/s."""
+def _zero_changes(problem: UpdateProblem, target: int, misplacements: tuple[PositionUncertainty, ...]) -> ComplexArray:
+    """Change of a zero by one standard deviation of each position, rad/s."""
     model, zero, frf = problem.model, complex(problem.computed[target]), int(problem.frf[target])
     label = problem.labels[frf]
     output, force = problem.rows(frf)
     dynamic = zero**2 * model.mass + zero * model.damping + model.stiffness
-    motion, across = np.linalg.solve(dynamic, force), np.linalg.solve(dynamic.T, output)
-    slope = -across @ (2 * zero * model.mass + model.damping) @ motion
-    changed = [
-        one.row @ (motion if one.is_output else across)
-        if one.dof == (label.output_dof if one.is_output else label.input_dof)
+    motion, adjoint = np.linalg.solve(dynamic, force), np.linalg.solve(dynamic.T, output)
+    slope = -adjoint @ (2 * zero * model.mass + model.damping) @ motion
+    value_changes = [
+        position.row @ (motion if position.is_output else adjoint)
+        if position.dof == (label.output_dof if position.is_output else label.input_dof)
         else 0.0
-        for one in misplacements
+        for position in misplacements
     ]
-    return np.asarray(-np.array(changed, complex) / slope)
+    return np.asarray(-np.array(value_changes, complex) / slope)

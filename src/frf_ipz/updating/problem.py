@@ -1,4 +1,4 @@
-"""What every updating method is given: matrices, targets with their covariance, and parameters."""
+"""Input of every updating method: matrices, targets with their covariance, and parameters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UpdateProblem:
-    """A reduced model, and the poles and zeros that it is to be brought to.
+    """A reduced model, and the poles and zeros that it has to meet.
 
     Parameters
     ----------
@@ -66,34 +66,34 @@ class UpdateProblem:
         Returns
         -------
         tuple of (r,) arrays
-            Motion of the sensor's and of the struck DOF for unit motions of the retained ones.
+            Motion of the sensor's and of the excited DOF for unit motions of the retained ones.
         """
         label = self.labels[frf]
         return self.model.row(label.output_dof), self.model.row(label.input_dof)
 
-    def roots_near(self, model: ReducedModel, near: ComplexArray) -> ComplexArray:
-        """Find poles and zeros of a model nearest to given ones.
+    def nearest_roots(self, model: ReducedModel, reference: ComplexArray) -> ComplexArray:
+        """Find the poles and zeros of a model nearest to given ones.
 
         Parameters
         ----------
         model : ReducedModel
             The model, changed or not.
-        near : (n,) complex array
-            One for each target, rad/s.
+        reference : (n,) complex array
+            One value for each target, rad/s.
 
         Returns
         -------
         (n,) complex array
             The model's, one to one, imaginary part > 0, rad/s.
         """
-        wanted = TargetRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
-        values = np.zeros(len(near), complex)
-        for number, roots in wanted.damped(model.mass, model.damping, model.stiffness).items():
-            places = np.flatnonzero(wanted.frf == number)
+        targets = TargetRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
+        values = np.zeros(len(reference), complex)
+        for number, roots in targets.damped(model.mass, model.damping, model.stiffness).items():
+            indices = np.flatnonzero(targets.frf == number)
             upper = roots.values[roots.values.imag > 0]
-            distance = np.abs(near[places][:, None] - upper) / np.abs(near[places])[:, None]
+            distance = np.abs(reference[indices][:, None] - upper) / np.abs(reference[indices])[:, None]
             rows, columns = linear_sum_assignment(distance)
-            values[places[rows]] = upper[columns]
+            values[indices[rows]] = upper[columns]
         return values
 
 
@@ -107,7 +107,7 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
     fit : ModalFit
         Poles and zeros as measured, with their covariance.
     pairs : Pairs
-        Who belongs to whom.
+        Measured poles and zeros with their counterparts.
     basis : ParameterBasis, optional
         Parameters to use.
 
@@ -117,8 +117,8 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
         The paired poles and zeros, in the order of `Pairs.targets`.
     """
     targets = pairs.targets
-    place = np.array([pair.measured + (fit.n_modes if pair.kind == "zero" else 0) for pair in targets], int)
-    parts = (2 * place[:, None] + np.arange(2)).ravel()
+    indices = np.array([pair.measured + (fit.n_modes if pair.kind == "zero" else 0) for pair in targets], int)
+    parts = (2 * indices[:, None] + np.arange(2)).ravel()
     return UpdateProblem(
         model=model,
         labels=fit.labels,

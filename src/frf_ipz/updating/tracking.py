@@ -1,4 +1,4 @@
-"""Follow poles and zeros while the model changes: by their vectors, not by their order."""
+"""Tracking of poles and zeros while the model changes: by their vectors, not by their order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TargetRoots:
-    """Which poles and zeros are looked for.
+    """Poles and zeros that are targets.
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ class TargetRoots:
         Returns
         -------
         dict of int to Roots
-            Poles under -1, where any are wanted, and the zeros of every FRF, squared.
+            Poles under -1, where any are targets, and the zeros of every FRF, squared.
         """
-        found = {-1: undamped_poles(mass, stiffness)} if (self.frf < 0).any() else {}
-        return found | {number: undamped_zeros(mass, stiffness, *pair) for number, pair in self.rows.items()}
+        poles = {-1: undamped_poles(mass, stiffness)} if (self.frf < 0).any() else {}
+        return poles | {number: undamped_zeros(mass, stiffness, *pair) for number, pair in self.rows.items()}
 
     def damped(self, mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> dict[int, Roots]:
         """Compute all damped roots.
@@ -54,10 +54,10 @@ class TargetRoots:
         Returns
         -------
         dict of int to Roots
-            Poles under -1, where any are wanted, and the zeros of every FRF, rad/s.
+            Poles under -1, where any are targets, and the zeros of every FRF, rad/s.
         """
-        found = {-1: damped_poles(mass, damping, stiffness)} if (self.frf < 0).any() else {}
-        return found | {number: damped_zeros(mass, damping, stiffness, *pair) for number, pair in self.rows.items()}
+        poles = {-1: damped_poles(mass, damping, stiffness)} if (self.frf < 0).any() else {}
+        return poles | {number: damped_zeros(mass, damping, stiffness, *pair) for number, pair in self.rows.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +67,7 @@ class TrackedRoots:
     Parameters
     ----------
     groups : tuple of (IntArray, Roots)
-        Places among the targets, and their roots: poles first, then the zeros of each FRF.
+        Indices among the targets, and their roots: poles first, then the zeros of each FRF.
     """
 
     groups: tuple[tuple[IntArray, Roots], ...]
@@ -85,19 +85,21 @@ class TrackedRoots:
         (count,) complex array
             (rad/s)^2.
         """
-        everything = np.zeros(count, complex)
-        for places, roots in self.groups:
-            everything[places] = roots.values
-        return everything
+        values = np.zeros(count, complex)
+        for indices, roots in self.groups:
+            values[indices] = roots.values
+        return values
 
 
-def nominal_roots(wanted: TargetRoots, mass: FloatArray, stiffness: FloatArray, computed: ComplexArray) -> TrackedRoots:
+def nominal_roots(
+    targets: TargetRoots, mass: FloatArray, stiffness: FloatArray, computed: ComplexArray
+) -> TrackedRoots:
     """Find the undamped roots that the pairing named, by their modulus.
 
     Parameters
     ----------
-    wanted : TargetRoots
-        Which.
+    targets : TargetRoots
+        Poles and zeros that are targets.
     mass, stiffness : (r, r) array
         Of the nominal model.
     computed : (n,) complex array
@@ -109,21 +111,21 @@ def nominal_roots(wanted: TargetRoots, mass: FloatArray, stiffness: FloatArray, 
         One root a target.
     """
     groups = []
-    for number, roots in wanted.undamped(mass, stiffness).items():
-        places = np.flatnonzero(wanted.frf == number)
-        logs = np.log(np.abs(computed[places]))
+    for number, roots in targets.undamped(mass, stiffness).items():
+        indices = np.flatnonzero(targets.frf == number)
+        logs = np.log(np.abs(computed[indices]))
         distance = np.abs(logs[:, None] - 0.5 * np.log(np.abs(roots.values) + np.finfo(float).tiny)[None])
-        groups.append((places, roots.take(_assign(distance))))
+        groups.append((indices, roots.take(_assign(distance))))
     return TrackedRoots(groups=tuple(groups))
 
 
-def track(wanted: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffness: FloatArray) -> TrackedRoots:
+def track(targets: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffness: FloatArray) -> TrackedRoots:
     """Find the same roots in a changed model.
 
     Parameters
     ----------
-    wanted : TargetRoots
-        Which.
+    targets : TargetRoots
+        Poles and zeros that are targets.
     before : TrackedRoots
         In the model before the change.
     mass, stiffness : (r, r) array
@@ -135,22 +137,22 @@ def track(wanted: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffness
         Those whose vectors overlap most with the ones before.
     """
     groups = []
-    everything = wanted.undamped(mass, stiffness)
-    for places, old in before.groups:
-        new = everything[int(wanted.frf[places[0]])]
-        groups.append((places, new.take(_assign(-_overlap(old, new, mass, new.slope)))))
+    all_roots = targets.undamped(mass, stiffness)
+    for indices, old in before.groups:
+        new = all_roots[int(targets.frf[indices[0]])]
+        groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope)))))
     return TrackedRoots(groups=tuple(groups))
 
 
 def with_damping(
-    wanted: TargetRoots, undamped: TrackedRoots, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+    targets: TargetRoots, undamped: TrackedRoots, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
 ) -> TrackedRoots:
     """Find the damped roots that belong to undamped ones, by their vectors.
 
     Parameters
     ----------
-    wanted : TargetRoots
-        Which.
+    targets : TargetRoots
+        Poles and zeros that are targets.
     undamped : TrackedRoots
         Squared roots of the same model without damping.
     mass, damping, stiffness : (r, r) array
@@ -162,11 +164,11 @@ def with_damping(
         Of the upper half plane, rad/s.
     """
     groups = []
-    everything = wanted.damped(mass, damping, stiffness)
-    for places, old in undamped.groups:
-        new = everything[int(wanted.frf[places[0]])]
+    all_roots = targets.damped(mass, damping, stiffness)
+    for indices, old in undamped.groups:
+        new = all_roots[int(targets.frf[indices[0]])]
         new = new.take(np.flatnonzero(new.values.imag > 0))
-        groups.append((places, new.take(_assign(-_overlap(old, new, mass, new.slope / (2 * new.values))))))
+        groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope / (2 * new.values))))))
     return TrackedRoots(groups=tuple(groups))
 
 

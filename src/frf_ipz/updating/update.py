@@ -1,4 +1,4 @@
-"""Updating: the reduced model brought to the measured poles and zeros, by one of the methods in `updating.methods`.
+"""Updating of the reduced model to the measured poles and zeros, by one of the methods in `updating.methods`.
 
 Sits between pairing and prediction. A method is a module that offers
 ``update(problem, options, progress) -> UpdatedModel``; it is found by its name.
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Method(Protocol):
-    """What a module in `updating.methods` offers."""
+    """Interface of a module in `updating.methods`."""
 
     def update(self, problem: UpdateProblem, options: UpdateOptions, progress: Progress) -> UpdatedModel:
         """Update a model.
@@ -39,9 +39,9 @@ class Method(Protocol):
         problem : UpdateProblem
             Model, targets, parameters.
         options : UpdateOptions
-            What the user has chosen.
+            Options of the user.
         progress : Progress
-            Told how far the work is.
+            Reports how far the work is.
 
         Returns
         -------
@@ -60,7 +60,7 @@ def update_model(
     misplacements: tuple[PositionUncertainty, ...] = (),
     progress: Progress = silent,
 ) -> UpdatedModel:
-    """Bring a reduced model to the measured poles and zeros.
+    """Update a reduced model to the measured poles and zeros.
 
     Parameters
     ----------
@@ -69,21 +69,21 @@ def update_model(
     fit : ModalFit
         Poles and zeros as measured, with their covariance.
     pairs : Pairs
-        Who belongs to whom; only what is paired becomes a target.
+        Measured poles and zeros with their counterparts; only the paired ones become targets.
     options : UpdateOptions, optional
         Method and its settings.
     basis : ParameterBasis, optional
         What may change, and how likely: the parts of the FE model (`updating.parameters.structural_basis`) or what a
         diagnosis has chosen. Without it the method uses its own generic parameters.
     misplacements : tuple of PositionUncertainty
-        How far sensors and blows may be from their places: zeros count that much less.
+        Uncertainty of the positions of sensors and excitation: zeros weigh less by it.
     progress : Progress
-        Told how far the work is.
+        Reports how far the work is.
 
     Returns
     -------
     UpdatedModel
-        The updated model, how it was reached and what remains open; look at `status`.
+        The updated model, its history and its ensemble; see `status`.
 
     Raises
     ------
@@ -93,9 +93,9 @@ def update_model(
         If the matrices of the model cannot be worked with.
     """
     chosen = options or UpdateOptions()
-    known = method_names()
-    if chosen.method not in known:
-        raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, known)}")
+    available = method_names()
+    if chosen.method not in available:
+        raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, available)}")
     module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
     problem = make_problem(model, fit, pairs, basis)
     problem = replace(problem, covariance=with_position_uncertainty(problem, misplacements))
@@ -103,7 +103,7 @@ def update_model(
 
 
 def method_names() -> tuple[str, ...]:
-    """Names of the methods that are there.
+    """Names of the available methods.
 
     Returns
     -------

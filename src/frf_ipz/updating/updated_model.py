@@ -1,4 +1,4 @@
-"""What updating gives: the updated reduced model, how it was reached, and what remains open."""
+"""What updating gives: the updated reduced model, its history, and its ensemble."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class UpdateStatus(Enum):
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "stopped at the largest number of iterations: allow more, or look at the pairs"
-    NOTHING_TO_DO = "there is no target in the band: the model is left as it was"
+    NOTHING_TO_DO = "there is no target in the band: the model is unchanged"
     DIVERGED = "the misfit grew: a smaller step or other pairs may help"
 
 
@@ -30,9 +30,9 @@ class UpdatedModel:
     model : ReducedModel
         With the updated matrices.
     nominal : ReducedModel
-        What it was before.
+        The model before updating.
     method : str
-        Which method.
+        Name of the method.
     status : UpdateStatus
         How it ended.
     history : DataFrame
@@ -40,8 +40,7 @@ class UpdatedModel:
     before, after : (n_targets,) complex array
         Poles and zeros of the model before and after, in the order of `Pairs.targets`, rad/s.
     ensemble : (n_members, 3, r, r) array
-        Mass, damping and stiffness of models drawn from what targets and prior leave open; empty for a method that
-        does not say.
+        Mass, damping and stiffness of models drawn from the posterior; empty for a method without one.
     unmet : tuple of str
         Targets that cannot be met, and why.
     warnings : tuple of str
@@ -72,23 +71,23 @@ def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:
     model : ReducedModel
         The nominal model.
     method : str
-        Which method was asked for.
+        Name of the method.
 
     Returns
     -------
     UpdatedModel
-        The model as it was.
+        The nominal model.
     """
     order = len(model.dofs)
-    nothing = np.zeros(0, complex)
+    no_roots = np.zeros(0, complex)
     return UpdatedModel(
         model=model,
         nominal=model,
         method=method,
         status=UpdateStatus.NOTHING_TO_DO,
         history=pd.DataFrame({"phase": [], "iteration": [], "misfit": [], "step": []}),
-        before=nothing,
-        after=nothing,
+        before=no_roots,
+        after=no_roots,
         ensemble=np.zeros((0, 3, order, order)),
         warnings=(UpdateStatus.NOTHING_TO_DO.value,),
     )

@@ -28,7 +28,7 @@ def frfs():
     )
 
 
-def test_rows_are_sensors_columns_blows_and_what_was_not_measured_is_nan():
+def test_rows_are_sensors_columns_excited_dofs_and_unmeasured_pairs_nan():
     measured = frfs()
     data = measured_frd(measured)
     assert data.output_labels == ["2:+x", "4:-x"]

@@ -33,13 +33,13 @@ def test_the_frf_table_is_that_of_the_contract(tmp_path):
     assert (row.real, row.imag, row.averages, row.quantity, row.input_dof) == (6.0, -1.0, 1, "accelerance", "5:+z")
 
 
-def test_what_is_unknown_is_null_not_nan():
+def test_unknown_values_are_null_not_nan():
     table = frf_table(frfs())
     assert table["variance"].null_count == 6
     assert table["coherence"].null_count == 3
 
 
-def test_every_column_says_its_unit_and_meaning(tmp_path):
+def test_every_column_has_a_unit_and_a_meaning(tmp_path):
     write_table(frf_table(frfs()), tmp_path / "frf.parquet")
     schema = pq.read_schema(tmp_path / "frf.parquet")
     assert schema.field("frequency_hz").metadata[b"unit"] == b"Hz"

@@ -18,15 +18,15 @@ def test_rotations_have_moments_and_radians():
     assert [output.unit for output in ports.outputs] == ["rad/s", "m/s"]
 
 
-def test_a_sensor_that_two_blows_share_is_one_output_in_its_first_quantity():
-    other = FrfLabel(Dof(1, "ry"), Dof(4, "z"), FrfQuantity.RECEPTANCE)
-    ports = choose_ports((TURNED, other), (), ExportOptions(), {})
+def test_a_sensor_of_two_excitations_is_one_output_in_its_first_quantity():
+    of_moment = FrfLabel(Dof(1, "ry"), Dof(4, "z"), FrfQuantity.RECEPTANCE)
+    ports = choose_ports((TURNED, of_moment), (), ExportOptions(), {})
     assert [str(dof) for dof in ports.inputs] == ["2:+rz", "4:+z"]
     assert [output.quantity for output in ports.outputs] == [FrfQuantity.MOBILITY]
 
 
-@pytest.mark.parametrize("wanted", ["displacement", "velocity", "acceleration"])
-def test_all_outputs_can_be_of_one_kind(wanted):
-    ports = choose_ports((TURNED,), (Dof(3, "z"),), ExportOptions(outputs=wanted), {})
+@pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
+def test_all_outputs_can_be_of_one_kind(quantity):
+    ports = choose_ports((TURNED,), (Dof(3, "z"),), ExportOptions(outputs=quantity), {})
     powers = np.array([output.quantity.power for output in ports.outputs])
-    assert np.all(powers == ("displacement", "velocity", "acceleration").index(wanted))
+    assert np.all(powers == ("displacement", "velocity", "acceleration").index(quantity))

@@ -29,7 +29,7 @@ LABELS = (
 POINT = Dof(99, "x")
 
 
-def wanted(model, space, quantities):
+def expected_frfs(model, space, quantities):
     """FRFs of the matrices themselves, in the order of python-control: output, input, line."""
     inputs = (Dof(1, "x"), Dof(3, "x", -1))
     outputs = (Dof(2, "x"), Dof(4, "x", -1), POINT)
@@ -58,7 +58,7 @@ def test_the_state_space_has_the_frfs_of_the_matrices(name, outputs):
     model = MODELS[name]
     space = to_state_space(updated(model), LABELS, (POINT,), ExportOptions(outputs=outputs))
     quantity = FrfQuantity.ACCELERANCE if outputs == "measured" else frf_quantity_of(outputs)
-    expected = wanted(model, space, [quantity] * 3)
+    expected = expected_frfs(model, space, [quantity] * 3)
     assert np.abs(to_control(space)(S) - expected).max() < SAME * np.abs(expected).max()
     unit = {"displacement": "m", "velocity": "m/s"}.get(outputs, "m/s^2")
     assert space.output_units == (unit,) * 3
@@ -70,7 +70,7 @@ def test_every_sensor_keeps_its_own_quantity():
     space = to_state_space(updated(MODELS["chain"]), mixed, (POINT,))
     quantities = [FrfQuantity.ACCELERANCE, FrfQuantity.RECEPTANCE, FrfQuantity.ACCELERANCE]
     assert space.output_units == ("m/s^2", "m", "m/s^2")
-    expected = wanted(MODELS["chain"], space, quantities)
+    expected = expected_frfs(MODELS["chain"], space, quantities)
     assert np.abs(to_control(space)(S) / expected - 1).max() < 1e-8
 
 
@@ -90,8 +90,8 @@ def test_states_are_modes_of_one_size():
 def test_a_rigid_body_mode_is_scaled_by_a_rate_that_is_not_zero():
     stiff = chain(3, free=True)
     exact = replace(stiff, mass=np.eye(3), damping=np.zeros((3, 3)), stiffness=np.diag([0.0, 1e4, 4e4]))
-    for one in (exact, stiff):
-        space = to_state_space(updated(one), (label(1, 1), label(2, 1)), ())
+    for model in (exact, stiff):
+        space = to_state_space(updated(model), (label(1, 1), label(2, 1)), ())
         assert np.isfinite(space.A).all()
         assert space.A[0, 1] >= 1e-7 * np.abs(space.A).max()
 
@@ -138,7 +138,7 @@ def test_a_delay_is_a_pade_approximant_of_the_late_channel_alone(order):
     assert late.state_names[-1] == f"delay of 4:-x {order}"
 
 
-def test_delays_are_left_out_unless_asked_for():
+def test_delays_are_omitted_by_default():
     space = to_state_space(updated(MODELS["chain"]), LABELS, (), ExportOptions(), delays_s={"acc": 1e-3})
     assert len(space.A) == 10
 
@@ -170,7 +170,7 @@ def test_the_ensemble_has_the_members_matrices():
     spaces = to_ensemble(updated(model, members), LABELS, (POINT,), ExportOptions(ensemble=2))
     assert len(spaces) == 2
     stiffer = replace(model, stiffness=1.1 * model.stiffness)
-    expected = wanted(stiffer, spaces[1], [FrfQuantity.ACCELERANCE] * 3)
+    expected = expected_frfs(stiffer, spaces[1], [FrfQuantity.ACCELERANCE] * 3)
     assert np.abs(to_control(spaces[1])(S) - expected).max() < SAME * np.abs(expected).max()
     assert to_ensemble(updated(model), LABELS, (POINT,), ExportOptions(ensemble=2)) == ()
 

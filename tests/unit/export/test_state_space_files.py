@@ -30,12 +30,12 @@ def members_of(count, labels, points=()):
 def test_an_ensemble_loses_nothing(tmp_path, count, labels):
     _, members = members_of(count, labels)
     save_ensemble(members, tmp_path / "e.mat")
-    for found, member in zip(read_ensemble(tmp_path / "e.mat"), members, strict=True):
+    for restored, member in zip(read_ensemble(tmp_path / "e.mat"), members, strict=True):
         for field in fields(member):
-            assert_array_equal(getattr(found, field.name), getattr(member, field.name))
+            assert_array_equal(getattr(restored, field.name), getattr(member, field.name))
     s = 2j * np.pi * np.array([3.0, 40.0])
-    for found, member in zip(load_ensemble(tmp_path / "e.mat"), members, strict=True):
-        assert_array_equal(found(s), to_control(member)(s))
+    for restored, member in zip(load_ensemble(tmp_path / "e.mat"), members, strict=True):
+        assert_array_equal(restored(s), to_control(member)(s))
 
 
 def test_matlab_takes_members_as_its_model_arrays(tmp_path):
@@ -54,9 +54,9 @@ def test_weights_lose_nothing(tmp_path):
     whole, _ = members_of(5, (label(2, 1),))
     weights = uncertainty_weights(whole, (label(2, 1),), (POINT,), np.geomspace(1.0, 100.0, 40))
     save_weights(weights, tmp_path / "w.json")
-    found = read_weights(tmp_path / "w.json")
+    restored = read_weights(tmp_path / "w.json")
     for field in fields(weights):
-        assert_array_equal(getattr(found, field.name), getattr(weights, field.name))
+        assert_array_equal(getattr(restored, field.name), getattr(weights, field.name))
 
 
 @pytest.mark.parametrize(("read", "name"), [(read_ensemble, "e.mat"), (read_weights, "w.json")])

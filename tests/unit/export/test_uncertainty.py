@@ -24,8 +24,8 @@ def weights():
 
 def test_the_weight_bounds_the_members_and_stays_close(weights):
     assert weights.output_names == ("2:+x", "99:+x")
-    for place, system in enumerate(weights.to_control()):
-        bound, error = np.abs(system(2j * np.pi * LINES)), weights.relative_error[:, place]
+    for output, system in enumerate(weights.to_control()):
+        bound, error = np.abs(system(2j * np.pi * LINES)), weights.relative_error[:, output]
         assert np.all(bound >= error)
         assert bound.min() / error.max() < 10
         assert (bound / error).min() < 1 + 1e-6
@@ -39,8 +39,8 @@ def test_it_is_stable_and_so_is_its_inverse(weights):
 
 def test_the_error_is_that_of_the_row_over_all_inputs():
     """Static: every member is softer or stiffer by its factor, so the error is |1 / factor - 1|."""
-    found = uncertainty_weights(spread([0.8] * 10), LABELS, (), np.array([1e-3, 2e-3, 3e-3]))
-    np.testing.assert_allclose(found.relative_error, 0.25, rtol=1e-3)
+    weights = uncertainty_weights(spread([0.8] * 10), LABELS, (), np.array([1e-3, 2e-3, 3e-3]))
+    np.testing.assert_allclose(weights.relative_error, 0.25, rtol=1e-3)
 
 
 def test_without_an_ensemble_nothing_is_known():

@@ -1,4 +1,4 @@
-"""The assignment is the cheapest one, and says by how much."""
+"""The assignment is the cheapest one, with the right margin."""
 
 from itertools import permutations
 
@@ -12,7 +12,7 @@ from frf_ipz.pairing.matching import match
 
 
 def cheapest(costs, row_alone, column_alone):
-    """By trying all: every row has a column of its own or stays alone."""
+    """Cost by trying all: every row has its own column or stays unmatched."""
     rows, columns = costs.shape
     best = np.inf
     for choice in set(permutations([*range(columns), *[-1] * rows], rows)):
@@ -23,7 +23,7 @@ def cheapest(costs, row_alone, column_alone):
 
 
 @given(st.integers(0, 10_000))
-def test_it_is_the_cheapest_of_all(seed):
+def test_the_assignment_is_the_cheapest_of_all(seed):
     rng = np.random.default_rng(seed)
     rows, columns = rng.integers(1, 4, 2)
     costs = rng.uniform(0, 10, (rows, columns))
@@ -33,32 +33,32 @@ def test_it_is_the_cheapest_of_all(seed):
 
 def test_the_margin_is_what_the_second_best_costs_more():
     costs = np.array([[1.0, 3.0], [9.0, 2.0]])
-    found = match(costs, np.full(2, 5.0), np.zeros(2))
-    assert found.partner.tolist() == [0, 1]
+    matching = match(costs, np.full(2, 5.0), np.zeros(2))
+    assert matching.partner.tolist() == [0, 1]
     # without (0, 0): 0 takes 1 (3) and 1 stays alone (5): 8; or 0 stays alone (5) and 1 keeps 1 (2): 7
-    assert_allclose(found.margin, [4.0, 3.0], rtol=1e-12)
-    assert found.rival.tolist() == [-1, -1]
+    assert_allclose(matching.margin, [4.0, 3.0], rtol=1e-12)
+    assert matching.rival.tolist() == [-1, -1]
 
 
 def test_a_rival_is_named():
-    found = match(np.array([[1.0, 1.5]]), np.array([9.0]), np.zeros(2))
-    assert (found.partner[0], found.rival[0]) == (0, 1)
-    assert_allclose(found.margin, [0.5], rtol=1e-12)
+    matching = match(np.array([[1.0, 1.5]]), np.array([9.0]), np.zeros(2))
+    assert (matching.partner[0], matching.rival[0]) == (0, 1)
+    assert_allclose(matching.margin, [0.5], rtol=1e-12)
 
 
 @pytest.mark.parametrize("forbidden", [np.inf, np.nan])
-def test_what_must_not_be_is_not(forbidden):
-    found = match(np.array([[forbidden]]), np.array([9.0]), np.zeros(1))
-    assert found.partner[0] == -1
+def test_a_forbidden_pair_is_not_assigned(forbidden):
+    matching = match(np.array([[forbidden]]), np.array([9.0]), np.zeros(1))
+    assert matching.partner[0] == -1
 
 
-def test_a_column_that_should_not_stay_alone_is_taken():
+def test_a_column_that_should_not_stay_unmatched_is_assigned():
     costs = np.array([[1.0, 2.0]])
     assert match(costs, np.array([9.0]), np.array([0.0, 0.0])).partner[0] == 0
     assert match(costs, np.array([9.0]), np.array([0.0, 5.0])).partner[0] == 1
 
 
-def test_nothing_against_nothing():
-    found = match(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
-    assert found.cost == 0
-    assert len(found.partner) == 0
+def test_an_empty_assignment_costs_nothing():
+    matching = match(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+    assert matching.cost == 0
+    assert len(matching.partner) == 0

@@ -27,12 +27,12 @@ BAND = (5.0, 120.0)
 
 def measured(model, labels=LABELS, *, poles=None, zeros=True, gain=1.0):
     """The fit of a model that a perfect measurement gives: its own poles, residues and zeros."""
-    found = model_poles(model, labels)
-    chosen = range(len(found.values)) if poles is None else poles
-    values, amplitudes = found.values[list(chosen)], found.amplitudes[list(chosen)]
-    powers = np.array([one.quantity.power for one in labels])
+    computed = model_poles(model, labels)
+    chosen = range(len(computed.values)) if poles is None else poles
+    values, amplitudes = computed.values[list(chosen)], computed.amplitudes[list(chosen)]
+    powers = np.array([frf_label.quantity.power for frf_label in labels])
     residues = gain * amplitudes / (2j * np.abs(values))[:, None] * values[:, None] ** powers
-    shown = [complex_zeros(model, one) if zeros else ([], []) for one in labels]
+    shown = [complex_zeros(model, frf_label) if zeros else ([], []) for frf_label in labels]
     roots = [values for values, _ in shown]
     all_zeros = np.concatenate(roots).astype(complex)
     fitted = PoleResidueModel(
@@ -43,18 +43,18 @@ def measured(model, labels=LABELS, *, poles=None, zeros=True, gain=1.0):
         scale_rad_s=1.0,
         delay_s=np.zeros(len(labels)),
     )
-    where = np.repeat(np.arange(len(labels)), [len(one) for one in roots])
+    where = np.repeat(np.arange(len(labels)), [len(zeros_of_frf) for zeros_of_frf in roots])
     kinds = [kind for _, kinds in shown for kind in kinds]
     std = np.repeat(1e-5 * np.abs(np.concatenate([values, all_zeros])), 2)
     nothing = np.zeros((len(values), len(labels), 2, 2))
     return make_modal_fit(fitted, labels, BAND, all_zeros, where, kinds, np.diag(std**2), nothing)
 
 
-def complex_zeros(model, one):
+def complex_zeros(model, frf_label):
     """Those that show as antiresonances, and their kinds."""
-    found = model_zeros(model, one)
-    places = [place for place, kind in enumerate(found.kind) if kind == "complex"]
-    return found.values[places], ["complex"] * len(places)
+    computed = model_zeros(model, frf_label)
+    indices = [index for index, kind in enumerate(computed.kind) if kind == "complex"]
+    return computed.values[indices], ["complex"] * len(indices)
 
 
 def test_a_model_is_paired_with_itself_throughout():
@@ -70,14 +70,14 @@ def test_a_model_is_paired_with_itself_throughout():
 
 def test_residues_of_the_model_rebuild_its_frf():
     model = chain(damping=0.02)
-    found = measured(model, zeros=False)
+    fit = measured(model, zeros=False)
     s = 2j * np.pi * np.linspace(2.0, 150.0, 40)
-    assert_allclose(found.model(s), model_frfs(model, LABELS, s), rtol=1e-9)
+    assert_allclose(fit.model(s), model_frfs(model, LABELS, s), rtol=1e-9)
 
 
 @pytest.mark.parametrize("quantity", list(FrfQuantity))
 def test_pairing_does_not_depend_on_the_quantity(quantity):
-    labels = tuple(replace(one, quantity=quantity) for one in LABELS)
+    labels = tuple(replace(frf_label, quantity=quantity) for frf_label in LABELS)
     model = chain()
     stiffer = replace(model, stiffness=1.15 * model.stiffness)
     pairs = pair(measured(stiffer, labels), model)
@@ -98,7 +98,7 @@ def test_a_common_factor_on_all_frequencies_is_no_obstacle():
 
 
 @pytest.mark.parametrize("quantity", list(FrfQuantity))
-def test_shapes_tell_swapped_modes_apart(quantity):
+def test_shapes_separate_swapped_modes(quantity):
     """Two loops of one stiffness and another mass each: the heavier one has the lower frequency."""
     model = two_loops(1.00, 1.06)
     swapped = two_loops(1.06, 1.00)
@@ -111,9 +111,9 @@ def two_loops(first, second):
     return replace(model, mass=np.diag([first, second]), stiffness=1e5 * np.eye(2), damping=np.eye(2))
 
 
-def test_a_polarity_that_is_turned_is_found_and_said():
+def test_a_reversed_polarity_is_found_and_reported():
     model = chain()
-    turned = tuple(replace(one, output_dof=replace(one.output_dof, sign=-1)) for one in LABELS)
+    turned = tuple(replace(frf_label, output_dof=replace(frf_label.output_dof, sign=-1)) for frf_label in LABELS)
     fit = measured(model, LABELS)
     pairs = pair(replace(fit, labels=turned), model)
     assert f"polarity of {turned[0]}, {turned[1]} is opposite" in pairs.warnings[-1]
@@ -128,7 +128,7 @@ def test_a_mode_that_was_not_measured_is_missing_in_the_measurement():
     assert [row.computed for row in pairs.targets] == [0, 1, 3, 4]
 
 
-def test_a_mode_that_the_model_lacks_is_said_and_is_no_target():
+def test_a_mode_that_the_model_lacks_is_reported_and_is_no_target():
     richer, model = chain(5), chain(5)
     fit = measured(richer, zeros=False)
     extra = 2j * np.pi * 200.0 - 5.0
@@ -186,19 +186,19 @@ def test_a_real_zero_is_no_target():
 
 
 def test_quadruples_are_listed_once():
-    """Far from the blow a beam's zeros leave the axis; each stands for four."""
+    """Far from the excitation a beam's zeros leave the axis; each stands for four."""
     seeds_with = 0
     for seed in SEEDS:
         case = make_update_case(seed)
-        for one in case.labels:
-            zeros = model_zeros(case.reduced_model, one)
+        for frf_label in case.labels:
+            zeros = model_zeros(case.reduced_model, frf_label)
             quadruples = zeros.values[np.array(zeros.kind) == "quadruple"]
             seeds_with += len(quadruples) > 0
             assert np.all(quadruples.real < 0)
             shown = zeros.values[np.abs(zeros.values.imag) > 1e-6 * np.abs(zeros.values)]
             for value in shown[shown.real > 1e-4 * np.abs(shown)]:
-                left = shown[shown.real < 0]
-                assert np.abs(left + value.conj()).min(initial=np.inf) > 0.5 * value.real
+                mirrored = shown[shown.real < 0]
+                assert np.abs(mirrored + value.conj()).min(initial=np.inf) > 0.5 * value.real
             gaps = np.abs(quadruples[:, None] + quadruples.conj()) + np.eye(len(quadruples)) * 1e9
             assert gaps.min(initial=1e9) > 1e-6
     assert seeds_with > 0
@@ -217,27 +217,27 @@ def test_no_pole_is_paired_wrongly(seed):
         if row.kind == "pole":
             real = int(np.argmin(np.abs(case.true_modes.omega - abs(row.measured_value))))
             sure = alike[real, partner[real]] > 0.8  # below, two modes have mixed and neither answer is wrong
-            found = int(np.argmin(np.abs(nominal.omega - abs(row.computed_value))))
-            assert found == partner[real] or not sure
+            assigned = int(np.argmin(np.abs(nominal.omega - abs(row.computed_value))))
+            assert assigned == partner[real] or not sure
 
 
 def test_the_slope_at_zeros_is_that_of_the_frf():
     model = chain(damping=0.001)
-    one = FrfLabel(Dof(2, "x"), Dof(2, "x"), FrfQuantity.RECEPTANCE)
-    zeros = model_zeros(model, one)
+    frf_label = FrfLabel(Dof(2, "x"), Dof(2, "x"), FrfQuantity.RECEPTANCE)
+    zeros = model_zeros(model, frf_label)
     step = 1e-5j * np.abs(zeros.values)
-    beside = [model_frfs(model, [one], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
-    assert np.array_equal(np.sign(beside[0] - beside[1]), zeros.slope_sign)
+    nearby = [model_frfs(model, [frf_label], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
+    assert np.array_equal(np.sign(nearby[0] - nearby[1]), zeros.slope_sign)
 
 
-def test_the_slope_tells_two_zeros_apart():
-    """The nearer one rises where the measured FRF falls: the other one it is."""
+def test_the_slope_separates_two_zeros():
+    """The nearer zero has the opposite slope of the measured one, so the farther one is its partner."""
     model = chain(damping=0.001)
     fit = measured(model)
-    place = int(np.flatnonzero(fit.zeros.frf == 0)[0])
+    index = int(np.flatnonzero(fit.zeros.frf == 0)[0])
     alone = replace(
         fit.zeros,
-        values=fit.zeros.values[[place]],
+        values=fit.zeros.values[[index]],
         frf=np.array([0]),
         kind=("complex",),
         identifiable=np.array([True]),
@@ -245,13 +245,13 @@ def test_the_slope_tells_two_zeros_apart():
     )
     value = alone.values[0]
     sign = measured_slope_sign(fit.model, 0, 0, alone.values)[0]
-    one = replace(fit, zeros=alone, covariance=1e-6 * np.eye(2 * fit.n_modes + 2))
+    fit_of_one = replace(fit, zeros=alone, covariance=1e-6 * np.eye(2 * fit.n_modes + 2))
     choice = ModelZeros(
         values=np.array([0.985 * value, 1.01 * value]), kind=("complex",) * 2, slope_sign=np.array([sign, -sign])
     )
     nothing = np.zeros(0), np.zeros(0)
-    assert pair_zeros(one, 0, choice, nothing, 1.0).matching.partner.tolist() == [0]
-    assert pair_zeros(one, 0, choice, nothing, -1.0).matching.partner.tolist() == [1]
+    assert pair_zeros(fit_of_one, 0, choice, nothing, 1.0).matching.partner.tolist() == [0]
+    assert pair_zeros(fit_of_one, 0, choice, nothing, -1.0).matching.partner.tolist() == [1]
 
 
 def test_a_zero_on_a_pole_is_no_obstacle():

@@ -17,35 +17,35 @@ SAME = 1e-8  # relative to the peak: modes and matrices solve one problem in two
 
 def members(models):
     ensemble = np.array([(model.mass, model.damping, model.stiffness) for model in models])
-    return ModelEnsemble(ensemble=ensemble, lowest_rad_s=float(np.abs(S).min()))
+    return ModelEnsemble(matrices=ensemble, lowest_rad_s=float(np.abs(S).min()))
 
 
 @pytest.mark.parametrize("damping", [0.001, 0.3], ids=["light", "heavy"])
 def test_receptances_are_those_of_the_matrices(damping):
     models = [chain(seed=seed, damping=damping, between=True) for seed in range(4)]
-    one = label(99, 3)
-    output, force = models[0].row(one.output_dof), models[0].row(one.input_dof)
-    found = members(models).receptance(output, force, S)
-    for member, model in zip(found, models, strict=True):
-        expected = model_frfs(model, [one], S)[:, 0]
+    frf_label = label(99, 3)
+    output, force = models[0].row(frf_label.output_dof), models[0].row(frf_label.input_dof)
+    computed = members(models).receptance(output, force, S)
+    for member, model in zip(computed, models, strict=True):
+        expected = model_frfs(model, [frf_label], S)[:, 0]
         assert np.abs(member - expected).max() < SAME * np.abs(expected).max()
 
 
 def test_a_body_that_is_free_to_fly_has_no_division_by_zero():
     model = chain(free=True)
-    one = label(1, 5)
-    found = members([model]).receptance(model.row(one.output_dof), model.row(one.input_dof), S)[0]
-    expected = model_frfs(model, [one], S)[:, 0]
-    assert_allclose(found, expected, rtol=1e-4)  # its rigid-body mode is given a thousandth of the lowest frequency
+    frf_label = label(1, 5)
+    computed = members([model]).receptance(model.row(frf_label.output_dof), model.row(frf_label.input_dof), S)[0]
+    expected = model_frfs(model, [frf_label], S)[:, 0]
+    assert_allclose(computed, expected, rtol=1e-4)  # its rigid-body mode is given a thousandth of the lowest frequency
 
 
 def test_amplitudes_are_products_of_mass_normalised_shapes():
     model = chain()
-    one = label(2, -4)
-    found = members([model]).amplitudes(model.row(one.output_dof), model.row(one.input_dof), 3)
+    frf_label = label(2, -4)
+    computed = members([model]).amplitudes(model.row(frf_label.output_dof), model.row(frf_label.input_dof), 3)
     shapes = undamped_poles(model.mass, model.stiffness).right_vectors.real
-    assert found.shape == (1, 3)
-    assert_allclose(found[0], -shapes[1, :3] * shapes[3, :3], rtol=1e-9)
+    assert computed.shape == (1, 3)
+    assert_allclose(computed[0], -shapes[1, :3] * shapes[3, :3], rtol=1e-9)
 
 
 def test_a_negative_stiffness_counts_as_none():

@@ -41,62 +41,71 @@ def local_spread(model, count=100):
     return [(model.mass, model.damping, model.stiffness + 2e4 * rng.standard_normal() * last) for _ in range(count)]
 
 
-def test_values_are_those_of_the_model_from_every_blow_to_every_point():
+def test_values_are_those_of_the_model_from_every_excited_dof_to_every_point():
     model = chain(between=True)
-    found = predict_frfs(updated(model), POINTS, LABELS, LINES)
-    assert [str(one) for one in found.labels] == ["5:-x / 1:+x", "5:-x / 3:-x", "99:+x / 1:+x", "99:+x / 3:-x"]
-    assert {one.quantity for one in found.labels} == {FrfQuantity.ACCELERANCE}
+    prediction = predict_frfs(updated(model), POINTS, LABELS, LINES)
+    assert [str(frf_label) for frf_label in prediction.labels] == [
+        "5:-x / 1:+x",
+        "5:-x / 3:-x",
+        "99:+x / 1:+x",
+        "99:+x / 3:-x",
+    ]
+    assert {frf_label.quantity for frf_label in prediction.labels} == {FrfQuantity.ACCELERANCE}
     s = 2j * np.pi * LINES
-    assert_allclose(found.values, model_frfs(model, found.labels, s), rtol=1e-12)
-    assert_allclose(found.nominal, model_frfs(updated(model).nominal, found.labels, s), rtol=1e-12)
+    assert_allclose(prediction.values, model_frfs(model, prediction.labels, s), rtol=1e-12)
+    assert_allclose(prediction.nominal, model_frfs(updated(model).nominal, prediction.labels, s), rtol=1e-12)
 
 
 def test_bands_are_quantiles_of_the_members():
     model = chain(between=True)
     ensemble = spread(model, 0.02)
-    found = predict_frfs(updated(model, ensemble), POINTS, LABELS, LINES)
+    prediction = predict_frfs(updated(model, ensemble), POINTS, LABELS, LINES)
     s = 2j * np.pi * LINES
-    each = [np.abs(model_frfs(replace(model, stiffness=k), found.labels[:1], s)[:, 0]) for _, _, k in ensemble]
-    low, high = np.quantile(each, [0.05, 0.95], axis=0)
-    assert_allclose(found.magnitude_low[:, 0], low, rtol=1e-6)
-    assert_allclose(found.magnitude_high[:, 0], high, rtol=1e-6)
+    magnitudes = [
+        np.abs(model_frfs(replace(model, stiffness=k), prediction.labels[:1], s)[:, 0]) for _, _, k in ensemble
+    ]
+    low, high = np.quantile(magnitudes, [0.05, 0.95], axis=0)
+    assert_allclose(prediction.magnitude_low[:, 0], low, rtol=1e-6)
+    assert_allclose(prediction.magnitude_high[:, 0], high, rtol=1e-6)
 
 
 def test_zeros_come_with_their_spread():
     """A common factor moves every zero by half its relative size."""
     model = chain(between=True)
-    found = predict_frfs(updated(model, spread(model, 0.004)), POINTS, LABELS, LINES)
-    assert found.zeros.identifiable.all()
-    assert len(found.zeros.values) > 2
-    assert_allclose(found.zero_std[:, 1], 0.002 * np.abs(found.zeros.values), rtol=0.35)  # of a hundred members
-    s = found.zeros.values
-    for place, value in enumerate(s):
-        one = found.labels[found.zeros.frf[place]]
-        beside = np.abs(model_frfs(model, [one], np.array([1.05 * value]))[0, 0])
-        assert np.abs(model_frfs(model, [one], np.array([value]))[0, 0]) < 1e-8 * beside
+    prediction = predict_frfs(updated(model, spread(model, 0.004)), POINTS, LABELS, LINES)
+    assert prediction.zeros.identifiable.all()
+    assert len(prediction.zeros.values) > 2
+    assert_allclose(
+        prediction.zero_std[:, 1], 0.002 * np.abs(prediction.zeros.values), rtol=0.35
+    )  # of a hundred members
+    s = prediction.zeros.values
+    for index, value in enumerate(s):
+        frf_label = prediction.labels[prediction.zeros.frf[index]]
+        nearby = np.abs(model_frfs(model, [frf_label], np.array([1.05 * value]))[0, 0])
+        assert np.abs(model_frfs(model, [frf_label], np.array([value]))[0, 0]) < 1e-8 * nearby
 
 
-def test_a_zero_that_most_members_lack_is_said():
+def test_a_zero_that_most_members_lack_is_not_identifiable():
     model = chain(between=True)
-    other = chain(between=True, seed=9)
-    members = [(other.mass, other.damping, 4 * other.stiffness)] * 60 + spread(model, 0.001, 40)
-    found = predict_frfs(updated(model, members), POINTS, LABELS, LINES)
-    assert not found.zeros.identifiable.all()
-    assert any("have no such zero" in reason for reason in found.zeros.reason)
+    different = chain(between=True, seed=9)
+    members = [(different.mass, different.damping, 4 * different.stiffness)] * 60 + spread(model, 0.001, 40)
+    prediction = predict_frfs(updated(model, members), POINTS, LABELS, LINES)
+    assert not prediction.zeros.identifiable.all()
+    assert any("have no such zero" in reason for reason in prediction.zeros.reason)
 
 
 def test_without_an_ensemble_there_are_no_bands_and_no_warnings():
-    found = predict_frfs(updated(chain(between=True)), POINTS, LABELS, LINES)
-    assert np.isnan(found.magnitude_low).all()
-    assert np.isnan(found.zero_std).all()
-    assert found.warnings == ()
-    assert found.zeros.identifiable.all()
+    prediction = predict_frfs(updated(chain(between=True)), POINTS, LABELS, LINES)
+    assert np.isnan(prediction.magnitude_low).all()
+    assert np.isnan(prediction.zero_std).all()
+    assert prediction.warnings == ()
+    assert prediction.zeros.identifiable.all()
 
 
 def test_without_points_there_is_nothing_to_predict():
-    found = predict_frfs(updated(chain(), spread(chain(), 0.1)), (), LABELS, LINES)
-    assert found.values.shape == (400, 0)
-    assert len(found.zeros.values) == 0
+    prediction = predict_frfs(updated(chain(), spread(chain(), 0.1)), (), LABELS, LINES)
+    assert prediction.values.shape == (400, 0)
+    assert len(prediction.zeros.values) == 0
 
 
 def test_narrow_bands_are_no_reason_to_warn():
@@ -104,36 +113,36 @@ def test_narrow_bands_are_no_reason_to_warn():
     assert predict_frfs(updated(model, spread(model, 1e-4)), POINTS, LABELS, LINES).warnings == ()
 
 
-def test_a_wide_band_says_where_why_and_what_would_narrow_it():
+def test_a_wide_band_is_explained_with_advice():
     model = chain(between=True)
-    found = predict_frfs(updated(model, local_spread(model)), (Dof(5, "x"),), (label(2, 1),), LINES)
-    assert found.warnings
-    assert "the 90 % band is up to" in found.warnings[0]
-    assert "open" in found.warnings[0]
-    assert any("would narrow it most" in text for text in found.warnings)
+    prediction = predict_frfs(updated(model, local_spread(model)), (Dof(5, "x"),), (label(2, 1),), LINES)
+    assert prediction.warnings
+    assert "the 90 % band is up to" in prediction.warnings[0]
+    assert "determine" in prediction.warnings[0]
+    assert any("would narrow it most" in text for text in prediction.warnings)
 
 
 def test_the_sensor_that_is_advised_narrows_the_band():
     """Measure what was advised: the members that agree with it spread less than all of them."""
     model = chain(between=True)
     members = local_spread(model, 400)
-    found = predict_frfs(updated(model, members), (Dof(5, "x"),), (label(2, 1),), LINES)
-    text = next(text for text in found.warnings if "would narrow it most" in text)
+    prediction = predict_frfs(updated(model, members), (Dof(5, "x"),), (label(2, 1),), LINES)
+    text = next(text for text in prediction.warnings if "would narrow it most" in text)
     words = text.split("; ")[-1].split()
     node = int(words[words.index("at") + 1].split(":")[0])
-    assert node in {3, 4, 99} or "blow" in text
+    assert node in {3, 4, 99} or "excitation" in text
 
 
-def test_wide_stretches_are_joined_and_short_ones_left_out():
+def test_wide_bands_are_joined_and_short_ones_omitted():
     lines = np.linspace(10.0, 20.0, 101)
     high = np.ones((101, 1))
     wide = 10 ** (2.2 * WIDE_DB / 20)
-    high[10:20] = high[22:30] = wide  # two stretches with a narrow gap
+    high[10:20] = high[22:30] = wide  # two bands with a narrow gap
     high[60:62] = wide  # too short
-    found = wide_bands(lines, np.ones((101, 1)), high)
-    assert len(found) == 1
-    assert (found[0].lines[0], found[0].lines[-1]) == (10, 29)
-    assert_allclose(found[0].half_width_db, 1.1 * WIDE_DB, rtol=1e-9)
+    prediction = wide_bands(lines, np.ones((101, 1)), high)
+    assert len(prediction) == 1
+    assert (prediction[0].lines[0], prediction[0].lines[-1]) == (10, 29)
+    assert_allclose(prediction[0].half_width_db, 1.1 * WIDE_DB, rtol=1e-9)
 
 
 def test_a_point_that_the_model_does_not_know_is_refused():
@@ -157,5 +166,5 @@ def test_points_need_not_be_retained():
     case = make_update_case(3)
     expanded = [dof for dof in case.reduced_model.expanded_dofs if dof not in case.reduced_model.dofs]
     model = updated(case.reduced_model)
-    found = predict_frfs(model, expanded[:2], case.labels, np.linspace(*case.fit.band_hz, 50))
-    assert np.isfinite(found.values).all()
+    prediction = predict_frfs(model, expanded[:2], case.labels, np.linspace(*case.fit.band_hz, 50))
+    assert np.isfinite(prediction.values).all()

@@ -13,7 +13,7 @@ from frf_ipz.updating.parameters import structural_basis
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.study import make_update_case
 
-LOCAL, GLOBAL = 11, 7  # a beam that is off in stretches, and a plate whose stiffness is 20 % lower throughout
+LOCAL, GLOBAL = 11, 7  # a beam that is wrong in segments, and a plate whose stiffness is 20 % lower throughout
 SEEDS = range(800, 810)
 
 
@@ -33,19 +33,19 @@ def local():
     return case, updated(case)
 
 
-def test_a_local_change_is_found_where_it_is(local):
-    case, found = local
-    table = change_along_structure(found, case.structure.nominal_model)
+def test_a_local_change_is_found_at_its_location(local):
+    case, updated_model = local
+    table = change_along_structure(updated_model, case.structure.nominal_model)
     truth = true_ratios(case)
     assert len(table) == len(truth)
     assert np.corrcoef(table.stiffness_ratio, truth)[0, 1] > 0.9
     assert np.abs(table.stiffness_ratio - truth).mean() < np.abs(1 - truth).mean() / 2
 
 
-def test_the_sentences_name_the_stretches(local):
-    case, found = local
+def test_the_sentences_name_the_segments(local):
+    case, updated_model = local
     truth = true_ratios(case)
-    texts = notable_changes(change_along_structure(found, case.structure.nominal_model))
+    texts = notable_changes(change_along_structure(updated_model, case.structure.nominal_model))
     assert texts
     for text in texts:
         element = int(text.split("most at element ")[1].split(":")[0])
@@ -66,38 +66,38 @@ def test_bands_cover_the_true_ratios_on_held_back_structures():
         table = change_along_structure(updated(case), case.structure.nominal_model)
         truth = true_ratios(case)
         covered.append(np.mean((truth >= table.stiffness_ratio_low) & (truth <= table.stiffness_ratio_high)))
-    assert (
-        0.8 < np.mean(covered) <= 1
-    )  # wanted: 0.9 of all elements; those of one structure are right or wrong together
+    assert 0.8 < np.mean(covered) <= 1  # 0.9 of all elements; those of one structure are right or wrong together
 
 
 def test_a_change_of_the_matrices_is_read_back(local):
     case, _ = local
-    found = updated(case, parts=False)
-    assert found.parts.empty
-    table = change_along_structure(found, case.structure.nominal_model)
+    updated_model = updated(case, parts=False)
+    assert updated_model.parts.empty
+    table = change_along_structure(updated_model, case.structure.nominal_model)
     assert np.corrcoef(table.stiffness_ratio, true_ratios(case))[0, 1] > 0.6
     assert table.stiffness_ratio_low.isna().all()
     assert notable_changes(table) == ()
 
 
-def test_what_is_read_back_of_parts_alone_is_exact(local):
+def test_a_change_of_parts_alone_is_read_back_exactly(local):
     """A change that the parts can express: all of them softer by a tenth."""
-    case, found = local
-    softer = replace(found.nominal, stiffness=0.9 * found.nominal.stiffness)
-    table = change_along_structure(replace(found, model=softer, parts=pd.DataFrame()), case.structure.nominal_model)
+    case, updated_model = local
+    softer = replace(updated_model.nominal, stiffness=0.9 * updated_model.nominal.stiffness)
+    table = change_along_structure(
+        replace(updated_model, model=softer, parts=pd.DataFrame()), case.structure.nominal_model
+    )
     assert_allclose(table.stiffness_ratio, 0.9, rtol=5e-3)  # READ_BACK: the free end hardly bends
 
 
 def test_a_model_without_parts_has_no_table(local):
-    case, found = local
-    none = replace(found, parts=pd.DataFrame())
-    assert change_along_structure(none, replace(case.structure.nominal_model, parts=())).empty
+    case, updated_model = local
+    without_parts = replace(updated_model, parts=pd.DataFrame())
+    assert change_along_structure(without_parts, replace(case.structure.nominal_model, parts=())).empty
 
 
 def test_the_table_survives_a_run_folder(local, tmp_path):
-    _, found = local
-    for number, each in enumerate((found, replace(found, parts=pd.DataFrame()))):
-        save_result(each, tmp_path / f"{number}.npz")
+    _, updated_model = local
+    for number, result in enumerate((updated_model, replace(updated_model, parts=pd.DataFrame()))):
+        save_result(result, tmp_path / f"{number}.npz")
         back = load_result(tmp_path / f"{number}.npz")
-        pd.testing.assert_frame_equal(back.parts, each.parts, check_column_type=False, check_index_type=False)
+        pd.testing.assert_frame_equal(back.parts, result.parts, check_column_type=False, check_index_type=False)

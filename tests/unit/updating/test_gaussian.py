@@ -37,9 +37,9 @@ def test_the_step_is_the_posterior_mean(problem):
     step = solve_step(sensitivity, data, noise)
     mean, covariance = posterior(*problem)
     assert_allclose(step.mean, mean, rtol=1e-9)
-    left = data - sensitivity @ mean
-    assert_allclose(step.misfit, left @ np.linalg.solve(noise, left), rtol=1e-9)
-    assert_allclose(step.freedom, np.trace(np.eye(5) - covariance), rtol=1e-9)
+    error = data - sensitivity @ mean
+    assert_allclose(step.misfit, error @ np.linalg.solve(noise, error), rtol=1e-9)
+    assert_allclose(step.n_determined, np.trace(np.eye(5) - covariance), rtol=1e-9)
 
 
 def test_draws_have_the_posterior_mean_and_covariance(problem):
@@ -51,7 +51,7 @@ def test_draws_have_the_posterior_mean_and_covariance(problem):
     assert np.abs(np.cov(members.T) - covariance).max() < SAMPLED * covariance.max()
 
 
-def test_the_likely_scales_have_the_largest_evidence():
+def test_the_most_likely_scales_have_the_largest_evidence():
     rng = np.random.default_rng(2)
     parts = [rng.standard_normal((12, 4)), rng.standard_normal((12, 6))]
     terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.5) for k, part in enumerate(parts)]
@@ -63,23 +63,23 @@ def test_the_likely_scales_have_the_largest_evidence():
         believed = sum(0.5 * np.log(s / 0.5) ** 2 for s in scales)
         return multivariate_normal(np.zeros(12), total).logpdf(data) - believed
 
-    found = most_likely_scales(parts, terms, data, noise, np.array([0.5, 0.5]))
-    best = evidence(found)
+    scales = most_likely_scales(parts, terms, data, noise, np.array([0.5, 0.5]))
+    best = evidence(scales)
     for factor in (0.9, 1.1):
-        assert evidence(found * [factor, 1.0]) < best
-        assert evidence(found * [1.0, factor]) < best
-    assert found[0] > 3 * found[1]
+        assert evidence(scales * [factor, 1.0]) < best
+        assert evidence(scales * [1.0, factor]) < best
+    assert scales[0] > 3 * scales[1]
 
 
-def test_a_scale_without_doubt_stays():
+def test_a_fixed_scale_stays():
     parts = [np.eye(4), np.ones((4, 1))]
     terms = [
         PriorTerm(name="sure", root=np.eye(4), std=0.2, scale_uncertainty=0.0),
         PriorTerm(name="open", root=np.eye(1), std=0.2),
     ]
-    found = most_likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))
-    assert found[0] == 0.2
-    assert found[1] > 1.0
+    scales = most_likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))
+    assert scales[0] == 0.2
+    assert scales[1] > 1.0
 
 
 def test_slack_grows_until_the_misfit_is_that_of_noise():
@@ -96,7 +96,7 @@ def test_slack_stays_where_data_agree():
     assert slack_by_discrepancy(np.eye(2), np.array([0.1, -0.2]), 0.01 * np.eye(2), np.full(2, 0.1), 0.7) == 0.7
 
 
-def test_the_datum_that_all_others_contradict_is_found():
+def test_the_most_contradicted_datum_is_found():
     sensitivity, noise = np.ones((5, 1)), 1e-4 * np.eye(5)
     data = np.array([1.0, 1.01, 3.0, 0.99, 1.0])
     assert most_contradicted(sensitivity, data, noise, 6.0) == 2
@@ -110,5 +110,5 @@ def test_the_search_for_scales_stays_within_reason(size):
     rng = np.random.default_rng(4)
     parts = [1e-3 * rng.standard_normal((9, 2)), rng.standard_normal((9, 3)), 1e-5 * np.eye(9)]
     terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.1) for k, part in enumerate(parts)]
-    found = most_likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
-    assert np.all(np.abs(np.log(found / 0.1)) <= 6.0 + 1e-9)
+    scales = most_likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
+    assert np.all(np.abs(np.log(scales / 0.1)) <= 6.0 + 1e-9)

@@ -43,19 +43,19 @@ def roots_with(step, matrix):
     return step.roots[0] + 1j * step.roots[1]
 
 
-def sensitivity_by_differences(case, step, place, size_of_step, *, damping):
+def sensitivity_by_differences(case, step, index, size_of_step, *, damping):
     """Change of all targets with one chosen eigenvalue of the matrix, or of its substructure, eqs. (22) and (24)."""
     matrix = (step.damping if damping else step.stiffness).take(step.back)
     size = step.order - 1
-    if place < step.n_poles:
-        change = np.outer(step.vectors[:, place], step.duals[place])
+    if index < step.n_poles:
+        change = np.outer(step.vectors[:, index], step.duals[index])
     else:
         change = np.zeros((step.order, step.order))
-        change[:size, :size] = np.outer(step.vectors[:size, place], step.duals[place, :size])
+        change[:size, :size] = np.outer(step.vectors[:size, index], step.duals[index, :size])
     whole = np.zeros_like(change)
     whole[np.ix_(step.rows, step.columns)] = size_of_step * change
-    other = step_of(case, damping=damping, ratio=RATIO)
-    return (roots_with(other, matrix + whole) - roots_with(other, matrix - whole)) / (2 * size_of_step)
+    reference = step_of(case, damping=damping, ratio=RATIO)
+    return (roots_with(reference, matrix + whole) - roots_with(reference, matrix - whole)) / (2 * size_of_step)
 
 
 @pytest.mark.parametrize("damping", [False, True], ids=["stiffness", "damping"])
@@ -65,21 +65,21 @@ def test_all_sensitivities_against_differences(make, damping):
     step = step_of(case, damping=damping, ratio=RATIO)
     step.evaluate((step.damping if damping else step.stiffness).take(step.back))
     step._eigenvectors()
-    found = step._sensitivity().copy() / step.weights
-    for place in range(7):
-        size = STEP / np.max(np.abs(found[place]) / np.abs(case.targets))
-        expected = sensitivity_by_differences(case, step, place, size, damping=damping)
-        assert np.abs(found[place] - expected).max() < SLOPES * np.abs(expected).max()
+    sensitivity = step._sensitivity().copy() / step.weights
+    for index in range(7):
+        size = STEP / np.max(np.abs(sensitivity[index]) / np.abs(case.targets))
+        expected = sensitivity_by_differences(case, step, index, size, damping=damping)
+        assert np.abs(sensitivity[index] - expected).max() < SLOPES * np.abs(expected).max()
 
 
-def test_cross_sensitivities_are_left_out_on_request():
+def test_cross_sensitivities_are_omitted_on_request():
     step = step_of(build_section_4(), cross=False)
     step.evaluate(step.stiffness.take(step.back))
     step._eigenvectors()
-    found = step._sensitivity()
-    assert not found[4:, :4].any()
-    assert not found[:4, 4:].any()
-    assert found[:4, :4].any()
+    sensitivity = step._sensitivity()
+    assert not sensitivity[4:, :4].any()
+    assert not sensitivity[:4, 4:].any()
+    assert sensitivity[:4, :4].any()
 
 
 def test_a_step_goes_towards_the_targets():
@@ -91,9 +91,9 @@ def test_a_step_goes_towards_the_targets():
     assert after < before
 
 
-def test_a_pencil_without_the_wanted_roots_is_refused():
+def test_a_pencil_without_the_roots_of_the_targets_is_refused():
     case = build_section_4()
-    with pytest.raises(NumericalError, match="fewer poles or zeros"):
+    with pytest.raises(NumericalError, match="fewer dominant poles or zeros"):
         step_of(replace(case, fit=case.fit), ratio=1e4)
 
 
@@ -113,8 +113,11 @@ def test_several_frfs_take_turns():
     assert updated.history.misfit.iloc[-1] < updated.history.misfit.iloc[0]
     assert any("(FRF 2)" in name for name in updated.history.columns)
     alone = Pairs(rows=tuple(row for row in case.pairs.rows if row.frf <= 0))
-    other = update_model(case.reduced_model, case.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
-    assert np.abs(updated.model.stiffness - other.model.stiffness).max() > 1e-6 * np.abs(other.model.stiffness).max()
+    reference = update_model(case.reduced_model, case.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
+    assert (
+        np.abs(updated.model.stiffness - reference.model.stiffness).max()
+        > 1e-6 * np.abs(reference.model.stiffness).max()
+    )
 
 
 def test_without_targets_there_is_nothing_to_do():
@@ -123,7 +126,7 @@ def test_without_targets_there_is_nothing_to_do():
     assert updated.status is UpdateStatus.NOTHING_TO_DO
 
 
-def test_the_limit_of_iterations_is_said():
+def test_the_limit_of_iterations_is_reported():
     case = build_section_4()
     updated = update_model(case.reduced_model, case.fit, case.pairs, IPZ)
     assert updated.status is UpdateStatus.MAX_ITERATIONS

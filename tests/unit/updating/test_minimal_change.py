@@ -38,14 +38,14 @@ def updated(case):
 
 def deviations(case):
     """Standard deviations of the modulus of every target, relative."""
-    places = [pair.measured + (case.fit.n_modes if pair.kind == "zero" else 0) for pair in case.pairs.targets]
+    indices = [pair.measured + (case.fit.n_modes if pair.kind == "zero" else 0) for pair in case.pairs.targets]
     values = np.array([pair.measured_value for pair in case.pairs.targets])
-    blocks = np.array([case.fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in places])
+    blocks = np.array([case.fit.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in indices])
     gradient = np.stack([values.real, values.imag], 1) / np.abs(values)[:, None] ** 2
     return np.sqrt(np.einsum("ki,kij,kj->k", gradient, blocks, gradient))
 
 
-def test_targets_are_met_as_far_as_their_noise_deserves(case, updated):
+def test_targets_are_met_to_within_their_noise(case, updated):
     assert updated.status is UpdateStatus.CONVERGED
     values = np.array([pair.measured_value for pair in case.pairs.targets])
     off = np.abs(np.log(np.abs(updated.after) / np.abs(values)))
@@ -66,7 +66,7 @@ def test_the_mass_stays_as_it_was(case, updated):
     assert np.abs(updated.model.mass - case.reduced_model.mass).max() < 1e-9 * np.abs(case.reduced_model.mass).max()
 
 
-def test_what_is_said_is_what_the_matrices_have(case, updated):
+def test_the_reported_roots_are_those_of_the_matrices(case, updated):
     poles = damped_poles(updated.model.mass, updated.model.damping, updated.model.stiffness).values
     for row, value in zip(case.pairs.targets, updated.after, strict=True):
         if row.kind == "pole":
@@ -75,13 +75,13 @@ def test_what_is_said_is_what_the_matrices_have(case, updated):
 
 def test_the_ensemble_has_the_measured_poles_within_their_noise(case, updated):
     std = deviations(case)
-    for place, row in enumerate(case.pairs.targets[:3]):
+    for index, row in enumerate(case.pairs.targets[:3]):
         near = []
         for mass, _, stiffness in updated.ensemble:
             omega = np.sqrt(np.maximum(undamped_poles(mass, stiffness).values.real, 0))
             near.append(omega[np.argmin(np.abs(omega - abs(row.measured_value)))])
-        assert abs(np.mean(near) / abs(row.measured_value) - 1) < 6 * std[place] + 1e-4
-        assert np.std(near) / abs(row.measured_value) < 3 * std[place] + 1e-4
+        assert abs(np.mean(near) / abs(row.measured_value) - 1) < 6 * std[index] + 1e-4
+        assert np.std(near) / abs(row.measured_value) < 3 * std[index] + 1e-4
 
 
 def free_case():
@@ -105,14 +105,14 @@ def test_rigid_body_modes_stay():
 
 def test_the_same_seed_gives_the_same_ensemble_and_another_another():
     case = make_update_case(3)
-    first, again = (update_model(case.reduced_model, case.fit, case.pairs) for _ in range(2))
-    other = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(seed=1, ensemble=7))
-    assert np.array_equal(first.ensemble, again.ensemble)
-    assert len(other.ensemble) == 7
-    assert not np.array_equal(first.ensemble[:7], other.ensemble)
+    first, second = (update_model(case.reduced_model, case.fit, case.pairs) for _ in range(2))
+    other_seed = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(seed=1, ensemble=7))
+    assert np.array_equal(first.ensemble, second.ensemble)
+    assert len(other_seed.ensemble) == 7
+    assert not np.array_equal(first.ensemble[:7], other_seed.ensemble)
 
 
-def test_without_targets_the_model_is_left_alone():
+def test_without_targets_the_model_is_unchanged():
     case = make_update_case(3)
     updated = update_model(case.reduced_model, case.fit, Pairs(rows=()))
     assert updated.status is UpdateStatus.NOTHING_TO_DO
@@ -120,16 +120,16 @@ def test_without_targets_the_model_is_left_alone():
     assert updated.warnings
 
 
-def test_a_target_that_all_others_contradict_is_left_out_and_said():
+def test_a_target_that_all_others_contradict_is_excluded_and_reported():
     case = make_update_case(11)
     rows = list(case.pairs.rows)
-    place = next(k for k, row in enumerate(rows) if row in case.pairs.targets and row.kind == "pole" and k > 0)
-    rows[place] = replace(rows[place], measured_value=1.25 * rows[place].measured_value)
+    index = next(k for k, row in enumerate(rows) if row in case.pairs.targets and row.kind == "pole" and k > 0)
+    rows[index] = replace(rows[index], measured_value=1.25 * rows[index].measured_value)
     basis = structural_basis(case.structure.nominal_model, case.reduced_model)
     updated = update_model(case.reduced_model, case.fit, replace(case.pairs, rows=tuple(rows)), basis=basis)
     assert len(updated.unmet) == 1
     assert "contradict it" in updated.unmet[0]
-    assert f"{abs(rows[place].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
+    assert f"{abs(rows[index].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
     honest = update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
     assert not honest.unmet
 
@@ -148,9 +148,9 @@ def test_the_mass_of_a_sensor_is_found():
     """What a test adds to every structure: without it the stiffness has to make up for it, and is wrong."""
     case = make_update_case(21)
     sensor, grams = case.structure.sensors[0], 3e-3
-    place = case.structure.nominal_model.full_index(sensor)
+    index = case.structure.nominal_model.full_index(sensor)
     added = np.zeros(case.structure.nominal_model.mass_all.shape)
-    added[place, place] = grams
+    added[index, index] = grams
     real = replace(
         case.structure.nominal_model, mass_all=case.structure.nominal_model.mass_all + sparse.csr_array(added)
     )
@@ -160,29 +160,29 @@ def test_the_mass_of_a_sensor_is_found():
     basis = structural_basis(case.structure.nominal_model, case.reduced_model, sensors=case.structure.sensors[:1])
     updated = update_model(case.reduced_model, fit, pair(fit, case.reduced_model), basis=basis)
     row = case.reduced_model.row(sensor)
-    found = row @ (updated.model.mass - case.reduced_model.mass) @ row / (row @ row) ** 2
-    assert_allclose(found, grams, rtol=0.2)
+    mass = row @ (updated.model.mass - case.reduced_model.mass) @ row / (row @ row) ** 2
+    assert_allclose(mass, grams, rtol=0.2)
 
 
 def chosen_parameters(case, elements):
-    """One factor for a stretch of elements and nothing else, as a diagnosis would name it."""
+    """One factor for a segment of elements and nothing else, as a diagnosis would name it."""
     regions = reduced_regions(case.structure.nominal_model, case.reduced_model)
     stiffness = sum(regions[k].stiffness for k in elements)[None]
     nothing = np.zeros_like(stiffness)
     return ParameterBasis(
-        names=("stiffness of the stretch",),
+        names=("stiffness of the segment",),
         mass=nothing,
         damping=nothing,
         stiffness=stiffness,
         logarithmic=np.array([True]),
-        terms=(PriorTerm(name="the stretch", root=np.eye(1), std=0.5),),
+        terms=(PriorTerm(name="the segment", root=np.eye(1), std=0.5),),
         regions=(replace(regions[elements[0]], stiffness=stiffness[0]),),
         is_from_diagnosis=True,
     )
 
 
 @pytest.mark.parametrize("method", ["minimal-change", "ipz"])
-def test_parameters_that_a_diagnosis_has_chosen_find_the_truth(method):
+def test_parameters_from_a_diagnosis_find_the_truth(method):
     structure = draw_structure(21)
     elements = range(3, 9)
     factors = np.ones(len(structure.nominal_model.parts))
@@ -198,14 +198,14 @@ def test_parameters_that_a_diagnosis_has_chosen_find_the_truth(method):
     case = replace(make_update_case(21), reduced_model=reduced, fit=fit, pairs=pair(fit, reduced))
     options = UpdateOptions(method=method, damping=method == "minimal-change", delta=1e-9, max_iterations=60)
     updated = update_model(case.reduced_model, case.fit, case.pairs, options, basis=chosen_parameters(case, elements))
-    found = updated.history[updated.history.phase != "damping"].iloc[-1]["stiffness of the stretch"]
-    factor = found if method == "minimal-change" else np.exp(found)
+    parameter = updated.history[updated.history.phase != "damping"].iloc[-1]["stiffness of the segment"]
+    factor = parameter if method == "minimal-change" else np.exp(parameter)
     assert_allclose(factor, 0.8, rtol=0.01)  # the reduction basis is that of the nominal model
 
 
-def test_the_history_tells_every_iteration(updated):
+def test_the_history_has_every_iteration(updated):
     assert set(updated.history.columns) >= {"phase", "iteration", "misfit", "step"}
     assert list(updated.history.phase.unique())[:2] == ["stiffness", "damping"]
-    stretch = [name for name in updated.history.columns if name.startswith("stiffness of element")]
-    assert stretch
-    assert updated.history[updated.history.phase == "stiffness"][stretch].notna().all().all()
+    columns = [name for name in updated.history.columns if name.startswith("stiffness of element")]
+    assert columns
+    assert updated.history[updated.history.phase == "stiffness"][columns].notna().all().all()

@@ -1,4 +1,4 @@
-"""What all other targets contradict is left out only where it is far off."""
+"""A target that all others contradict is excluded only where its error is large."""
 
 import numpy as np
 import pytest

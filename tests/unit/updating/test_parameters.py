@@ -1,4 +1,4 @@
-"""What an update may change: matrices that add up, and a prior that means what it says."""
+"""What an update may change: matrices that add up, and a prior with the stated covariance."""
 
 from dataclasses import replace
 
@@ -14,9 +14,9 @@ from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.reduce import reduce_model
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import (
-    FREE_STD,
+    GENERIC_STD_ALONE,
     GLOBAL_STD,
-    STRETCH_STD,
+    SEGMENT_STD,
     generic_basis,
     join_bases,
     structural_basis,
@@ -28,75 +28,75 @@ EXACT = 1e-9  # relative: sums of a few hundred products
 
 
 @pytest.fixture(scope="module")
-def full():
+def fe_model():
     return beam(modal_ratio=0.001, left="clamped")
 
 
-def reduced(full):
+def reduced(fe_model):
     ends = {"actuators": [Dof(5, "z")], "sensors": [Dof(21, "z")], "points": [Dof(12, "z")]}
-    return reduce_model(full, ReduceOptions(modes=4), band_hz=(10.0, 500.0), **ends)
+    return reduce_model(fe_model, ReduceOptions(modes=4), band_hz=(10.0, 500.0), **ends)
 
 
 def covariance(terms, stds):
     return sum(std**2 * term.root @ term.root.T for term, std in zip(terms, stds, strict=True))
 
 
-def test_the_parts_together_are_the_whole_stiffness_and_mass(full):
-    model = reduced(full)
-    regions = reduced_regions(full, model)
+def test_the_parts_together_are_the_whole_stiffness_and_mass(fe_model):
+    model = reduced(fe_model)
+    regions = reduced_regions(fe_model, model)
     assert len(regions) == 20
     assert_allclose(sum(region.stiffness for region in regions), model.stiffness, rtol=EXACT, atol=1e-9 * 1e6)
     total = sum(region.mass for region in regions)
     assert np.abs(total - model.mass).max() < EXACT * np.abs(model.mass).max()
 
 
-def test_a_region_sits_where_its_element_is(full):
-    region = reduced_regions(full, reduced(full))[3]
+def test_a_region_sits_where_its_element_is(fe_model):
+    region = reduced_regions(fe_model, reduced(fe_model))[3]
     assert region.nodes == (4, 5)
     assert_allclose(region.coordinates_m[0], 3.5 * 0.4995 / 20, rtol=1e-12)
     assert region.name == "element 4"
 
 
-def test_many_parts_are_taken_together_without_losing_any():
-    full = beam(elements=400, left="clamped")
-    model = reduced(full)
-    regions = reduced_regions(full, model)
+def test_many_parts_are_merged_without_losing_any():
+    fe_model = beam(elements=400, left="clamped")
+    model = reduced(fe_model)
+    regions = reduced_regions(fe_model, model)
     assert len(regions) == MAX_REGIONS
     assert_allclose(np.trace(sum(region.stiffness for region in regions)), np.trace(model.stiffness), rtol=1e-6)
     assert max(len(region.nodes) for region in regions) <= 5
 
 
-def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(full):
-    model = reduced(full)
-    basis = structural_basis(full, model)
+def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(fe_model):
+    model = reduced(fe_model)
+    basis = structural_basis(fe_model, model)
     theta = np.where(basis.logarithmic, np.log(1.2), 0.0)
     changed = np.tensordot(basis.amounts(theta), basis.stiffness, 1)
     assert np.abs(changed - 0.2 * model.stiffness).max() < EXACT * np.abs(model.stiffness).max()
 
 
-def test_masses_change_only_when_asked(full):
-    model = reduced(full)
-    assert not structural_basis(full, model).mass.any()
-    basis = structural_basis(full, model, mass=True)
+def test_masses_change_only_on_request(fe_model):
+    model = reduced(fe_model)
+    assert not structural_basis(fe_model, model).mass.any()
+    basis = structural_basis(fe_model, model, mass=True)
     of_mass = np.array([name.startswith("mass of") for name in basis.names])
     assert of_mass.sum() == 20
     assert not basis.stiffness[of_mass].any()
     assert np.abs(basis.mass[of_mass].sum(0) - model.mass).max() < EXACT * np.abs(model.mass).max()
 
 
-def test_a_sensor_may_weigh_something(full):
-    model = reduced(full)
-    basis = structural_basis(full, model, sensors=(Dof(21, "z"), Dof(21, "z", -1), Dof(5, "ry")))
+def test_the_mass_of_a_sensor_may_be_a_parameter(fe_model):
+    model = reduced(fe_model)
+    basis = structural_basis(fe_model, model, sensors=(Dof(21, "z"), Dof(21, "z", -1), Dof(5, "ry")))
     of_sensors = np.flatnonzero([name.startswith("mass of the sensor") for name in basis.names])
-    assert [basis.names[place] for place in of_sensors] == ["mass of the sensor at 21:z"]
+    assert [basis.names[index] for index in of_sensors] == ["mass of the sensor at 21:z"]
     row = model.row(Dof(21, "z"))
     assert_allclose(basis.mass[of_sensors[0]], np.outer(row, row), rtol=1e-12)
     assert not basis.stiffness[of_sensors].any()
 
 
-def test_without_parts_the_generic_parameters_are_used(full):
-    model = reduced(full)
-    basis = structural_basis(replace(full, parts=()), model)
+def test_without_parts_the_generic_parameters_are_used(fe_model):
+    model = reduced(fe_model)
+    basis = structural_basis(replace(fe_model, parts=()), model)
     assert basis.names == generic_basis(model).names
 
 
@@ -127,13 +127,13 @@ def test_rigid_body_modes_stay_where_they_are():
     assert np.abs(basis.stiffness @ rigid).max() < 1e-6 * np.abs(model.stiffness).max()
 
 
-def test_the_prior_is_what_it_says(full):
-    basis = structural_basis(full, reduced(full))
+def test_the_prior_has_the_stated_covariance(fe_model):
+    basis = structural_basis(fe_model, reduced(fe_model))
     names = [term.name for term in basis.terms]
     assert names[0] == "a factor on the stiffness"
     stds = np.array([term.std for term in basis.terms])
     prior = covariance(basis.terms, stds)[:20, :20]
-    assert_allclose(np.diag(prior), GLOBAL_STD**2 + 2 * STRETCH_STD**2, rtol=1e-6)
+    assert_allclose(np.diag(prior), GLOBAL_STD**2 + 2 * SEGMENT_STD**2, rtol=1e-6)
     assert prior[0, 1] > prior[0, 5] > prior[0, 19] > GLOBAL_STD**2
 
 
@@ -142,7 +142,7 @@ def test_the_generic_prior_is_the_same_in_rotated_coordinates():
     rng = np.random.default_rng(0)
     root = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     basis = generic_basis(replace(chain(3), mass=np.eye(3), stiffness=1e4 * np.eye(3)), common=False)
-    stds = np.array([FREE_STD])
+    stds = np.array([GENERIC_STD_ALONE])
     whitened = rng.standard_normal((20000, 6))
     members = np.tensordot(unwhiten(basis.terms, stds, whitened), basis.stiffness, 1)
     turned = root.T @ members @ root
@@ -150,8 +150,8 @@ def test_the_generic_prior_is_the_same_in_rotated_coordinates():
     assert np.abs(spread[0] - spread[1]).max() < 0.05 * np.abs(spread[0]).max()
 
 
-def test_slopes_are_the_derivatives_of_the_amounts(full):
-    basis = structural_basis(full, reduced(full))
+def test_slopes_are_the_derivatives_of_the_amounts(fe_model):
+    basis = structural_basis(fe_model, reduced(fe_model))
     theta = np.random.default_rng(0).normal(0, 0.1, len(basis.names))
     step = 1e-6
     expected = (basis.amounts(theta + step) - basis.amounts(theta - step)) / (2 * step)
@@ -159,13 +159,13 @@ def test_slopes_are_the_derivatives_of_the_amounts(full):
 
 
 def test_joined_parameters_have_independent_priors():
-    one, other = generic_basis(chain(3)), generic_basis(chain(3), std=0.2, common=False)
-    both = join_bases(one, other)
-    stds = np.array([term.std for term in both.terms])
-    prior = covariance(both.terms, stds)
+    first, second = generic_basis(chain(3)), generic_basis(chain(3), std=0.2, common=False)
+    joined = join_bases(first, second)
+    stds = np.array([term.std for term in joined.terms])
+    prior = covariance(joined.terms, stds)
     assert not prior[:6, 6:].any()
-    assert_allclose(prior[:6, :6], covariance(one.terms, stds[:2]), rtol=1e-12)
-    assert_allclose(prior[6:, 6:], covariance(other.terms, stds[2:]), rtol=1e-12)
+    assert_allclose(prior[:6, :6], covariance(first.terms, stds[:2]), rtol=1e-12)
+    assert_allclose(prior[6:, 6:], covariance(second.terms, stds[2:]), rtol=1e-12)
 
 
 def test_shapes_that_disagree_are_refused():

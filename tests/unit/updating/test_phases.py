@@ -18,8 +18,8 @@ from frf_testbench.updating.study import make_update_case
 STEP = 1e-6  # of a logarithm: central differences are then off by rounding over it
 SLOPES = 1e-4  # of the largest: squared roots are good to 1e-11 of the largest one in the pencil, over the step
 STRONG = 5e-3  # of what would stop the motion
-LESS = 0.7  # of the damping of the modes
-AS_MEASURED = 2e-3  # relative, of a real part: what is said not to be explained by damping is half of it
+DAMPING_RATIO = 0.7  # of the damping of the modes
+AS_MEASURED = 2e-3  # relative, of a real part: the slack of damping is half of it
 UNTOUCHED = 1e-6  # of the largest stiffness
 SEEDS = (20, 12, 11)  # a plate and a frame with zeros off the axis, and a beam
 
@@ -46,8 +46,8 @@ def stiffness_phase(problem):
 def differences(value, count):
     """Central differences of a vector by parameters of the order of 1."""
     columns = []
-    for place in range(count):
-        step = STEP * np.eye(count)[place]
+    for index in range(count):
+        step = STEP * np.eye(count)[index]
         columns.append((value(step) - value(-step)) / (2 * STEP))
     return np.array(columns).T
 
@@ -56,10 +56,10 @@ def test_stiffness_slopes_against_differences(problem):
     phase = stiffness_phase(problem)
     start = phase.nominal_roots(problem.computed)
     theta = 0.01 * np.random.default_rng(0).standard_normal(len(phase.basis.names))
-    there = phase.roots(theta, start)
-    found = phase.slopes(theta, there)
-    expected = -differences(lambda step: phase.errors(phase.roots(theta + step, there)), len(theta))
-    assert np.abs(found - expected).max() < SLOPES * np.abs(expected).max()
+    tracked = phase.roots(theta, start)
+    slopes = phase.slopes(theta, tracked)
+    expected = -differences(lambda step: phase.errors(phase.roots(theta + step, tracked)), len(theta))
+    assert np.abs(slopes - expected).max() < SLOPES * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("has_damper", [False, True])
@@ -73,12 +73,12 @@ def test_damping_slopes_against_differences(case, has_damper):
     frame = frame_of(problem.model)
     phase = minimal_change._stiffness_phase(problem, frame)
     result = iterate(phase, phase.nominal_roots(problem.computed))
-    damping = minimal_change._damping(problem, frame, modal_frame(*phase.matrices(result.theta)), phase, result)
+    damping = minimal_change._damping_phase(problem, frame, modal_frame(*phase.matrices(result.theta)), phase, result)
     count = damping.terms[0].root.shape[0]
     theta = 0.02 * np.random.default_rng(1).standard_normal(count)
-    found = damping.slopes(theta, damping.roots(theta))
+    slopes = damping.slopes(theta, damping.roots(theta))
     expected = -differences(lambda step: damping.errors(damping.roots(theta + step)), count)
-    assert np.abs(found - expected).max() < 10 * SLOPES * np.abs(expected).max()
+    assert np.abs(slopes - expected).max() < 10 * SLOPES * np.abs(expected).max()
 
 
 def test_an_indefinite_stiffness_is_refused(problem):
@@ -89,17 +89,17 @@ def test_an_indefinite_stiffness_is_refused(problem):
         assert phase.roots(theta, start) is None
 
 
-def test_roots_are_followed_through_a_crossing(problem):
-    """A large change keeps every target's root its own: the vectors tell, not the order."""
+def test_roots_are_tracked_through_a_crossing(problem):
+    """Every target keeps its root through a large change: by the vectors, not by the order."""
     phase = stiffness_phase(problem)
-    near = phase.nominal_roots(problem.computed)
+    tracked = phase.nominal_roots(problem.computed)
     direction = np.random.default_rng(2).standard_normal(len(phase.basis.names))
     direction /= np.abs(direction).max()
     small = 0.002
     for step in range(1, 20):
-        before, near = near, phase.roots(small * step * direction, near)
+        before, tracked = tracked, phase.roots(small * step * direction, tracked)
         slope = phase.slopes(small * (step - 1) * direction, before) @ direction
-        moved = phase.errors(before) - phase.errors(near)
+        moved = phase.errors(before) - phase.errors(tracked)
         assert np.abs(moved - small * slope).max() < 0.2 * max(np.abs(small * slope).max(), small)
 
 
@@ -110,36 +110,36 @@ def damper_at(problem, part):
 
 
 @pytest.mark.parametrize("seed", [3, 7])
-def test_a_known_damper_stays_while_the_modes_are_damped_anew(seed):
-    """Scaled with the modes that it couples, it would keep them from losing damping of their own."""
+def test_a_known_damper_stays_while_modal_damping_is_updated(seed):
+    """Scaled with the modes that it couples, it would keep them from losing their own damping."""
     case = make_update_case(seed)
     problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     modal, damper = problem.model.damping, damper_at(problem, STRONG / 10)
-    there = problem.roots_near(replace(problem.model, damping=LESS * modal + damper), problem.computed)
+    measured = problem.nearest_roots(replace(problem.model, damping=DAMPING_RATIO * modal + damper), problem.computed)
     nominal = replace(problem.model, damping=modal + damper, dashpots=damper)
-    found = minimal_change.update(replace(problem, model=nominal, values=there), UpdateOptions(ensemble=2), silent)
-    assert found.status is UpdateStatus.CONVERGED
-    off = np.abs(found.after.real / there.real - 1)
-    assert off[problem.frf < 0].max() < AS_MEASURED
-    assert np.median(off[problem.frf >= 0]) < AS_MEASURED
+    updated = minimal_change.update(replace(problem, model=nominal, values=measured), UpdateOptions(ensemble=2), silent)
+    assert updated.status is UpdateStatus.CONVERGED
+    error = np.abs(updated.after.real / measured.real - 1)
+    assert error[problem.frf < 0].max() < AS_MEASURED
+    assert np.median(error[problem.frf >= 0]) < AS_MEASURED
 
 
-def test_a_model_that_is_right_stays_as_it_is_however_it_is_damped(case):
-    """A damper bends shapes and moves moduli: that is no error of the stiffness."""
+def test_a_correct_stiffness_does_not_change_with_damping(case):
+    """A damper bends shapes and changes moduli: that is no error of the stiffness."""
     problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     damped = replace(problem.model, damping=problem.model.damping + damper_at(problem, STRONG))
-    there = problem.roots_near(damped, problem.computed)
-    kept = problem.frf < 0
+    damped_roots = problem.nearest_roots(damped, problem.computed)
+    is_pole = problem.frf < 0
     known = replace(
         problem,
         model=damped,
-        values=there[kept],
-        computed=there[kept],
-        frf=problem.frf[kept],
-        covariance=problem.covariance[np.ix_(np.repeat(kept, 2), np.repeat(kept, 2))],
-        names=tuple(name for name, is_kept in zip(problem.names, kept, strict=True) if is_kept),
+        values=damped_roots[is_pole],
+        computed=damped_roots[is_pole],
+        frf=problem.frf[is_pole],
+        covariance=problem.covariance[np.ix_(np.repeat(is_pole, 2), np.repeat(is_pole, 2))],
+        names=tuple(name for name, selected in zip(problem.names, is_pole, strict=True) if selected),
     )
     undamped = np.sqrt(np.abs(minimal_change._stiffness_phase(known, frame_of(damped)).eigenvalues))
-    assert np.abs(np.abs(there[kept]) / undamped[undamped > 0][: kept.sum()] - 1).max() > 0
-    found = minimal_change.update(known, UpdateOptions(ensemble=2), silent).model
-    assert np.abs(found.stiffness - damped.stiffness).max() < UNTOUCHED * np.abs(damped.stiffness).max()
+    assert np.abs(np.abs(damped_roots[is_pole]) / undamped[undamped > 0][: is_pole.sum()] - 1).max() > 0
+    updated = minimal_change.update(known, UpdateOptions(ensemble=2), silent).model
+    assert np.abs(updated.stiffness - damped.stiffness).max() < UNTOUCHED * np.abs(damped.stiffness).max()

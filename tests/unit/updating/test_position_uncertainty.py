@@ -1,4 +1,4 @@
-"""Misplaced sensors and blows: how far they move zeros, against zeros of a model that has them elsewhere."""
+"""Position errors of sensors and excitation: their effect on zeros, against a model with other positions."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from frf_ipz.updating.update import update_model
 from frf_testbench.updating.study import make_update_case
 
 SEEDS = (20, 12)  # a plate and a frame
-SMALL = 1e-5  # of a row: what is left of second order is as small
+SMALL = 1e-5  # of a row: the terms of second order are as small
 SECOND_ORDER = 1e-3  # of the largest move
 TOLERANCE = 1e-3  # m/m, as stated by default
 
@@ -28,18 +28,18 @@ def test_zeros_move_as_those_of_a_model_with_other_rows(case):
     row = SMALL * np.random.default_rng(0).standard_normal(len(problem.model.dofs))
     for dof, is_output in ((label.output_dof, True), (label.input_dof, False)):
         only = replace(problem, covariance=np.zeros_like(problem.covariance))
-        found = with_position_uncertainty(only, (PositionUncertainty(dof=dof, is_output=is_output, row=row),))
+        covariance = with_position_uncertainty(only, (PositionUncertainty(dof=dof, is_output=is_output, row=row),))
         moved = _zeros_with(problem, dof, is_output, row) - problem.computed
         parts = np.stack([moved.real, moved.imag], axis=1).ravel()
         expected = np.outer(parts, parts)
         assert np.abs(expected).max() > 0
-        assert np.abs(found - expected).max() < SECOND_ORDER * np.abs(expected).max()
+        assert np.abs(covariance - expected).max() < SECOND_ORDER * np.abs(expected).max()
     poles = 2 * np.count_nonzero(problem.frf < 0)
-    assert not found[:poles].any()
+    assert not covariance[:poles].any()
 
 
 def _zeros_with(problem, dof, is_output, row):
-    """Zeros of the same model with a sensor or a blow elsewhere; poles as they are."""
+    """Zeros of the same model with a sensor or an excitation at another position; poles are the same."""
     values = problem.computed.copy()
     for target in np.flatnonzero(problem.frf >= 0):
         frf = int(problem.frf[target])
@@ -61,11 +61,11 @@ def _newton(model, output, force, zero):
     return zero
 
 
-def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are():
+def test_a_position_tolerance_makes_zeros_less_certain_and_not_poles():
     case = make_update_case(SEEDS[0])
     off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
     ends = {(label.output_dof, True) for label in case.fit.labels} | {(x.input_dof, False) for x in case.fit.labels}
-    assert {(one.dof, one.is_output) for one in off} == ends
+    assert {(position.dof, position.is_output) for position in off} == ends
     problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
     wider = with_position_uncertainty(problem, off) - problem.covariance
     zeros = np.repeat(problem.frf >= 0, 2)
@@ -74,12 +74,14 @@ def test_a_tolerance_of_places_leaves_zeros_less_certain_and_poles_as_they_are()
     assert not wider[~zeros].any()
 
 
-def test_a_misplaced_sensor_is_not_taken_for_another_stiffness():
+def test_a_misplaced_sensor_is_not_mistaken_for_a_stiffness():
     """A zero that lies elsewhere because of its sensor changes the model less where that is allowed for."""
     case = make_update_case(SEEDS[0])
     off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
     changes = [
-        np.abs(np.diagonal(found.model.stiffness) / np.diagonal(case.reduced_model.stiffness) - 1).max()
-        for found in (update_model(case.reduced_model, case.fit, case.pairs, misplacements=some) for some in ((), off))
+        np.abs(np.diagonal(covariance.model.stiffness) / np.diagonal(case.reduced_model.stiffness) - 1).max()
+        for covariance in (
+            update_model(case.reduced_model, case.fit, case.pairs, misplacements=positions) for positions in ((), off)
+        )
     ]
     assert changes[1] < changes[0]

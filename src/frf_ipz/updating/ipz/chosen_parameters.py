@@ -1,6 +1,6 @@
-"""The published iteration on parameters that a diagnosis has chosen: eqs. (6) to (20) without substructures.
+"""The published iteration on parameters from a diagnosis: eqs. (6) to (20) without substructures.
 
-With parameters of both matrices at once nothing is put back (steps 2j to 2l), and all FRFs count in every step.
+With parameters of both matrices at once no substructure is put back (steps 2j to 2l), and all FRFs count in every step.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.problem import UpdateProblem
 
-DEAF = 1e-12  # of the largest sensitivity: a parameter below moves no target
+INSENSITIVE = 1e-12  # of the largest sensitivity: a parameter below moves no target
 
 
 def iterate_parameters(
@@ -38,7 +38,7 @@ def iterate_parameters(
     alpha, beta, delta : float
         Regularisation, step and stop.
     max_iterations : int
-        Stop after that many.
+        Largest number of iterations.
 
     Returns
     -------
@@ -52,15 +52,15 @@ def iterate_parameters(
         One row an iteration.
     """
     theta = np.zeros(len(basis.names))
-    wanted = TargetRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
+    targets = TargetRoots(frf=problem.frf, rows={number: problem.rows(number) for number in problem.frfs})
     values, previous, rows = problem.computed, np.inf, []
     status = UpdateStatus.MAX_ITERATIONS
     for iteration in range(1, max_iterations + 1):
-        values, slopes = _roots_and_slopes(problem, basis, wanted, theta, values)
+        values, slopes = _roots_and_slopes(problem, basis, targets, theta, values)
         weights = np.abs(values).max() / np.abs(values)
         error = (problem.values - values) * weights
         misfit = float(np.sum(np.abs(error) ** 2))
-        change = beta * _solve(slopes * weights[:, None], error, alpha)
+        change = beta * _solve_step(slopes * weights[:, None], error, alpha)
         size = float(np.linalg.norm(change))
         rows.append({"iteration": iteration, "misfit": misfit, "step": size, **_named(basis, theta)})
         if abs(misfit - previous) <= delta:
@@ -74,41 +74,43 @@ def iterate_parameters(
 
 
 def _roots_and_slopes(
-    problem: UpdateProblem, basis: ParameterBasis, wanted: TargetRoots, theta: FloatArray, near: ComplexArray
+    problem: UpdateProblem, basis: ParameterBasis, targets: TargetRoots, theta: FloatArray, reference: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    amounts, moves = basis.amounts(theta), basis.slopes(theta)
+    amounts, amount_slopes = basis.amounts(theta), basis.slopes(theta)
     model = problem.model
-    everything = wanted.damped(
+    all_roots = targets.damped(
         model.mass + np.tensordot(amounts, basis.mass, 1),
         model.damping + np.tensordot(amounts, basis.damping, 1),
         model.stiffness + np.tensordot(amounts, basis.stiffness, 1),
     )
-    values, slopes = np.zeros(len(near), complex), np.zeros((len(near), len(theta)), complex)
-    for number, found in everything.items():
-        places = np.flatnonzero(wanted.frf == number)
-        roots = _nearest(found, near[places])
-        values[places] = roots.values
-        moved = damped_sensitivity(roots, mass=basis.mass, damping=basis.damping, stiffness=basis.stiffness)
-        slopes[places] = moved * moves
+    values, slopes = np.zeros(len(reference), complex), np.zeros((len(reference), len(theta)), complex)
+    for number, candidates in all_roots.items():
+        indices = np.flatnonzero(targets.frf == number)
+        roots = _nearest_roots(candidates, reference[indices])
+        values[indices] = roots.values
+        root_slopes = damped_sensitivity(roots, mass=basis.mass, damping=basis.damping, stiffness=basis.stiffness)
+        slopes[indices] = root_slopes * amount_slopes
     return values, slopes
 
 
-def _nearest(roots: Roots, near: ComplexArray) -> Roots:
+def _nearest_roots(roots: Roots, reference: ComplexArray) -> Roots:
     upper = roots.take(np.flatnonzero(roots.values.imag > 0))
-    _, chosen = linear_sum_assignment(np.abs(near[:, None] - upper.values) / np.abs(near)[:, None])
-    return upper.take(chosen)
+    _, nearest = linear_sum_assignment(np.abs(reference[:, None] - upper.values) / np.abs(reference)[:, None])
+    return upper.take(nearest)
 
 
-def _solve(slopes: ComplexArray, error: ComplexArray, alpha: float) -> FloatArray:
+def _solve_step(slopes: ComplexArray, error: ComplexArray, alpha: float) -> FloatArray:
     """Eq. (18), with the rule for alpha of step 2g."""
     stacked = np.vstack([slopes.real, slopes.imag])
-    heard: BoolArray = np.linalg.norm(stacked, axis=0) > DEAF * np.linalg.norm(stacked)
-    normal = stacked[:, heard].T @ stacked[:, heard]
+    is_sensitive: BoolArray = np.linalg.norm(stacked, axis=0) > INSENSITIVE * np.linalg.norm(stacked)
+    normal = stacked[:, is_sensitive].T @ stacked[:, is_sensitive]
     if np.linalg.cond(normal) >= ILL_CONDITIONED:
         diagonal = np.diagonal(normal).copy()
         normal[np.diag_indices_from(normal)] += alpha**2 * diagonal.mean() / (1 / diagonal).mean() / diagonal
-    change = np.zeros(len(heard))
-    change[heard] = np.linalg.lstsq(normal, stacked[:, heard].T @ np.concatenate([error.real, error.imag]))[0]
+    change = np.zeros(len(is_sensitive))
+    change[is_sensitive] = np.linalg.lstsq(
+        normal, stacked[:, is_sensitive].T @ np.concatenate([error.real, error.imag])
+    )[0]
     return change
 
 

@@ -19,14 +19,14 @@ from frf_ipz.updating.updated_model import UpdateStatus
 if TYPE_CHECKING:
     from frf_ipz.progress import Progress
 
-KEPT_ROWS = 32_768  # of the history: beyond, every second one is dropped, again and again
-GROWTH = 1e4  # times the first misfit from which an iteration has diverged; it may well rise at first
-TELL_EVERY = 1000  # iterations
+MAX_ROWS = 32_768  # of the history: beyond, every second one is dropped, as often as needed
+GROWTH = 1e4  # times the first misfit from which an iteration has diverged; it may rise at first
+REPORT_INTERVAL = 1000  # iterations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoopResult:
-    """Where the published iteration ended.
+    """Result of the published iteration.
 
     Parameters
     ----------
@@ -63,67 +63,69 @@ def published_loop(
     delta : float
         Change of the misfit at which to stop, eq. (20).
     max_iterations : int
-        Stop after that many.
+        Largest number of iterations.
     progress : Progress
-        Told now and then.
+        Reports the iteration.
 
     Returns
     -------
     LoopResult
         The matrix at the stop; where the iteration diverged, the one with the smallest misfit.
     """
-    trace = _Trace()
+    history = _History()
     previous, first, best = np.inf, 0.0, (np.inf, matrix)
     status = UpdateStatus.MAX_ITERATIONS
-    with np.errstate(all="ignore"):  # zeros at infinity divide by 0, and a diverging iteration overflows; both are seen
+    with np.errstate(
+        all="ignore"
+    ):  # zeros at infinity divide by 0, and a diverging iteration overflows; both are detected
         for iteration in range(max_iterations):
-            misfit, following = 0.0, matrix
+            misfit, next_matrix = 0.0, matrix
             try:
                 for step in steps:
-                    misfit += step.evaluate(following)
-                    following = step.step()
+                    misfit += step.evaluate(next_matrix)
+                    next_matrix = step.step()
             except NumericalError:
                 misfit = np.inf
             first = first or misfit
             if not misfit <= GROWTH * first:
-                return LoopResult(matrix=best[1], status=UpdateStatus.DIVERGED, history=trace.table(steps))
+                return LoopResult(matrix=best[1], status=UpdateStatus.DIVERGED, history=history.table(steps))
             best = min(best, (misfit, matrix), key=lambda pair: pair[0])
-            trace.add(iteration, misfit, steps)
+            history.add(iteration, misfit, steps)
             if abs(misfit - previous) <= delta:
                 status = UpdateStatus.CONVERGED
                 break
-            previous, matrix = misfit, following
-            if iteration % TELL_EVERY == 0:
+            previous, matrix = misfit, next_matrix
+            if iteration % REPORT_INTERVAL == 0:
                 progress(iteration / max_iterations, f"{iteration} iterations, epsilon {misfit:.5g}")
-    return LoopResult(matrix=matrix, status=status, history=trace.table(steps))
+    return LoopResult(matrix=matrix, status=status, history=history.table(steps))
 
 
-class _Trace:
+class _History:
     """Rows of the history, thinned out as they become many."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []
-        self.every = 1
+        self.interval = 1
         self.before: tuple[FloatArray, FloatArray] | None = None
 
     def add(self, iteration: int, misfit: float, steps: tuple[PublishedStep, ...]) -> None:
-        """Note an iteration; the first FRF's poles tell gamma."""
-        if iteration % self.every:
+        """Add an iteration; gamma is that of the first FRF's poles."""
+        if iteration % self.interval:
             self.before = None
             return
         step = steps[0]
         roots = step.roots.copy()
         self.rows.append((iteration + 1, misfit, step.size_of_change(), self._gamma(step, roots), *_parameters(steps)))
-        self.before = roots, step.promised_poles()
-        if len(self.rows) >= KEPT_ROWS:
-            self.rows, self.every, self.before = self.rows[::2], 2 * self.every, None
+        self.before = roots, step.predicted_poles()
+        if len(self.rows) >= MAX_ROWS:
+            self.rows, self.interval, self.before = self.rows[::2], 2 * self.interval, None
 
     def _gamma(self, step: PublishedStep, roots: FloatArray) -> float:
         if self.before is None:
             return float("nan")
-        before, promised = self.before
-        made = (roots - before)[:, : step.n_poles].reshape(-1)
-        return float(promised @ made / np.sqrt((promised @ promised) * (made @ made)))
+        before, predicted = self.before
+        change = (roots - before)[:, : step.n_poles].reshape(-1)
+        return float(predicted @ change / np.sqrt((predicted @ predicted) * (change @ change)))
 
     def table(self, steps: tuple[PublishedStep, ...]) -> pd.DataFrame:
         """Give the history."""

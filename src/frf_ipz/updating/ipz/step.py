@@ -1,8 +1,8 @@
 """One step of the published Iterative Pole-Zero update for one FRF: eqs. (4) to (34) of [Dorosti2018].
 
-The iteration needs ten thousands of steps of matrices of order six, so it is written for few and small calls: LAPACK
-directly, arrays that are made once, and rows and columns put in such an order that the substructure matrices (without
-the row of the actuator and the column of the sensor) are the leading block.
+The iteration needs tens of thousands of steps with matrices of order six, so it is written for few and small calls:
+LAPACK directly, arrays that are allocated once, and rows and columns in such an order that the substructure matrices
+(without the row of the actuator and the column of the sensor) are the leading block.
 
 Poles and zeros come from QZ on the pencil ``[[K, 0], [0, I]] - s [[-B, -M], [I, 0]]`` without balancing. Close to its
 end the published iteration creeps, and where a small delta stops it depends on the rounding of this pencil: with a
@@ -31,7 +31,7 @@ ILL_CONDITIONED = 1e5  # condition number of S^H W S from which alpha is used (s
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StepSettings:
-    """What the user chooses for the published iteration.
+    """Options of the published iteration.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ class PublishedStep:
     computed : (m,) complex array
         Their nominal counterparts.
     n_poles : int
-        How many of them are poles.
+        Number of poles among them.
     settings : StepSettings
-        What the user chose.
+        Options of the iteration.
     """
 
     def __init__(
@@ -82,10 +82,10 @@ class PublishedStep:
         settings: StepSettings,
     ) -> None:
         order, count = len(mass), len(targets)
-        everything = np.arange(order)
+        all_dofs = np.arange(order)
         self.settings, self.n_poles, self.order = settings, n_poles, order
-        self.rows = np.append(np.delete(everything, actuator), actuator)
-        self.columns = np.append(np.delete(everything, sensor), sensor)
+        self.rows = np.append(np.delete(all_dofs, actuator), actuator)
+        self.columns = np.append(np.delete(all_dofs, sensor), sensor)
         self.forward = order * self.rows[:, None] + self.columns
         self.back = np.argsort(self.forward, axis=None).reshape(order, order)
         self.mass, self.damping, self.stiffness = (m.take(self.forward) for m in (mass, damping, stiffness))
@@ -97,7 +97,7 @@ class PublishedStep:
         self.pencils = [_Pencil(self, size, part) for size, part in sizes if part.stop > part.start]
         self.unit = [np.eye(size, order="F") for size in (order, order - 1)]
         self.vectors, self.duals = np.zeros((order, count)), np.zeros((count, order))
-        self.theta, self.change, self.promised = np.ones(count), np.zeros(count), np.zeros(2 * count)
+        self.theta, self.change, self.predicted = np.ones(count), np.zeros(count), np.zeros(2 * count)
         self.changed = (self.damping if settings.damping else self.stiffness).copy()
         for pencil in self.pencils:
             pencil.choose_roots(computed[pencil.part])
@@ -132,7 +132,7 @@ class PublishedStep:
         self.error = error.reshape(-1)
         misfit = float(self.error @ self.error)
         if not isfinite(misfit):
-            raise NumericalError("a pole or zero that is to be updated is no longer there")
+            raise NumericalError("a pole or zero that is to be updated has disappeared")
         return misfit
 
     def step(self) -> FloatArray:
@@ -162,7 +162,7 @@ class PublishedStep:
         if info or not isfinite(float(change @ change)):
             raise NumericalError("the equations of the step are singular: no parameter moves one of the targets")
         change *= self.settings.beta
-        self.change, self.promised = change, change @ weighted
+        self.change, self.predicted = change, change @ weighted
         scaled = self.vectors * change
         self.changed[:size, :size] += scaled[:size, poles:] @ self.duals[poles:, :size]
         whole = scaled[:, :poles] @ self.duals[:poles]
@@ -174,24 +174,24 @@ class PublishedStep:
         """Give the norm of the last change of the parameters over their own norm."""
         return float(np.sqrt((self.change @ self.change) / (self.theta @ self.theta)))
 
-    def promised_poles(self) -> FloatArray:
-        """Give what the last step should change of the poles, eq. (40): real, then imaginary parts, rad/s."""
-        promised = self.promised.reshape(2, -1) / self.weights
-        return np.asarray(promised[:, : self.n_poles].reshape(-1))
+    def predicted_poles(self) -> FloatArray:
+        """Give the change of the poles that the last step predicts, eq. (40): real, then imaginary parts, rad/s."""
+        predicted = self.predicted.reshape(2, -1) / self.weights
+        return np.asarray(predicted[:, : self.n_poles].reshape(-1))
 
     def _eigenvectors(self) -> None:
         """Columns of V and rows of its inverse for the chosen eigenvalues, eqs. (22) and (24)."""
         poles, size = self.n_poles, self.order - 1
-        of_poles, of_zeros = self.chosen
+        for_poles, for_zeros = self.chosen
         if poles:
             values, vectors, order, inverse = _decomposition(self.changed.take(self.back), self.unit[0])
-            chosen = order.take(of_poles)
+            chosen = order.take(for_poles)
             self.theta[:poles] = values.take(chosen)
             self.vectors[:, :poles] = vectors.take(chosen, 1).take(self.rows, 0)
             self.duals[:poles] = inverse.take(chosen, 0).take(self.columns, 1)
-        if len(of_zeros):
+        if len(for_zeros):
             values, vectors, order, inverse = _decomposition(self.changed[:size, :size], self.unit[1])
-            chosen = order.take(of_zeros)
+            chosen = order.take(for_zeros)
             self.theta[poles:] = values.take(chosen)
             self.vectors[:size, poles:] = vectors.take(chosen, 1)
             self.duals[poles:, :size] = inverse.take(chosen, 0)
@@ -220,9 +220,9 @@ class PublishedStep:
         poles, size, count = self.n_poles, self.order - 1, self.targets.shape[1]
         whole = _decomposition(self.changed.take(self.back), self.unit[0])
         part = _decomposition(self.changed[:size, :size], self.unit[1])
-        of_poles = self._most_sensitive(whole, slice(0, poles), self.rows, self.columns)
-        of_zeros = self._most_sensitive(part, slice(poles, count), np.arange(size), np.arange(size))
-        return of_poles, of_zeros
+        for_poles = self._most_sensitive(whole, slice(0, poles), self.rows, self.columns)
+        for_zeros = self._most_sensitive(part, slice(poles, count), np.arange(size), np.arange(size))
+        return for_poles, for_zeros
 
     def _most_sensitive(
         self,
@@ -232,9 +232,9 @@ class PublishedStep:
         columns: IntArray,
     ) -> IntArray:
         values, vectors, order, inverse = decomposition
-        left, right = self.left[: len(rows), part], self.right[: len(columns), part]
-        moved = (vectors[rows][:, order].T @ left) * (inverse[order][:, columns] @ right)
-        effect = np.abs(moved * values[order][:, None])
+        left_vectors, right_vectors = self.left[: len(rows), part], self.right[: len(columns), part]
+        sensitivity = (vectors[rows][:, order].T @ left_vectors) * (inverse[order][:, columns] @ right_vectors)
+        effect = np.abs(sensitivity * values[order][:, None])
         rigid = np.abs(values[order]) < 1e-10 * np.abs(values).max()
         effect[rigid] = 0
         effect /= np.maximum(effect.max(axis=0), np.finfo(float).tiny)
@@ -255,40 +255,42 @@ class _Pencil:
         self.values = step.roots[:, part]
         self.right = step.right.real[:size, part], step.right.imag[:size, part]
         self.left = step.left.real[:size, part], step.left.imag[:size, part]
-        self.places = np.zeros(part.stop - part.start, int)
+        self.indices = np.zeros(part.stop - part.start, int)
 
     def choose_roots(self, computed: ComplexArray) -> None:
-        """Find which of the roots, by ascending imaginary part, the targets belong to."""
+        """Find the indices of the targets' roots, by ascending imaginary part."""
         real, imaginary, beta = lapack.dggev(self.first, self.second)[:3]
         with np.errstate(divide="ignore", invalid="ignore"):  # zeros at infinity have beta = 0
             values = (real + 1j * imaginary) / beta
-        shown = np.sort_complex(-1j * values[values.imag > DOMINANT * np.abs(values.real)])
-        distance = np.abs(1j * shown[None, :] - computed[:, None])
-        rows, places = linear_sum_assignment(distance)
+        dominant = np.sort_complex(-1j * values[values.imag > DOMINANT * np.abs(values.real)])
+        distance = np.abs(1j * dominant[None, :] - computed[:, None])
+        rows, indices = linear_sum_assignment(distance)
         if len(rows) < len(computed):
-            raise NumericalError("the model shows fewer poles or zeros than are to be updated: look at the pairs")
-        self.places = places
+            raise NumericalError(
+                "the model has fewer dominant poles or zeros than are to be updated: look at the pairs"
+            )
+        self.indices = indices
 
     def solve(self) -> None:
-        """Compute roots and vectors for the matrix at hand."""
+        """Compute roots and vectors for the current matrix."""
         size, step = self.size, self.step
         block = step.changed[:size, :size]
         if step.settings.damping:
             np.negative(block, out=self.second[:size, :size])
         else:
             self.first[:size, :size] = block
-        real, imaginary, beta, left, right, _, _ = lapack.dggev(self.first, self.second)
+        real, imaginary, beta, left_vectors, right_vectors, _, _ = lapack.dggev(self.first, self.second)
         real /= beta
         imaginary /= beta
         imaginary[~(imaginary > DOMINANT * np.abs(real))] = np.inf
-        order = imaginary.argsort().take(self.places)
-        after = order + 1
+        order = imaginary.argsort().take(self.indices)
+        imaginary_part = order + 1
         real.take(order, out=self.values[0])
         imaginary.take(order, out=self.values[1])
-        self.right[0][...] = right.take(order, 1)[:size]
-        self.right[1][...] = right.take(after, 1)[:size]
-        self.left[0][...] = left.take(order, 1)[:size]
-        np.negative(left.take(after, 1)[:size], out=self.left[1])
+        self.right[0][...] = right_vectors.take(order, 1)[:size]
+        self.right[1][...] = right_vectors.take(imaginary_part, 1)[:size]
+        self.left[0][...] = left_vectors.take(order, 1)[:size]
+        np.negative(left_vectors.take(imaginary_part, 1)[:size], out=self.left[1])
 
 
 def _decomposition(matrix: FloatArray, unit: FloatArray) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:

@@ -2,8 +2,8 @@
 
 Eigenvalues of the stiffness matrix and of its substructures are changed until poles and zeros meet their targets; then
 those of the damping matrices. With one FRF this is section 3.1 of the paper, apart from the minus sign and the left
-vectors that eqs. (21) to (26) lack; with several, every iteration makes the step of each FRF in turn. Parameters that a
-diagnosis has chosen take the place of the eigenvalues.
+vectors that eqs. (21) to (26) lack; with several, every iteration makes the step of each FRF in turn. Parameters from a
+diagnosis replace the eigenvalues.
 
 [Dorosti2018] M. Dorosti, R. H. B. Fey, M. F. Heertjes, H. Nijmeijer, Iterative Pole-Zero model updating: A combined
 sensitivity approach, Control Engineering Practice 71, 2018, 164-174, doi:10.1016/j.conengprac.2017.11.002.
@@ -42,27 +42,27 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     problem : UpdateProblem
         Model, targets, parameters.
     options : UpdateOptions
-        What the user has chosen.
+        Options of the user.
     progress : Progress
-        Told how far the work is.
+        Reports how far the work is.
 
     Returns
     -------
     UpdatedModel
-        Without an ensemble: the method says nothing of what remains open.
+        Without an ensemble: the method has no posterior.
 
     Raises
     ------
     InputError
-        If no FRF with targets has its sensor and its blow among the retained DOFs.
+        If no FRF with targets has its sensor and its excited DOF among the retained ones.
     NumericalError
         If the model shows fewer poles or zeros than are to be updated.
     """
     if not len(problem.values):
         return nothing_to_do(problem.model, "ipz")
     if problem.basis is not None and problem.basis.is_from_diagnosis:
-        return _with_parameters(problem, problem.basis, options)
-    model, frfs, left_out = problem.model, *_usable_frfs(problem)
+        return _update_chosen_parameters(problem, problem.basis, options)
+    model, frfs, unused = problem.model, *_usable_frfs(problem)
     result = _phase(problem, model, frfs, options, progress, damping=False)
     model = replace(model, stiffness=result.matrix)
     phases = [("stiffness", result)]
@@ -72,7 +72,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
         phases.append(("damping", result))
     history = pd.concat([result.history.assign(phase=name) for name, result in phases], ignore_index=True)
     worst = max((result.status for _, result in phases), key=list(UpdateStatus).index)
-    return _updated(problem, model, worst, history, left_out)
+    return _updated(problem, model, worst, history, unused)
 
 
 def _phase(
@@ -84,7 +84,7 @@ def _phase(
     *,
     damping: bool,
 ) -> LoopResult:
-    computed = problem.roots_near(model, problem.computed)
+    computed = problem.nearest_roots(model, problem.computed)
     settings = StepSettings(
         alpha=options.alpha,
         beta=options.beta,
@@ -106,44 +106,44 @@ def _step(
 ) -> PublishedStep:
     label = problem.labels[frf]
     poles = np.flatnonzero(problem.frf < 0)
-    places = np.concatenate([poles, np.flatnonzero(problem.frf == frf)])
+    indices = np.concatenate([poles, np.flatnonzero(problem.frf == frf)])
     return PublishedStep(
         model.mass,
         model.damping,
         model.stiffness,
         sensor=model.dofs.index(label.output_dof.unsigned),
         actuator=model.dofs.index(label.input_dof.unsigned),
-        targets=problem.values[places],
-        computed=computed[places],
+        targets=problem.values[indices],
+        computed=computed[indices],
         n_poles=len(poles),
         settings=settings,
     )
 
 
 def _usable_frfs(problem: UpdateProblem) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """FRFs whose sensor and blow are retained: the substructure leaves out their row and column."""
+    """FRFs whose sensor and excited DOF are retained: the substructure lacks their row and column."""
     retained = set(problem.model.dofs)
 
     def usable(frf: int) -> bool:
         label = problem.labels[frf]
         return {label.output_dof.unsigned, label.input_dof.unsigned} <= retained
 
-    wanted = problem.frfs or tuple(range(len(problem.labels)))
-    frfs = tuple(frf for frf in wanted if usable(frf))
+    with_targets = problem.frfs or tuple(range(len(problem.labels)))
+    frfs = tuple(frf for frf in with_targets if usable(frf))
     if not frfs:
-        names = ", ".join(str(problem.labels[frf]) for frf in wanted)
+        names = ", ".join(str(problem.labels[frf]) for frf in with_targets)
         raise InputError(
-            f"[update] method = 'ipz' needs sensor and blow of an FRF among [reduce] dofs; none of {names} is"
+            f"[update] method = 'ipz' needs sensor and excited DOF of an FRF among [reduce] dofs; {names} have not both"
         )
-    left_out = tuple(
-        f"the zeros of {problem.labels[frf]} are left out: 'ipz' needs its sensor and its blow among [reduce] dofs"
-        for frf in wanted
+    unused = tuple(
+        f"the zeros of {problem.labels[frf]} are not used: 'ipz' needs its sensor and excited DOF among [reduce] dofs"
+        for frf in with_targets
         if frf not in frfs
     )
-    return frfs if problem.frfs else frfs[:1], left_out
+    return frfs if problem.frfs else frfs[:1], unused
 
 
-def _with_parameters(problem: UpdateProblem, basis: ParameterBasis, options: UpdateOptions) -> UpdatedModel:
+def _update_chosen_parameters(problem: UpdateProblem, basis: ParameterBasis, options: UpdateOptions) -> UpdatedModel:
     theta, _, status, history = iterate_parameters(
         problem,
         basis,
@@ -175,7 +175,7 @@ def _updated(
         status=status,
         history=history[["phase", *history.columns.drop("phase")]],
         before=problem.computed,
-        after=problem.roots_near(model, problem.values),
+        after=problem.nearest_roots(model, problem.values),
         ensemble=np.zeros((0, 3, order, order)),
         unmet=unmet,
         warnings=(warning,) if asymmetry > ROUNDING else (),

@@ -2,9 +2,9 @@
 
 The metric is that of a prior over what may be wrong in a model (`updating.parameters`): the change is the most likely
 one. First the stiffness (and, when asked, the mass) brings the moduli of poles and zeros to their targets, then the
-damping their real parts. Targets are weighted by the inverse of their covariance, so that noisy ones are met only as
-far as they deserve; targets that all others contradict are left out, and said. Matrices stay symmetric and positive
-semi-definite, rigid-body modes stay. What targets and prior leave open is drawn from: the ensemble.
+damping their real parts. Targets are weighted by the inverse of their covariance, so that noisy ones are met only
+to within their noise; targets that all others contradict are excluded, and reported. Matrices stay symmetric and
+positive semi-definite, rigid-body modes stay. The ensemble is drawn from the posterior.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
-from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, basis_inside, frame_of, modal_frame
+from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from frf_ipz.updating.problem import UpdateProblem
 
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
-LEFT_OUT = 1.0  # relative standard deviation given to a target that is left out
-SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness makes up for what damping does to it
+EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
+SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
 
 def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -> UpdatedModel:
@@ -45,33 +45,33 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     problem : UpdateProblem
         Model, targets, parameters.
     options : UpdateOptions
-        What the user has chosen.
+        Options of the user.
     progress : Progress
-        Told how far the work is.
+        Reports how far the work is.
 
     Returns
     -------
     UpdatedModel
-        With an ensemble of what remains open.
+        With an ensemble of the posterior.
     """
     if not len(problem.values):
         return nothing_to_do(problem.model, "minimal-change")
     frame = frame_of(problem.model)
     phase = _stiffness_phase(problem, frame)
     start = phase.nominal_roots(problem.computed)
-    stated = _by_damping(problem.computed, start)
+    stated = _change_by_damping(problem.computed, start)
     phase = replace(phase, targets=phase.targets - stated)
-    left_out = contradicted_targets(phase, start)
+    excluded = contradicted_targets(phase, start)
     phase = replace(
-        phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.wanted.frf)), left_out) * LEFT_OUT**2)
+        phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.target_roots.frf)), excluded) * EXCLUDED_STD**2)
     )
     result = iterate(phase, start, max_iterations=options.max_iterations)
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
-    damping = _damping(problem, frame, inner, phase, result)
+    damping = _damping_phase(problem, frame, inner, phase, result)
     damped = iterate(damping, damping.initial_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
-    shift = _by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
+    shift = _change_by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
     if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(result.noise))):
         phase = replace(phase, targets=phase.targets - shift, noise=phase.noise + np.diag((shift / 2) ** 2))
         result = iterate(
@@ -91,11 +91,11 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
         damping_result=damped,
     )
     progress(0.8, "ensemble")
-    return _updated(problem, options, posterior, history, left_out)
+    return _updated(problem, options, posterior, history, excluded)
 
 
-def _by_damping(damped: ComplexArray, undamped: TrackedRoots) -> FloatArray:
-    """Give what damping adds to the logarithms of the moduli."""
+def _change_by_damping(damped: ComplexArray, undamped: TrackedRoots) -> FloatArray:
+    """Change of the logarithms of the moduli by damping."""
     return np.asarray(np.log(np.abs(damped)) - log_moduli(undamped, len(damped)))
 
 
@@ -106,18 +106,18 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
     gradient = np.stack([problem.values.real, problem.values.imag], axis=1) / size[:, None] ** 2
     return StiffnessPhase(
         eigenvalues=frame.eigenvalues,
-        basis=basis_inside(frame, basis),
-        wanted=TargetRoots(frf=problem.frf, rows=_rows(problem, frame)),
+        basis=modal_parameters(frame, basis),
+        target_roots=TargetRoots(frf=problem.frf, rows=_modal_rows(problem, frame)),
         targets=np.log(size),
-        noise=_projected(problem.covariance, gradient) + SMALLEST_NOISE**2 * np.eye(len(size)),
+        noise=_project_covariance(problem.covariance, gradient) + SMALLEST_NOISE**2 * np.eye(len(size)),
         changes_mass=bool(np.any(basis.mass)),
     )
 
 
-def _damping(
+def _damping_phase(
     problem: UpdateProblem, frame: ModalFrame, inner: ModalFrame, phase: StiffnessPhase, result: PhaseResult
 ) -> DampingPhase:
-    rows = phase.wanted.rows.items()
+    rows = phase.target_roots.rows.items()
     real_part = np.tile([-1.0, 0.0], (len(problem.values), 1))
     return damping_phase(
         phase.basis,
@@ -125,32 +125,32 @@ def _damping(
         TargetRoots(
             frf=problem.frf, rows={number: (out @ inner.shapes, force @ inner.shapes) for number, (out, force) in rows}
         ),
-        inner.inside(frame.inside(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
+        inner.to_modal(frame.to_modal(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
         _dashpots(problem, frame, inner),
         problem.values,
-        _projected(problem.covariance, real_part),
+        _project_covariance(problem.covariance, real_part),
         np.exp(log_moduli(result.tracked, len(problem.values))),
     )
 
 
 def _dashpots(problem: UpdateProblem, frame: ModalFrame, inner: ModalFrame) -> FloatArray:
-    """Give the dampers of the model, which are no damping of its modes."""
+    """Dampers of the model, which are no damping of its modes, in the inner coordinates."""
     dashpots = problem.model.dashpots
-    return inner.inside(frame.inside(dashpots)) if dashpots.size else np.zeros((len(inner.eigenvalues),) * 2)
+    return inner.to_modal(frame.to_modal(dashpots)) if dashpots.size else np.zeros((len(inner.eigenvalues),) * 2)
 
 
 def _damping_by_stiffness(phase: StiffnessPhase, theta: FloatArray) -> FloatArray:
-    """Damping of parameters that the stiffness has fixed: a joint that is both a spring and a damper."""
+    """Damping of parameters that the stiffness phase has fixed: a joint that is both a spring and a damper."""
     fixed = np.any(phase.basis.stiffness != 0, axis=(1, 2)) | np.any(phase.basis.mass != 0, axis=(1, 2))
     return np.asarray(np.tensordot(phase.basis.amounts(theta) * fixed, phase.basis.damping, 1))
 
 
-def _rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[FloatArray, FloatArray]]:
+def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[FloatArray, FloatArray]]:
     pairs = {number: problem.rows(number) for number in problem.frfs}
     return {number: (output @ frame.shapes, force @ frame.shapes) for number, (output, force) in pairs.items()}
 
 
-def _projected(covariance: FloatArray, gradient: FloatArray) -> FloatArray:
+def _project_covariance(covariance: FloatArray, gradient: FloatArray) -> FloatArray:
     """Covariance of one number a target, each with a gradient by its real and imaginary part."""
     count = len(gradient)
     blocks = covariance.reshape(count, 2, count, 2)
@@ -162,7 +162,7 @@ def _updated(
     options: UpdateOptions,
     posterior: Posterior,
     history: list[tuple[str, PhaseResult]],
-    left_out: IntArray,
+    excluded: IntArray,
 ) -> UpdatedModel:
     mass, damping, stiffness = posterior.model()
     model = replace(problem.model, mass=mass, damping=damping, stiffness=stiffness)
@@ -176,15 +176,15 @@ def _updated(
         status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
         history=pd.DataFrame([{"phase": name, **row} for name, result in history for row in result.rows]),
         before=problem.computed,
-        after=problem.roots_near(model, tracked),
+        after=problem.nearest_roots(model, tracked),
         ensemble=ensemble,
-        unmet=unmet_targets(posterior.stiffness_result, problem.names, left_out),
+        unmet=unmet_targets(posterior.stiffness_result, problem.names, excluded),
         parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
     )
 
 
 def _parts(basis: ParameterBasis, theta: FloatArray, draws: FloatArray) -> pd.DataFrame:
-    """Change of each part; empty where the parameters belong to no place."""
+    """Change of each part; empty for parameters without a location."""
     count = len(basis.regions)
     if not count:
         return pd.DataFrame()

@@ -1,4 +1,4 @@
-"""Models drawn from what targets and prior leave open: the null space of an update, and the noise of its targets."""
+"""Models drawn from the posterior of an update: its null space, and the noise of its targets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from frf_ipz.updating.parameters import unwhiten
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Posterior:
-    """Both phases of an update and where they ended.
+    """Both phases of an update with their results.
 
     Parameters
     ----------
@@ -27,13 +27,13 @@ class Posterior:
     stiffness : StiffnessPhase
         With its targets and noise.
     stiffness_result : PhaseResult
-        Where it ended.
+        Its result.
     inner : ModalFrame
         Coordinates of the damping phase: modes of the model with updated stiffness, inside `frame`.
     damping : DampingPhase
         With its targets and noise.
     damping_result : PhaseResult
-        Where it ended.
+        Its result.
     """
 
     frame: ModalFrame
@@ -46,8 +46,8 @@ class Posterior:
     def model(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Give mass, damping and stiffness of the updated model, each (r, r)."""
         mass, stiffness = self.stiffness.matrices(self.stiffness_result.theta)
-        damping = self.inner.outside(self.damping.damping(self.damping_result.theta))
-        return self.frame.outside(mass), self.frame.outside(damping), self.frame.outside(stiffness)
+        damping = self.inner.from_modal(self.damping.damping(self.damping_result.theta))
+        return self.frame.from_modal(mass), self.frame.from_modal(damping), self.frame.from_modal(stiffness)
 
 
 def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
@@ -60,7 +60,7 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
     rng : Generator
         Source of randomness.
     count : int
-        How many.
+        Number of models.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
     theta, mass, stiffness = _draw_stiffness(posterior, rng, count)
     damping = _draw_damping(posterior, rng, count)
     frame = posterior.frame
-    return np.stack([frame.outside(mass), frame.outside(damping), frame.outside(stiffness)], axis=1), theta
+    return np.stack([frame.from_modal(mass), frame.from_modal(damping), frame.from_modal(stiffness)], axis=1), theta
 
 
 def _draw_stiffness(
@@ -82,16 +82,16 @@ def _draw_stiffness(
     whitened = draw_posterior(result.step, result.sensitivity, result.noise, rng, count)
     theta = unwhiten(phase.terms, result.scales[:-1], whitened)
     mass, stiffness = phase.matrices(theta)
-    # what the linear step promised for the poles is imposed: far from the mean, second-order terms would blur them
-    poles = np.flatnonzero(phase.wanted.frf < 0)
-    promised = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
-    wanted = np.exp(2 * promised[:, poles])
+    # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
+    poles = np.flatnonzero(phase.target_roots.frf < 0)
+    predicted = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
+    squares = np.exp(2 * predicted[:, poles])
     shapes = next((roots.right_vectors.real for _, roots in result.tracked.groups if len(poles)), None)
-    return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, wanted)
+    return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, squares)
 
 
-def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Give the modes that are most like some shapes the squared frequencies wanted; negative ones become 0."""
+def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squares: FloatArray) -> FloatArray:
+    """Give squared frequencies to the modes most like some shapes; negative eigenvalues of the rest become 0."""
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
     values = np.maximum(values, 0.0)
@@ -99,7 +99,7 @@ def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, wan
     likeness = (shapes.T @ sides) ** 2
     for member in range(len(values)):
         rows, columns = linear_sum_assignment(-likeness[member])
-        values[member, columns] = wanted[member, rows]
+        values[member, columns] = squares[member, rows]
     return np.asarray((sides * values[:, None, :]) @ sides.swapaxes(1, 2))
 
 
@@ -109,4 +109,4 @@ def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) ->
     members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
     values, vectors = np.linalg.eigh(members)
     members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    return posterior.inner.outside(members)
+    return posterior.inner.from_modal(members)

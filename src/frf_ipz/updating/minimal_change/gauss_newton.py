@@ -1,7 +1,7 @@
-"""The one iteration of a minimal change: Gauss-Newton on the total change, under a prior whose scales are found too.
+"""The iteration of a minimal change: Gauss-Newton on the total change, under a prior whose scales are estimated too.
 
 Each step solves the linearised problem from the nominal model again, so that the prior always weighs the whole change
-and not the last step. A phase (stiffness, damping) says what its roots are and how they move; the loop is here.
+and not the last step. A phase (stiffness, damping) gives its roots and their derivatives; the loop is here.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from frf_ipz.updating.parameters import PriorTerm, unwhiten
 from frf_ipz.updating.tracking import TrackedRoots
 
 MAX_ITERATIONS = 30
-SETTLED = 0.3  # standard deviations by which the model still misses what the last linear step promised
-STILL = 0.03  # prior standard deviations that no parameter moved by: the optimum, whatever misfit is left
-MET = 0.1  # of the number of targets: a misfit so far below what noise makes needs no further step
+CONVERGED_ERROR = 0.3  # standard deviations between the roots and the prediction of the last linear step
+CONVERGED_STEP = 0.03  # prior standard deviations by which parameters changed: the optimum, whatever the misfit
+MET = 0.1  # of the number of targets: a misfit so far below that of noise needs no further step
 MAX_HALVINGS = 6
-CURVATURE = 0.5  # of the squared error at first, then of what the last linear step did not foresee: taken as noise
+CURVATURE = 0.5  # of the squared error at first, then of the error of the last linear prediction: counts as noise
 SLACK_UNCERTAINTY = 1.5  # standard deviation of the logarithm of the factor on the slack
-STALLED = 3.0  # times that noise is taken after a step of which no part was any good
-SCALE_ITERATIONS = 3  # iterations that ask the evidence again: later ones would only chase their own change
+STALLED = 3.0  # factor on that noise after a step that had to be rejected
+SCALE_ITERATIONS = 3  # iterations that maximise the evidence: later ones would only follow their own change
 
 
 class Phase(Protocol):
-    """What the loop needs to know of the stiffness or of the damping."""
+    """What the loop needs of the stiffness or of the damping."""
 
     @property
     def terms(self) -> tuple[PriorTerm, ...]:
@@ -42,15 +42,15 @@ class Phase(Protocol):
     def slack(self) -> FloatArray:
         """Standard deviations of what no parameter explains, (n,), before the data are seen."""
 
-    def roots(self, theta: FloatArray, near: TrackedRoots) -> TrackedRoots | None:
+    def roots(self, theta: FloatArray, reference: TrackedRoots) -> TrackedRoots | None:
         """Give the roots that belong to the targets.
 
         Parameters
         ----------
         theta : (p,) array
             Parameters.
-        near : TrackedRoots
-            Those of a model close by.
+        reference : TrackedRoots
+            Roots of a model close to this one.
 
         Returns
         -------
@@ -88,8 +88,8 @@ class Phase(Protocol):
             Per unit of the parameters.
         """
 
-    def shown(self, theta: FloatArray) -> dict[str, float]:
-        """Give the parameters that belong into the history.
+    def history_columns(self, theta: FloatArray) -> dict[str, float]:
+        """Give the parameters for the history.
 
         Parameters
         ----------
@@ -102,13 +102,13 @@ class Phase(Protocol):
             By name.
         """
 
-    def largest_part(self, theta: FloatArray, wanted: FloatArray) -> float:
-        """Give the largest part of a step that may be tried.
+    def max_step_fraction(self, theta: FloatArray, proposed: FloatArray) -> float:
+        """Give the largest fraction of a step that may be tried.
 
         Parameters
         ----------
-        theta, wanted : (p,) array
-            Where the step starts and ends.
+        theta, proposed : (p,) array
+            Parameters before and after the step.
 
         Returns
         -------
@@ -119,7 +119,7 @@ class Phase(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PhaseResult:
-    """Where the iteration ended.
+    """Result of the iteration of a phase.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class PhaseResult:
     rows : tuple of dict
         One an iteration, for the history.
     converged : bool
-        True when a further step would change nothing that matters.
+        True where a further step would change nothing that matters.
     """
 
     whitened: FloatArray
@@ -158,8 +158,8 @@ class PhaseResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
-    """A point of the iteration."""
+class _Iterate:
+    """Parameters, roots and errors at a step of the iteration."""
 
     whitened: FloatArray
     theta: FloatArray
@@ -175,7 +175,7 @@ def iterate(
     scales: FloatArray | None = None,
     max_iterations: int | None = None,
 ) -> PhaseResult:
-    """Bring the roots to their targets.
+    """Iterate the roots to their targets.
 
     Parameters
     ----------
@@ -184,18 +184,18 @@ def iterate(
     tracked : TrackedRoots
         Roots at the start.
     start : (k,) array, optional
-        Unit normal numbers of the prior terms to start from, for the scales given or stated; 0 where it is left out.
+        Unit normal numbers of the prior terms to start from; 0 by default.
     scales : (t + 1,) array, optional
-        Standard deviations of the prior terms and the factor on the slack, where they are known from before.
+        Standard deviations of the prior terms and the factor on the slack, if they are to be held.
     max_iterations : int, optional
-        Stop after that many.
+        Largest number of iterations.
 
     Returns
     -------
     PhaseResult
-        Where it ended.
+        Parameters, roots and errors at the end.
     """
-    known = scales is not None
+    scales_are_held = scales is not None
     terms = (
         *phase.terms,
         PriorTerm(
@@ -204,35 +204,42 @@ def iterate(
     )
     scales = np.array([term.std for term in terms]) if scales is None else scales.copy()
     whitened = np.zeros(sum(term.root.shape[1] for term in phase.terms)) if start is None else start
-    place = _Place(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))
-    bend, rows, converged = CURVATURE * place.error**2, [], False
+    state = _Iterate(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))
+    nonlinearity, rows, converged = CURVATURE * state.error**2, [], False
     for iteration in range(1, (max_iterations or MAX_ITERATIONS) + 1):
-        slopes = phase.slopes(place.theta, place.tracked)
+        slopes = phase.slopes(state.theta, state.tracked)
         parts = [slopes @ term.root for term in phase.terms]
-        data = place.error + slopes @ place.theta
-        bent = np.diag(bend**2)
-        if not known and iteration <= SCALE_ITERATIONS:
-            found = most_likely_scales([*parts, np.diag(phase.slack)], terms, data, phase.noise + bent, scales)
-            place = replace(place, whitened=_rescaled(phase.terms, scales / found, place.whitened))
-            scales = found
+        data = state.error + slopes @ state.theta
+        linearisation_noise = np.diag(nonlinearity**2)
+        if not scales_are_held and iteration <= SCALE_ITERATIONS:
+            new_scales = most_likely_scales(
+                [*parts, np.diag(phase.slack)], terms, data, phase.noise + linearisation_noise, scales
+            )
+            state = replace(state, whitened=_rescaled(phase.terms, scales / new_scales, state.whitened))
+            scales = new_scales
         sensitivity = np.hstack([scale * part for scale, part in zip(scales[:-1], parts, strict=True)])
-        scales[-1] = slack_by_discrepancy(sensitivity, data, phase.noise + bent, phase.slack, scales[-1])
+        scales[-1] = slack_by_discrepancy(sensitivity, data, phase.noise + linearisation_noise, phase.slack, scales[-1])
         noise = phase.noise + np.diag((scales[-1] * phase.slack) ** 2)
-        step = solve_step(sensitivity, data, noise + bent)
-        before, (place, part) = place, _walk(phase, scales[:-1], place, step.mean, noise + bent)
-        promised = before.error + part * (data - sensitivity @ step.mean - before.error)
-        surprise = np.abs(place.error - promised)
-        bend = CURVATURE * surprise if part else STALLED * np.maximum(bend, np.sqrt(np.diagonal(noise)))
-        rows.append(_row(terms, iteration, place.error, noise, step, scales, part) | phase.shown(place.theta))
-        converged = part == 1 and _is_settled(noise, surprise, place.whitened - before.whitened)
+        step = solve_step(sensitivity, data, noise + linearisation_noise)
+        before = state
+        state, fraction = _line_search(phase, scales[:-1], before, step.mean, noise + linearisation_noise)
+        predicted = before.error + fraction * (data - sensitivity @ step.mean - before.error)
+        deviation = np.abs(state.error - predicted)
+        if fraction:
+            nonlinearity = CURVATURE * deviation
+        else:
+            nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(np.diagonal(noise)))
+        row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
+        rows.append(row | phase.history_columns(state.theta))
+        converged = fraction == 1 and _has_converged(noise, deviation, state.whitened - before.whitened)
         if converged or rows[-1]["misfit"] < MET * len(data):
             converged = True
             break
     return PhaseResult(
-        whitened=place.whitened,
-        theta=place.theta,
-        tracked=place.tracked,
-        error=place.error,
+        whitened=state.whitened,
+        theta=state.theta,
+        tracked=state.tracked,
+        error=state.error,
         noise=noise,
         scales=scales,
         step=step,
@@ -243,54 +250,54 @@ def iterate(
 
 
 def _rescaled(terms: tuple[PriorTerm, ...], factors: FloatArray, whitened: FloatArray) -> FloatArray:
-    """Whitened numbers of the same parameters under other scales."""
+    """Whitened parameters of the same parameters under other scales."""
     sizes = [term.root.shape[1] for term in terms]
     return np.asarray(whitened * np.repeat(factors[: len(terms)], sizes))
 
 
-def _is_settled(noise: FloatArray, surprise: FloatArray, moved: FloatArray) -> bool:
-    as_promised = bool(np.all(surprise < SETTLED * np.sqrt(np.diagonal(noise))))
-    return as_promised or float(np.abs(moved).max()) < STILL
+def _has_converged(noise: FloatArray, deviation: FloatArray, change: FloatArray) -> bool:
+    is_as_predicted = bool(np.all(deviation < CONVERGED_ERROR * np.sqrt(np.diagonal(noise))))
+    return is_as_predicted or float(np.abs(change).max()) < CONVERGED_STEP
 
 
-def _walk(
-    phase: Phase, scales: FloatArray, place: _Place, wanted: FloatArray, noise: FloatArray
-) -> tuple[_Place, float]:
-    """Go the largest part of the step that keeps the model sound and lets misfit and change together fall."""
+def _line_search(
+    phase: Phase, scales: FloatArray, start: _Iterate, proposed: FloatArray, noise: FloatArray
+) -> tuple[_Iterate, float]:
+    """Take the largest fraction of the step that keeps the model valid and reduces misfit and change together."""
     weights = np.linalg.inv(noise)
 
     def cost(whitened: FloatArray, error: FloatArray) -> float:
         return float(whitened @ whitened + error @ weights @ error)
 
-    allowed = cost(place.whitened, place.error)
-    part = phase.largest_part(place.theta, unwhiten(phase.terms, scales, wanted))
+    initial_cost = cost(start.whitened, start.error)
+    fraction = phase.max_step_fraction(start.theta, unwhiten(phase.terms, scales, proposed))
     for _ in range(MAX_HALVINGS):
-        whitened = place.whitened + part * (wanted - place.whitened)
+        whitened = start.whitened + fraction * (proposed - start.whitened)
         theta = unwhiten(phase.terms, scales, whitened)
-        found = phase.roots(theta, place.tracked)
-        if found is not None:
-            error = phase.errors(found)
-            if cost(whitened, error) <= allowed:
-                return _Place(whitened, theta, found, error), part
-        part /= 2
-    return place, 0.0
+        tracked = phase.roots(theta, start.tracked)
+        if tracked is not None:
+            error = phase.errors(tracked)
+            if cost(whitened, error) <= initial_cost:
+                return _Iterate(whitened, theta, tracked, error), fraction
+        fraction /= 2
+    return start, 0.0
 
 
-def _row(
+def _history_row(
     terms: tuple[PriorTerm, ...],
     iteration: int,
     error: FloatArray,
     noise: FloatArray,
     step: GaussianStep,
     scales: FloatArray,
-    part: float,
+    fraction: float,
 ) -> dict[str, float]:
     return {
         "iteration": iteration,
         "misfit": float(error @ np.linalg.solve(noise, error)),
-        "step": part,
+        "step": fraction,
         "largest_error": float(np.abs(error).max(initial=0.0)),
         "size_of_change": float(np.linalg.norm(step.mean)),
-        "data_left_free": step.freedom,
+        "data_left_free": step.n_determined,
         **{f"std: {term.name}": float(scale) for term, scale in zip(terms, scales, strict=True)},
     }

@@ -1,4 +1,4 @@
-"""Mass-normalised modal coordinates of the nominal model: where changes of any model are of one size."""
+"""Mass-normalised modal coordinates of the nominal model, in which the changes of any model are of one size."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class ModalFrame:
     shapes: FloatArray
     inverse: FloatArray
 
-    def inside(self, matrix: FloatArray) -> FloatArray:
-        """Turn matrices of the model into modal ones.
+    def to_modal(self, matrix: FloatArray) -> FloatArray:
+        """Transform matrices of the model into modal ones.
 
         Parameters
         ----------
@@ -44,12 +44,12 @@ class ModalFrame:
         Returns
         -------
         (..., r, r) array
-            In modal ones.
+            In modal coordinates.
         """
         return np.asarray(self.shapes.T @ matrix @ self.shapes)
 
-    def outside(self, matrix: FloatArray) -> FloatArray:
-        """Turn symmetric modal matrices into those of the model.
+    def from_modal(self, matrix: FloatArray) -> FloatArray:
+        """Transform symmetric modal matrices into those of the model.
 
         Parameters
         ----------
@@ -59,7 +59,7 @@ class ModalFrame:
         Returns
         -------
         (..., r, r) array
-            In the model's, symmetric to the last bit.
+            In the model's coordinates, symmetric to the last bit.
         """
         result = self.inverse.T @ matrix @ self.inverse
         return np.asarray((result + np.swapaxes(result, -1, -2)) / 2)
@@ -99,7 +99,7 @@ def frame_of(model: ReducedModel) -> ModalFrame:
     return modal_frame(model.mass, model.stiffness)
 
 
-def basis_inside(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
+def modal_parameters(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
     """Express parameters in modal coordinates.
 
     Parameters
@@ -116,7 +116,7 @@ def basis_inside(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
     """
     return replace(
         basis,
-        mass=frame.inside(basis.mass),
-        damping=frame.inside(basis.damping),
-        stiffness=frame.inside(basis.stiffness),
+        mass=frame.to_modal(basis.mass),
+        damping=frame.to_modal(basis.damping),
+        stiffness=frame.to_modal(basis.stiffness),
     )

@@ -1,4 +1,4 @@
-"""Targets that cannot be met, and why: contradicted by all others, or beyond what the parameters can move."""
+"""Outliers among the targets, and targets that cannot be met: contradicted by all others, or moved by no parameter."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
     from frf_ipz.updating.tracking import TrackedRoots
 
-CONTRADICTED = 6.0  # standard deviations from what all other targets and the prior say
-LEAST_ERROR = 0.02  # relative: a pair of two different modes is farther apart; what is nearer is small and true
+CONTRADICTED = 6.0  # standard deviations from the prediction by all other targets and the prior
+MIN_ERROR = 0.02  # relative: a wrong pair of two modes is farther apart; smaller errors are real
 CURVATURE = 0.5  # of the squared error: what a linear step cannot see
-MOST = 0.25  # part of the targets that may be left out
-LEFT_OUT = 1.0  # relative standard deviation of a target while it is left out
+MAX_SHARE = 0.25  # of the targets may be excluded
+EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
 UNMET = 4.0  # standard deviations off from which a target counts as not met
-NEAR_ENOUGH = 1e-4  # relative; what is nearer counts as met all the same
-DEAF = 1e-3  # relative change by the prior's standard deviations below which nothing moves a target
+TOLERANCE = 1e-4  # relative error that counts as met in any case
+INSENSITIVE = 1e-3  # relative change by the prior's standard deviations below which no parameter moves a target
 
 
 def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
@@ -37,7 +37,7 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray
     Returns
     -------
     (k,) int array
-        Places of the targets to leave out.
+        Indices of the targets to exclude.
     """
     theta = np.zeros(len(phase.basis.names))
     error = phase.errors(start)
@@ -45,29 +45,29 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray
     parts = [slopes @ term.root for term in phase.terms]
     noise = phase.noise + np.diag((CURVATURE * error**2) ** 2)
     scales = np.array([term.std for term in phase.terms])
-    found: list[int] = []
-    while len(found) <= MOST * len(error):
+    outliers: list[int] = []
+    while len(outliers) <= MAX_SHARE * len(error):
         scales = most_likely_scales(parts, phase.terms, error, noise, scales)
         sensitivity = np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)])
-        worst = most_contradicted(sensitivity, error, noise, CONTRADICTED, least=LEAST_ERROR)
+        worst = most_contradicted(sensitivity, error, noise, CONTRADICTED, least=MIN_ERROR)
         if worst < 0:
-            return np.array(found, int)
-        found.append(worst)
-        noise[worst, worst] += LEFT_OUT**2
+            return np.array(outliers, int)
+        outliers.append(worst)
+        noise[worst, worst] += EXCLUDED_STD**2
     return np.array([], int)  # so many contradictions are no exception: the model is far off, and all targets count
 
 
-def unmet_targets(result: PhaseResult, names: tuple[str, ...], left_out: IntArray) -> tuple[str, ...]:
-    """Say which targets are not met.
+def unmet_targets(result: PhaseResult, names: tuple[str, ...], excluded: IntArray) -> tuple[str, ...]:
+    """Describe the targets that are not met.
 
     Parameters
     ----------
     result : PhaseResult
-        Where it ended.
+        Result of the stiffness phase.
     names : tuple of str
         Targets in words.
-    left_out : (k,) int array
-        Those that were left out.
+    excluded : (k,) int array
+        Excluded targets.
 
     Returns
     -------
@@ -77,12 +77,12 @@ def unmet_targets(result: PhaseResult, names: tuple[str, ...], left_out: IntArra
     deviation = np.sqrt(np.diagonal(result.noise))
     reach = np.linalg.norm(result.sensitivity, axis=1)
     texts = []
-    for place, name in enumerate(names):
-        off = f"the {name} stays {abs(result.error[place]):.2g} of its value off"
-        if place in left_out:
-            texts.append(f"{off}: all other targets contradict it, so it was left out; it may be paired wrongly")
-        elif abs(result.error[place]) > max(UNMET * deviation[place], NEAR_ENOUGH):
-            many = abs(result.error[place]) / deviation[place]
-            why = "nothing that may change moves it" if reach[place] < DEAF else "other targets pull the other way"
-            texts.append(f"{off} ({many:.0f} standard deviations): {why}")
+    for target, name in enumerate(names):
+        error = f"the {name} stays {abs(result.error[target]):.2g} of its value off"
+        if target in excluded:
+            texts.append(f"{error}: all other targets contradict it, so it was excluded; it may be paired wrongly")
+        elif abs(result.error[target]) > max(UNMET * deviation[target], TOLERANCE):
+            ratio = abs(result.error[target]) / deviation[target]
+            why = "no parameter moves it" if reach[target] < INSENSITIVE else "other targets pull the other way"
+            texts.append(f"{error} ({ratio:.0f} standard deviations): {why}")
     return tuple(texts)

@@ -1,7 +1,7 @@
 """The stiffness phase of a minimal change: moduli of poles and zeros by stiffness (and mass).
 
-What is compared are the logarithms of the moduli of undamped roots: the modulus of a pole is what light damping leaves
-alone. What damping adds to the moduli all the same is taken off the targets.
+Targets are the logarithms of the moduli of undamped roots: light damping hardly changes the modulus of a pole. The
+small change by damping is subtracted from the targets.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from frf_ipz.numerics.pencils import undamped_sensitivity
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, track
 
-POLE_SLACK = 1e-7  # relative standard deviation of what a reduced model cannot express of a real pole: it has its modes
-ZERO_SLACK = 1e-5  # the same of a zero, which the modes left out move as well
+POLE_SLACK = 1e-7  # relative standard deviation of a true pole that a reduced model cannot express: it has its modes
+ZERO_SLACK = 1e-5  # the same of a zero, which depends on the modes beyond as well
 INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
 
@@ -30,19 +30,19 @@ class StiffnessPhase:
         Squared natural frequencies of the nominal model, (rad/s)^2: its stiffness; its mass is the unit matrix.
     basis : ParameterBasis
         In the same coordinates.
-    wanted : TargetRoots
-        Which roots are targets.
+    target_roots : TargetRoots
+        Poles and zeros that are targets.
     targets : (n,) array
-        Logarithms of the moduli of measured poles and zeros, less what damping adds to them in the model.
+        Logarithms of the moduli of measured poles and zeros, without the change by damping in the model.
     noise : (n, n) array
         Their covariance.
     changes_mass : bool
-        False where no parameter moves the mass: then its derivatives need not be worked out.
+        False where no parameter changes the mass: its derivatives are then not needed.
     """
 
     eigenvalues: FloatArray
     basis: ParameterBasis
-    wanted: TargetRoots
+    target_roots: TargetRoots
     targets: FloatArray
     noise: FloatArray
     changes_mass: bool
@@ -55,7 +55,7 @@ class StiffnessPhase:
     @property
     def slack(self) -> FloatArray:
         """Standard deviations of what no parameter explains, (n,)."""
-        return np.where(self.wanted.frf < 0, POLE_SLACK, ZERO_SLACK)
+        return np.where(self.target_roots.frf < 0, POLE_SLACK, ZERO_SLACK)
 
     def matrices(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mass and stiffness for some parameters.
@@ -87,19 +87,19 @@ class StiffnessPhase:
         Returns
         -------
         TrackedRoots
-            Where the iteration starts.
+            Roots at the start of the iteration.
         """
-        return nominal_roots(self.wanted, *self.matrices(np.zeros(len(self.basis.names))), computed)
+        return nominal_roots(self.target_roots, *self.matrices(np.zeros(len(self.basis.names))), computed)
 
-    def roots(self, theta: FloatArray, near: TrackedRoots) -> TrackedRoots | None:
+    def roots(self, theta: FloatArray, reference: TrackedRoots) -> TrackedRoots | None:
         """Give the squared roots that belong to the targets; see `Phase`.
 
         Parameters
         ----------
         theta : (p,) array
             Parameters.
-        near : TrackedRoots
-            Those of a model close by.
+        reference : TrackedRoots
+            Roots of a model close to this one.
 
         Returns
         -------
@@ -110,7 +110,7 @@ class StiffnessPhase:
         values = np.linalg.eigvalsh(stiffness)
         if values[0] < -INDEFINITE * values[-1] or (self.changes_mass and np.linalg.eigvalsh(mass)[0] <= 0):
             return None
-        return track(self.wanted, near, mass, stiffness)
+        return track(self.target_roots, reference, mass, stiffness)
 
     def errors(self, tracked: TrackedRoots) -> FloatArray:
         """Give targets minus model.
@@ -143,13 +143,13 @@ class StiffnessPhase:
             Per unit of the parameters.
         """
         result = np.zeros((len(self.targets), len(theta)))
-        for places, roots in tracked.groups:
-            moved = undamped_sensitivity(roots, self.basis.stiffness, self.basis.mass if self.changes_mass else None)
-            result[places] = 0.5 * (moved / roots.values[:, None]).real
+        for indices, roots in tracked.groups:
+            slopes = undamped_sensitivity(roots, self.basis.stiffness, self.basis.mass if self.changes_mass else None)
+            result[indices] = 0.5 * (slopes / roots.values[:, None]).real
         return result * self.basis.slopes(theta)
 
-    def shown(self, theta: FloatArray) -> dict[str, float]:
-        """Give the factor on the stiffness of every region, real over nominal.
+    def history_columns(self, theta: FloatArray) -> dict[str, float]:
+        """Give the factor on the stiffness of every region, updated over nominal.
 
         Parameters
         ----------
@@ -159,26 +159,26 @@ class StiffnessPhase:
         Returns
         -------
         dict of str to float
-            By name; empty for parameters that belong to no place.
+            By name; empty for parameters without a location.
         """
         count = len(self.basis.regions)
         factors = 1 + self.basis.amounts(theta)[:count]
         return dict(zip(self.basis.names[:count], factors.tolist(), strict=True))
 
-    def largest_part(self, theta: FloatArray, wanted: FloatArray) -> float:
+    def max_step_fraction(self, theta: FloatArray, proposed: FloatArray) -> float:
         """Allow the whole step.
 
         Parameters
         ----------
-        theta, wanted : (p,) array
-            Where the step starts and ends.
+        theta, proposed : (p,) array
+            Parameters before and after the step.
 
         Returns
         -------
         float
             1.
         """
-        del theta, wanted
+        del theta, proposed
         return 1.0
 
 
