@@ -46,10 +46,10 @@ def apply_to_model(
     StructuralModel
         The model with what it lacked; the same model where findings are in the measuring chain only, or none.
     """
-    return corrector(model, diagnosis, effects)([finding.values for finding in diagnosis.findings])
+    return prepare_correction(model, diagnosis, effects)([finding.values for finding in diagnosis.findings])
 
 
-def corrector(
+def prepare_correction(
     model: StructuralModel, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None
 ) -> Callable[[Sequence[Sequence[float]]], StructuralModel]:
     """Prepare to put the findings into the model, for any values of their parameters.
@@ -64,12 +64,12 @@ def corrector(
     callable
         From the values of each finding to the model with what it lacked.
     """
-    base = model if diagnosis.linearised_law is None else _with_law(model, diagnosis.linearised_law)
+    base = model if diagnosis.linearised_law is None else _add_linearised_law(model, diagnosis.linearised_law)
     known = effects or shipped_effects()
     structural = {
-        number: known[one.effect]
-        for number, one in enumerate(diagnosis.findings)
-        if one.effect in known and known[one.effect].chain(_location_of(one)) is None
+        number: known[finding.effect]
+        for number, finding in enumerate(diagnosis.findings)
+        if finding.effect in known and known[finding.effect].chain(_location_of(finding)) is None
     }
     if not structural or diagnosis.curves is None:
         return lambda _: base
@@ -86,7 +86,7 @@ def corrector(
     return correct
 
 
-def _with_law(model: StructuralModel, law: LinearisedLaw) -> StructuralModel:
+def _add_linearised_law(model: StructuralModel, law: LinearisedLaw) -> StructuralModel:
     """Put the spring and the damper that stand for a force law into a model."""
     rows = [model.full_index(end) for end in reversed(law.ends)]
     signs = [1.0, -1.0][: len(rows)]
@@ -100,7 +100,7 @@ def _with_law(model: StructuralModel, law: LinearisedLaw) -> StructuralModel:
 
 
 def _model_context(model: StructuralModel, curves: Curves) -> ModelContext:
-    """Gather what effects may know, as it was when they were searched for."""
+    """Gather what effects may use, as it was when they were searched for."""
     layout = make_layout(curves.labels)
     measured_rows = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     highest = float(curves.s.imag.max())
@@ -128,28 +128,28 @@ def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effe
     Returns
     -------
     FrfSet
-        What a faultless measuring chain would have shown, its sensors where they really are.
+        FRFs of a faultless measuring chain, its sensors where they really are.
     """
-    change = _chain(diagnosis, effects or shipped_effects())
+    change = _chain_change(diagnosis, effects or shipped_effects())
     if not (change.channels or change.moved):
         return frfs
     factors = np.ones(frfs.values.shape, np.complex128)
     for index, label in enumerate(frfs.labels):
-        output, struck = _channels(label)
+        output, excited = _channel_names(label)
         if output in change.channels:
-            shown = change.channels[output](frfs.s)
-            factors[:, index] /= np.where(shown == 0, 1.0, shown)  # a high-pass has nothing to show at 0 Hz
-        if struck in change.channels:
-            factors[:, index] *= change.channels[struck](frfs.s)
+            factor = change.channels[output](frfs.s)
+            factors[:, index] /= np.where(factor == 0, 1.0, factor)  # a high-pass passes nothing at 0 Hz
+        if excited in change.channels:
+            factors[:, index] *= change.channels[excited](frfs.s)
     return replace(
         frfs,
         values=frfs.values * factors,
         variance=frfs.variance * np.abs(factors) ** 2,
-        labels=tuple(_where_it_is(label, change.moved) for label in frfs.labels),
+        labels=tuple(_relabel(label, change.moved) for label in frfs.labels),
     )
 
 
-def _chain(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Change:
+def _chain_change(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Change:
     """Everything that the findings change in the measuring chain."""
     total = NO_CHANGE
     for finding in diagnosis.findings:
@@ -164,12 +164,12 @@ def _location_of(finding: Finding) -> Location:
     return Location(key=finding.key, entries=finding.location, text=text)
 
 
-def _channels(label: FrfLabel) -> tuple[str, str]:
+def _channel_names(label: FrfLabel) -> tuple[str, str]:
     return label.output_channel or f"output {label.output_dof}", label.input_channel or f"input {label.input_dof}"
 
 
-def _where_it_is(label: FrfLabel, moved: Mapping[str, int]) -> FrfLabel:
-    node = moved.get(_channels(label)[0])
+def _relabel(label: FrfLabel, moved: Mapping[str, int]) -> FrfLabel:
+    node = moved.get(_channel_names(label)[0])
     if node is None:
         return label
     return replace(label, output_dof=Dof(node, label.output_dof.direction, label.output_dof.sign))

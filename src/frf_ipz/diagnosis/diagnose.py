@@ -68,10 +68,10 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
-CERTAIN = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
-ENOUGH_TO_COMPARE = 2  # blows at a place
-ALIKE_NATS = 5.0  # effects nearer to each other than that are not told apart
-MOST_ALTERNATIVES = 6
+CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
+MIN_RECORDS = 2  # at one excited point, to compare levels
+AMBIGUOUS = 5.0  # log Bayes factor: effects nearer to the best than that are not distinguished
+MAX_ALTERNATIVES = 6
 
 
 def diagnose(
@@ -95,7 +95,7 @@ def diagnose(
     folder : Path
         Where paths of users' own effects start.
     progress : Progress
-        Told how far it is.
+        Receives the progress.
 
     Returns
     -------
@@ -114,32 +114,38 @@ def diagnose(
 def _diagnose(
     model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
 ) -> Diagnosis:
-    progress(0.0, "comparing weak and strong blows")
-    observations, linearity = _without_constants(observations)
+    progress(0.0, "comparing weak and strong records")
+    observations, linearity = _clean_and_assess(observations)
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.05, "measuring transfer functions")
     source = split_data(observations)
-    kept = _identifiable(select_effects(options, folder), scale)
-    pose_with = partial(pose_problem, model, source, observations.band_hz, effects=kept, free_gains=scale)
+    effects = _select_identifiable(select_effects(options, folder), scale)
+    pose_with = partial(pose_problem, model, source, observations.band_hz, effects=effects, free_gains=scale)
     problem = pose_with(options)
-    gates = run_data_checks(source, linearity)
+    data_checks = run_data_checks(source, linearity)
     excess = linearity.score / linearity.limit if linearity and select_laws(options, folder) else 0.0
-    certain = excess > CERTAIN
-    problem, found, shortfall = _decide(problem, pose_with, options, progress, is_certain=certain)
+    is_clearly_nonlinear = excess > CLEARLY_NONLINEAR
+    problem, decision, shortfall = _decide(
+        problem, pose_with, options, progress, is_clearly_nonlinear=is_clearly_nonlinear
+    )
     progress(0.9, "proving on what was not fitted")
     held_out = make_data(source.held_out, options, free_gains=scale)
-    found, proof = _proven(problem, held_out, found)
-    linear = _linear(problem, found, proof, gates, held_out_kind=source.held_out_kind)
-    statement = _statement(found, linear.findings, shortfall)
-    linear = replace(linear, statement=statement, unexplained_part=shortfall, warnings=list_warnings(source, gates))
+    decision, proof = _prove_and_prune(problem, held_out, decision)
+    linear = _make_linear_diagnosis(problem, decision, proof, data_checks, held_out_kind=source.held_out_kind)
+    statement = _write_statement(decision, linear.findings, shortfall)
+    linear = replace(
+        linear, statement=statement, unexplained_part=shortfall, warnings=list_warnings(source, data_checks)
+    )
     if excess <= 1:
         return linear
-    laws_of = partial(search_laws, options=options, folder=folder, progress=_late(progress))
+    laws_of = partial(search_laws, options=options, folder=folder, progress=_late_progress(progress))
     laws = laws_of(model, observations, linearity=linearity)
-    if certain or not kept or found.verdict == UNEXPLAINED:
-        pose_with_observations = partial(_pose_with_observations, model, options, kept, scale)
-        return _nonlinear(linear, problem, pose_with_observations, found, model, observations, laws, laws_of)
-    return _unless_a_law(linear, laws)
+    if is_clearly_nonlinear or not effects or decision.verdict == UNEXPLAINED:
+        pose_with_observations = partial(_pose_with_observations, model, options, effects, scale)
+        return _diagnose_nonlinear(
+            linear, problem, pose_with_observations, decision, model, observations, laws, laws_of
+        )
+    return _prefer_proven_law(linear, laws)
 
 
 def _decide(
@@ -148,87 +154,96 @@ def _decide(
     options: DiagnoseOptions,
     progress: Progress,
     *,
-    is_certain: bool,
+    is_clearly_nonlinear: bool,
 ) -> tuple[InferenceProblem, Decision, str]:
-    """Decide what is missing, unless a law is; where damping alone has no explanation, once more with damping free."""
-    is_searched = bool(problem.effects) and not is_certain
-    found = decide(problem, progress) if is_searched else decide_without_search(problem)
-    if is_searched and is_damping_only(problem, found):
-        freed = drop_damping_effects(pose_with(free_damping(options)))
-        again = decide(freed, progress)
-        if again.goodness.is_good:
-            return freed, replace(again, verdict=UNEXPLAINED), describe_damping(again.final, options)
-    unnamed_force = find_unnamed_force(problem, found) if found.final.explains_nearly_all else None
+    """Decide what is missing, unless clearly a law; where damping alone has no explanation, again with free damping."""
+    is_searched = bool(problem.effects) and not is_clearly_nonlinear
+    decision = decide(problem, progress) if is_searched else decide_without_search(problem)
+    if is_searched and is_damping_only(problem, decision):
+        free_problem = drop_damping_effects(pose_with(free_damping(options)))
+        free_decision = decide(free_problem, progress)
+        if free_decision.goodness.is_good:
+            return (
+                free_problem,
+                replace(free_decision, verdict=UNEXPLAINED),
+                describe_damping(free_decision.final, options),
+            )
+    unnamed_force = find_unnamed_force(problem, decision) if decision.final.explains_nearly_all else None
     if unnamed_force is not None:
         return (
             problem,
-            replace(found, verdict=UNEXPLAINED, unnamed_force=unnamed_force),
+            replace(decision, verdict=UNEXPLAINED, unnamed_force=unnamed_force),
             describe_unnamed_force(unnamed_force),
         )
-    if found.verdict == EXPLAINED and (rather := describe_implausibility(found.final)):
-        return problem, replace(found, verdict=UNEXPLAINED), rather
-    return problem, found, found.goodness.shortfall if found.verdict == UNEXPLAINED else ""
+    if decision.verdict == EXPLAINED and (reason := describe_implausibility(decision.final)):
+        return problem, replace(decision, verdict=UNEXPLAINED), reason
+    return problem, decision, decision.goodness.shortfall if decision.verdict == UNEXPLAINED else ""
 
 
-def _proven(problem: InferenceProblem, held_out: Data, found: Decision) -> tuple[Decision, Proof]:
-    """Prove, and leave out what explains a part only and makes worse what was not fitted."""
-    proof = prove(problem, held_out, found.null, found.final)
-    while found.verdict == UNEXPLAINED and proof.after.held_out > proof.before.held_out:
-        if found.final is found.null:  # the model goes on as it is
-            as_it_is = replace(proof.curves, explained=proof.curves.nominal)
-            return found, replace(proof, after=proof.before, curves=as_it_is)
-        found = drop_last_component(problem, found)
-        proof = prove(problem, held_out, found.null, found.final)
-    return found, proof
+def _prove_and_prune(problem: InferenceProblem, held_out: Data, decision: Decision) -> tuple[Decision, Proof]:
+    """Prove, and drop what explains a part only and makes worse what was not fitted."""
+    proof = prove(problem, held_out, decision.null, decision.final)
+    while decision.verdict == UNEXPLAINED and proof.after.held_out > proof.before.held_out:
+        if decision.final is decision.null:  # the nominal model goes on
+            nominal_curves = replace(proof.curves, explained=proof.curves.nominal)
+            return decision, replace(proof, after=proof.before, curves=nominal_curves)
+        decision = drop_last_component(problem, decision)
+        proof = prove(problem, held_out, decision.null, decision.final)
+    return decision, proof
 
 
-def _linear(
-    problem: InferenceProblem, found: Decision, proof: Proof, gates: tuple[DataCheck, ...], *, held_out_kind: str
+def _make_linear_diagnosis(
+    problem: InferenceProblem,
+    decision: Decision,
+    proof: Proof,
+    data_checks: tuple[DataCheck, ...],
+    *,
+    held_out_kind: str,
 ) -> Diagnosis:
-    """Gather what a linear model explains; it is not said yet."""
-    where = describe_mismatch(problem, found.null, proof.curves)
-    weighed = rank_effects(found.ranking.fits, max(1.0, found.goodness.misfit))
-    findings = _findings(problem, found, weighed)
+    """Gather what a linear model explains, still without a statement."""
+    mismatch = describe_mismatch(problem, decision.null, proof.curves)
+    ranked_effects = rank_effects(decision.ranking.fits, max(1.0, decision.goodness.misfit))
+    findings = _make_findings(problem, decision, ranked_effects)
     return Diagnosis(
-        verdict=found.verdict,
+        verdict=decision.verdict,
         findings=findings,
-        alternatives=_alternatives(found, weighed),
-        mismatch_hz=where[0],
-        mismatch_where=where[1],
-        mismatch_location=_mismatch_location(problem, found, findings),
-        mismatch=where[2],
+        alternatives=_make_alternatives(decision, ranked_effects),
+        mismatch_hz=mismatch[0],
+        mismatch_where=mismatch[1],
+        mismatch_location=_locate_mismatch(problem, decision, findings),
+        mismatch=mismatch[2],
         before=proof.before,
         updated=proof.updated,
         after=proof.after,
         held_out_kind=held_out_kind,
-        ambiguity=_ambiguity(problem, found, weighed),
-        data_checks=gates,
-        detectability=find_detectable_sizes(problem, found.null, found.null_goodness.required_log_bayes_factor),
+        ambiguity=_find_ambiguity(problem, decision, ranked_effects),
+        data_checks=data_checks,
+        detectability=find_detectable_sizes(problem, decision.null, decision.null_goodness.required_log_bayes_factor),
         curves=proof.curves,
-        numbers=_numbers(found),
+        numbers=_collect_numbers(decision),
     )
 
 
-def _without_constants(observations: Observations) -> tuple[Observations, Linearity | None]:
-    """Take off what no structure does, and compare blows of several levels.
+def _clean_and_assess(observations: Observations) -> tuple[Observations, Linearity | None]:
+    """Remove residual motion and offsets, and compare records of several levels.
 
-    Constants are read from what blows of one linear system do not share, or, where they are of none, at rest.
+    Offsets are read from what records of one linear system do not share, or, where they are of none, at rest.
     """
     linear = remove_residual_motion(observations)
-    linearity = _linearity(linear)
+    linearity = _assess_linearity(linear)
     if linearity is None or not linearity.is_nonlinear:
         return linear, linearity
-    quiet = remove_dc_offset(observations)
-    return quiet, _linearity(quiet)
+    without_offset = remove_dc_offset(observations)
+    return without_offset, _assess_linearity(without_offset)
 
 
-def _linearity(observations: Observations) -> Linearity | None:
-    """Compare blows of several levels; None where no place has two."""
+def _assess_linearity(observations: Observations) -> Linearity | None:
+    """Compare records of several levels; None where no point was excited twice."""
     counts = [len(records) for records in group_records(observations)]
-    return None if max(counts, default=0) < ENOUGH_TO_COMPARE else assess_linearity(observations)
+    return None if max(counts, default=0) < MIN_RECORDS else assess_linearity(observations)
 
 
-def _late(progress: Progress) -> Progress:
+def _late_progress(progress: Progress) -> Progress:
     """Progress of what comes after the linear model."""
     return lambda part, text: progress(0.9 + 0.1 * part, text)
 
@@ -240,11 +255,11 @@ def _pose_with_observations(
     free_gains: str,
     observations: Observations,
 ) -> InferenceProblem:
-    """Bring the model and changed recordings together."""
+    """Pose the problem of the model and changed recordings."""
     return pose_problem(model, split_data(observations), observations.band_hz, options, effects, free_gains=free_gains)
 
 
-def _nonlinear(
+def _diagnose_nonlinear(
     linear: Diagnosis,
     problem: InferenceProblem,
     pose_with_observations: Callable[[Observations], InferenceProblem],
@@ -254,7 +269,7 @@ def _nonlinear(
     laws: LawSearch,
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
 ) -> Diagnosis:
-    """Look for a linear cause beside a law, where that strains the model or none explains by itself."""
+    """Search for a linear effect beside a law, where that strains the model or none explains by itself."""
     beside = None
     if problem.effects and laws.verdict == UNEXPLAINED:
         beside = search_beside_linear(problem, decision, laws, model, observations, laws_of)
@@ -262,38 +277,38 @@ def _nonlinear(
         beside = search_beside_law(pose_with_observations, laws, model, observations, laws_of)
     if beside is not None:
         law, component = beside
-        found = _with_law(linear, law)
-        findings = tuple(sorted((*found.findings, component), key=lambda finding: -finding.log_evidence_gain))
-        return replace(found, findings=findings, statement=f"{found.statement} {component.statement}")
-    found = _with_law(linear, laws)
-    if laws.verdict != UNEXPLAINED or found.findings or not linear.findings:
-        return found
+        diagnosis = _add_law(linear, law)
+        findings = tuple(sorted((*diagnosis.findings, component), key=lambda finding: -finding.log_evidence_gain))
+        return replace(diagnosis, findings=findings, statement=f"{diagnosis.statement} {component.statement}")
+    diagnosis = _add_law(linear, laws)
+    if laws.verdict != UNEXPLAINED or diagnosis.findings or not linear.findings:
+        return diagnosis
     return replace(linear, verdict=UNEXPLAINED, statement=f"{laws.statement} {linear.statement}")
 
 
-def _unless_a_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
-    """Keep a linear explanation that leaves nothing, unless a law says how blows disagree, which nothing linear can."""
+def _prefer_proven_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
+    """Keep a linear explanation that leaves nothing, unless a law explains how records disagree: nothing linear can."""
     is_proven = laws.verdict == EXPLAINED and laws.nonlinear_evidence > LAW_NATS
-    return _with_law(linear, laws) if is_proven else linear
+    return _add_law(linear, laws) if is_proven else linear
 
 
-def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
-    """Say what a law explains; the linear model about the amplitudes of the test stays beside."""
-    found = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
+def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
+    """Put what a law explains into a diagnosis, with the linear model about the amplitudes of the test."""
+    findings = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
     before, updated, after = laws.before or linear.before, laws.updated or linear.updated, laws.after or linear.updated
-    is_needed = bool(found) and float(np.fmin(found[0].log_evidence_gain, laws.nonlinear_evidence)) > LAW_NATS
+    is_needed = bool(findings) and float(np.fmin(findings[0].log_evidence_gain, laws.nonlinear_evidence)) > LAW_NATS
     is_worse = laws.verdict == UNEXPLAINED and after.held_out > updated.held_out
     n_findings = 1 if is_needed and not is_worse else 0
     linearised = linearise(laws.fit, laws.modal_model) if n_findings and laws.fit and laws.modal_model else None
     return replace(
         linear,
         verdict=laws.verdict,
-        findings=found[:n_findings],
-        alternatives=found[n_findings:],
+        findings=findings[:n_findings],
+        alternatives=findings[n_findings:],
         before=before,
         updated=updated,
         after=after if n_findings else updated,
-        mismatch_location=laws.location or (found[0].location if n_findings else {}),
+        mismatch_location=laws.location or (findings[0].location if n_findings else {}),
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised_law=linearised,
@@ -302,39 +317,41 @@ def _with_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     )
 
 
-def _mismatch_location(
-    problem: InferenceProblem, found: Decision, findings: tuple[Finding, ...]
+def _locate_mismatch(
+    problem: InferenceProblem, decision: Decision, findings: tuple[Finding, ...]
 ) -> Mapping[str, object]:
-    """Give the place of what was found, or of what remains unexplained."""
-    if found.unnamed_force is not None:
-        return found.unnamed_force.hypothesis.components[-1].location.entries
-    if found.verdict == UNEXPLAINED:
-        return localise_mismatch(problem, found.null)
+    """Locate what was found, or what remains unexplained."""
+    if decision.unnamed_force is not None:
+        return decision.unnamed_force.hypothesis.components[-1].location.entries
+    if decision.verdict == UNEXPLAINED:
+        return localise_mismatch(problem, decision.null)
     return findings[0].location if findings else {}
 
 
-def _identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
-    """Gains that nobody knows are fitted, not diagnosed."""
-    return effects if scale == "none" else {name: one for name, one in effects.items() if name != "sensor_gain"}
+def _select_identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
+    """Leave out gains that are unknown: they are fitted, not diagnosed."""
+    return effects if scale == "none" else {name: effect for name, effect in effects.items() if name != "sensor_gain"}
 
 
-def _findings(problem: InferenceProblem, found: Decision, weighed: list[RankedEffect]) -> tuple[Finding, ...]:
-    components = found.final.hypothesis.components
-    scale = max(1.0, found.goodness.misfit)
+def _make_findings(
+    problem: InferenceProblem, decision: Decision, ranked_effects: list[RankedEffect]
+) -> tuple[Finding, ...]:
+    components = decision.final.hypothesis.components
+    scale = max(1.0, decision.goodness.misfit)
     if not components:
         return ()
-    if not found.further_rankings:
-        only = make_finding(weighed[0], log_bayes_factor(found.final, found.null), scale)
-        is_needed = found.verdict == EXPLAINED  # nothing explains without it
+    if not decision.further_rankings:
+        only = make_finding(ranked_effects[0], log_bayes_factor(decision.final, decision.null), scale)
+        is_needed = decision.verdict == EXPLAINED  # nothing explains without it
         return (replace(only, is_significant=only.is_significant or is_needed),)
-    competing = rank_effects(found.further_rankings[-1].fits, scale)
-    newest = make_finding(competing[0], log_bayes_factor(found.final, found.further_rankings[-1].base), scale)
+    competing = rank_effects(decision.further_rankings[-1].fits, scale)
+    newest = make_finding(competing[0], log_bayes_factor(decision.final, decision.further_rankings[-1].base), scale)
     older = [
         describe_component(
-            found.final,
+            decision.final,
             number,
             newest.probability,
-            log_bayes_factor(found.final, fit_without_component(problem, found.final, number)),
+            log_bayes_factor(decision.final, fit_without_component(problem, decision.final, number)),
             scale,
             location_set=(dict(components[number].location.entries),),
         )
@@ -343,50 +360,57 @@ def _findings(problem: InferenceProblem, found: Decision, weighed: list[RankedEf
     return tuple(sorted((*older, newest), key=lambda finding: -finding.log_evidence_gain))
 
 
-def _alternatives(found: Decision, weighed: list[RankedEffect]) -> tuple[Finding, ...]:
-    scale = max(1.0, found.goodness.misfit)
-    if found.further_rankings:
-        weighed, base = rank_effects(found.further_rankings[-1].fits, scale), found.further_rankings[-1].base
+def _make_alternatives(decision: Decision, ranked_effects: list[RankedEffect]) -> tuple[Finding, ...]:
+    scale = max(1.0, decision.goodness.misfit)
+    if decision.further_rankings:
+        ranked_effects, base = (
+            rank_effects(decision.further_rankings[-1].fits, scale),
+            decision.further_rankings[-1].base,
+        )
     else:
-        base = found.null
-    rest = weighed if found.final is found.null else weighed[1:]
-    return tuple(make_finding(one, log_bayes_factor(one.best, base), scale) for one in rest[:MOST_ALTERNATIVES])
+        base = decision.null
+    remaining = ranked_effects if decision.final is decision.null else ranked_effects[1:]
+    return tuple(
+        make_finding(effect, log_bayes_factor(effect.best, base), scale) for effect in remaining[:MAX_ALTERNATIVES]
+    )
 
 
-def _ambiguity(problem: InferenceProblem, found: Decision, weighed: list[RankedEffect]) -> tuple[Ambiguity, ...]:
-    """Effects that explain the same nearly as well."""
-    if found.final is found.null or len(found.final.hypothesis.components) > 1:
+def _find_ambiguity(
+    problem: InferenceProblem, decision: Decision, ranked_effects: list[RankedEffect]
+) -> tuple[Ambiguity, ...]:
+    """Find effects that explain the same nearly as well."""
+    if decision.final is decision.null or len(decision.final.hypothesis.components) > 1:
         return ()
-    near = [one for one in weighed if log_bayes_factor(found.final, one.best) < ALIKE_NATS]
-    if len(near) < 2:
+    ambiguity_set = [effect for effect in ranked_effects if log_bayes_factor(decision.final, effect.best) < AMBIGUOUS]
+    if len(ambiguity_set) < 2:
         return ()
     return (
         Ambiguity(
-            effects=tuple(one.name for one in near),
-            log_bayes_factor=log_bayes_factor(found.final, near[-1].best),
-            resolve_by=find_best_sensor(problem, near[0].best, near[1].best),
+            effects=tuple(effect.name for effect in ambiguity_set),
+            log_bayes_factor=log_bayes_factor(decision.final, ambiguity_set[-1].best),
+            resolve_by=find_best_sensor(problem, ambiguity_set[0].best, ambiguity_set[1].best),
         ),
     )
 
 
-def _statement(found: Decision, findings: tuple[Finding, ...], shortfall: str) -> str:
-    said = " ".join(finding.statement for finding in findings)
-    if found.verdict == CONSISTENT:
+def _write_statement(decision: Decision, findings: tuple[Finding, ...], shortfall: str) -> str:
+    statements = " ".join(finding.statement for finding in findings)
+    if decision.verdict == CONSISTENT:
         return "The nominal model explains the measurement within noise and its tolerances: nothing is missing."
-    if found.verdict == EXPLAINED:
-        return f"{said} With that, the model explains the measurement."
-    partly = f" A part of it is explained: {said}" if said else ""
+    if decision.verdict == EXPLAINED:
+        return f"{statements} With that, the model explains the measurement."
+    partly = f" A part of it is explained: {statements}" if statements else ""
     return f"Something is missing that nothing in the catalogue explains: {shortfall}.{partly}"
 
 
-def _numbers(found: Decision) -> dict[str, float]:
+def _collect_numbers(decision: Decision) -> dict[str, float]:
     return {
-        "log_bayes_factor": log_bayes_factor(found.ranking.best, found.null),
-        "hypotheses": float(found.ranking.n_tried),
-        "null_misfit": found.null_goodness.misfit,
-        "null_nuisance_chi2": found.null_goodness.nuisance_chi2,
-        "null_worst_subband": found.null_goodness.worst_subband,
-        "misfit": found.goodness.misfit,
-        "nuisance_chi2": found.goodness.nuisance_chi2,
-        "worst_subband": found.goodness.worst_subband,
+        "log_bayes_factor": log_bayes_factor(decision.ranking.best, decision.null),
+        "hypotheses": float(decision.ranking.n_tried),
+        "null_misfit": decision.null_goodness.misfit,
+        "null_nuisance_chi2": decision.null_goodness.nuisance_chi2,
+        "null_worst_subband": decision.null_goodness.worst_subband,
+        "misfit": decision.goodness.misfit,
+        "nuisance_chi2": decision.goodness.nuisance_chi2,
+        "worst_subband": decision.goodness.worst_subband,
     }

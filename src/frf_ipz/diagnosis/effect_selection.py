@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def select_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
-    """Find the effects that are to be looked for, without force laws.
+    """Select the effects to look for, force laws apart.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def select_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
     for name in options.effects:
         if name not in known:
             raise InputError(f"[diagnose] effects names '{name}', which is no effect; {did_you_mean(name, known)}")
-    chosen = {name: effect for name, effect in shipped.items() if not options.effects or name in options.effects}
+    selected = {name: effect for name, effect in shipped.items() if not options.effects or name in options.effects}
     for reference in options.extra_effects:
-        found = read_class(reference, folder, (Effect, Law))
-        if issubclass(found, Effect):
-            chosen[found.name] = found()
-    return chosen
+        effect_class = read_class(reference, folder, (Effect, Law))
+        if issubclass(effect_class, Effect):
+            selected[effect_class.name] = effect_class()
+    return selected

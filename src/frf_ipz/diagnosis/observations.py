@@ -26,14 +26,14 @@ BLOCK = 128  # samples
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sensor:
-    """An output channel as it was used in one blow or record.
+    """An output channel as it was used in one record.
 
     Parameters
     ----------
     channel : str
         Column of the recordings.
     dof : Dof
-        Where it sat, with its sign.
+        Its position and direction, with its sign.
     quantity : FrfQuantity
         What it measures, as the FRF over a force.
     """
@@ -45,16 +45,16 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObservedRecord:
-    """One blow of a hammer, or one record of a shaker.
+    """One impact of a hammer, or one run of a shaker, with its responses.
 
     Parameters
     ----------
     name : str
-        As in the table of blows.
+        As in the table of records.
     input_channel : str
         Column of the force.
     input_dof : Dof
-        Where it was struck, with its sign: the force on the model's DOF is this sign times `force`.
+        Where it was excited, with its sign: the force on the model's DOF is this sign times `force`.
     sensors : tuple of Sensor
         Rows of `responses`.
     step_s : float
@@ -66,13 +66,13 @@ class ObservedRecord:
     starts_at_rest : bool
         The structure was at rest at the first sample.
     recording : str
-        What it was cut from.
+        The recording that it was cut from.
     number : int
-        1 for the first blow of its recording: what that has left may still move the structure at the next.
+        1 for the first record of its recording: the structure may still move from it in the next one.
     start_s : float
         Time of its first sample in its recording, s.
     dc_offset_std : (n_sensors,) array, optional
-        What constant parts of the responses may be left, one standard deviation, SI; none where it is left out.
+        Standard deviation of offsets that may remain in the responses, SI; none where it is left out.
     """
 
     name: str
@@ -106,31 +106,31 @@ class ObservedRecord:
 
     @property
     def has_predecessor(self) -> bool:
-        """Another blow came before it in the same recording."""
+        """True if another record came before it in the same recording."""
         return self.number > 1
 
     @property
     def level(self) -> float:
-        """Largest force, N: what tells weak from strong blows."""
+        """Largest force, N: distinguishes weak from strong records."""
         return float(np.abs(self.force).max())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Observations:
-    """All blows or records of a test that are used.
+    """All records of a test that are used.
 
     Parameters
     ----------
     kind : str
-        ``hammer``, ``random`` or ``frf``; with the last there are no blows.
+        ``hammer``, ``random`` or ``frf``; with the last there are no records.
     records : tuple of ObservedRecord
         In the order of the test.
     band_hz : pair of float
-        Band that is looked at, Hz.
+        Analysed band, Hz.
     frfs : FrfSet, optional
-        FRFs on lines: what is looked at where there are no blows, or some did not start at rest.
+        FRFs on lines: analysed where there are no records, or some did not start at rest.
     exclude_hz : tuple of pairs of float
-        Stretches of the band that are not looked at, Hz.
+        Parts of the band that are left out, Hz.
     """
 
     kind: str
@@ -141,36 +141,36 @@ class Observations:
 
     @property
     def input_dofs(self) -> tuple[Dof, ...]:
-        """Struck DOFs, each once."""
+        """Excited DOFs, each once."""
         return tuple(dict.fromkeys(record.input_dof for record in self.records))
 
     @property
     def start_at_rest(self) -> bool:
-        """There are blows or records, and the structure was at rest at the beginning of each."""
+        """True if there are records, and the structure was at rest at the beginning of each."""
         return bool(self.records) and all(record.starts_at_rest for record in self.records)
 
     def mask_band(self, frequency_hz: FloatArray, width_hz: float) -> BoolArray:
-        """Say which frequencies are in the band, and not in or next to a stretch that is left out.
+        """Mask the frequencies in the band that are not in or next to an excluded part.
 
         Parameters
         ----------
         frequency_hz : (n,) array
             Hz.
         width_hz : float
-            How far a line sees, Hz: it is kept that far from what is left out.
+            Resolution of a line, Hz: it is kept that far from what is left out.
 
         Returns
         -------
         (n,) bool array
-            True where it is looked at.
+            True where it is analysed.
         """
-        kept = (frequency_hz >= self.band_hz[0]) & (frequency_hz <= self.band_hz[1])
+        is_inside = (frequency_hz >= self.band_hz[0]) & (frequency_hz <= self.band_hz[1])
         for low, high in self.exclude_hz:
-            kept &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
-        return np.asarray(kept)
+            is_inside &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
+        return np.asarray(is_inside)
 
     def records_at(self, input_dof: Dof) -> tuple[ObservedRecord, ...]:
-        """Give the blows at one DOF, the strongest first.
+        """List the records with the input at one DOF, the strongest first.
 
         Parameters
         ----------
@@ -180,19 +180,19 @@ class Observations:
         Returns
         -------
         tuple of ObservedRecord
-            Its blows.
+            Its records.
         """
-        mine = [record for record in self.records if record.input_dof == input_dof]
-        return tuple(sorted(mine, key=lambda record: -record.level))
+        records = [record for record in self.records if record.input_dof == input_dof]
+        return tuple(sorted(records, key=lambda record: -record.level))
 
 
 def transform_records(
     records: Sequence[ObservedRecord], s: ComplexArray
 ) -> tuple[tuple[ComplexArray, ComplexArray], ...]:
-    """Transform force and responses of blows at any complex frequency, ``sum x(t) exp(-s t) dt``.
+    """Transform force and responses of records at any complex frequency, ``sum x(t) exp(-s t) dt``.
 
-    For a structure at rest before the blow the ratio of the two is exactly its transfer function at s, but for what is
-    left of the motion at the end of the record times ``exp(-Re s T)``.
+    For a structure at rest before the record the ratio of the two is exactly its transfer function at s, but for the
+    motion that remains at the end of the record times ``exp(-Re s T)``.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def transform_records(
     Returns
     -------
     tuple of pairs
-        Of each blow the force, (n_lines,) complex array, N s, and the responses, (n_lines, n_sensors).
+        Of each record the force, (n_lines,) complex array, N s, and the responses, (n_lines, n_sensors).
     """
     return tuple(_transform(record, s) for record in records)
 
@@ -226,7 +226,7 @@ def _transform(record: ObservedRecord, s: ComplexArray) -> tuple[ComplexArray, C
 def observe(
     test: VibrationTest, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None
 ) -> Observations:
-    """Gather what a diagnosis looks at.
+    """Gather what a diagnosis works with.
 
     Parameters
     ----------
@@ -237,13 +237,13 @@ def observe(
     frfs : FrfSet
         The FRFs that were estimated from it, or elsewhere.
     fit : FitOptions, optional
-        Says which band to look at, and which stretches of it not; without a band, the one that carries signal is
+        Says which band to analyse, and which parts of it not; without a band, the one that carries signal is
         taken.
 
     Returns
     -------
     Observations
-        Blows or records where the scale of the channels is known, and the FRFs.
+        Records where the scale of the channels is known, and the FRFs.
 
     Raises
     ------
@@ -255,14 +255,16 @@ def observe(
     records: tuple[ObservedRecord, ...] = ()
     if test.kind != "frf" and frfs.unknown_scale == "none":
         records = tuple(
-            _record(record, test) for record in read_records(test, options) if set(record.labels) & set(test.labels)
+            _select_sensors(record, test)
+            for record in read_records(test, options)
+            if set(record.labels) & set(test.labels)
         )
     kind = test.kind if records else "frf"
     return Observations(kind=kind, records=records, band_hz=band, frfs=frfs, exclude_hz=chosen.exclude_hz)
 
 
-def _record(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
-    """Take of a blow what the FRFs of the test were estimated from: the user may have hidden a sensor."""
+def _select_sensors(record: recorded.Record, test: VibrationTest) -> ObservedRecord:
+    """Select the sensors of a record whose FRFs were estimated: the user may have hidden one."""
     rows = [row for row, label in enumerate(record.labels) if label in test.labels]
     labels = [record.labels[row] for row in rows]
     return ObservedRecord(

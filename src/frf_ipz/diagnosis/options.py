@@ -26,7 +26,7 @@ class DiagnoseOptions:
     gain_tolerance : float
         Relative tolerance of sensor gains.
     position_tolerance_m_per_m : float
-        Tolerance of positions of sensors and blows, as a part of the structure's length.
+        Tolerance of positions of sensors and excited points, as a part of the structure's length.
     seed : int
         Of everything that is drawn at random.
     """

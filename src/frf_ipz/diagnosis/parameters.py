@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.diagnosis.apply import corrector
+from frf_ipz.diagnosis.apply import prepare_correction
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import stated_damping_ratios
@@ -55,13 +55,13 @@ def diagnosed_basis(
     Raises
     ------
     InputError
-        If nothing was found that has a place in the structure.
+        If no finding is in the structure.
     """
-    moving, corrected = [], corrector(nominal, diagnosis, effects)
+    moving, corrected = [], prepare_correction(nominal, diagnosis, effects)
     for number, finding in enumerate(diagnosis.findings):
-        for index, name in enumerate(_names(finding)):
-            low, high = (corrected(_values(diagnosis, number, index, factor)) for factor in (1 - STEP, 1 + STEP))
-            slope = _reduced(low, high, reduced) / (2 * STEP)
+        for index, name in enumerate(_value_names(finding)):
+            low, high = (corrected(_scaled_values(diagnosis, number, index, factor)) for factor in (1 - STEP, 1 + STEP))
+            slope = _reduce_difference(low, high, reduced) / (2 * STEP)
             if np.abs(slope).max() > 0:
                 moving.append((f"{finding.effect} {name}", slope))
     if not moving:
@@ -80,20 +80,20 @@ def diagnosed_basis(
     )
 
 
-def _names(finding: Finding) -> list[str]:
+def _value_names(finding: Finding) -> list[str]:
     """Names of the values; of one that the contract does not name, its number."""
     named = [name for name, value in finding.parameters.items() if not isinstance(value, str)]
     return named if len(named) == len(finding.values) else [str(number + 1) for number in range(len(finding.values))]
 
 
-def _values(diagnosis: Diagnosis, number: int, index: int, factor: float) -> list[list[float]]:
+def _scaled_values(diagnosis: Diagnosis, number: int, index: int, factor: float) -> list[list[float]]:
     """Values of all findings, one of them times a factor."""
     values = [list(finding.values) for finding in diagnosis.findings]
     values[number][index] *= factor
     return values
 
 
-def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel) -> FloatArray:
+def _reduce_difference(low: StructuralModel, high: StructuralModel, reduced: ReducedModel) -> FloatArray:
     """Difference of mass, damping and stiffness of two models in the coordinates of the reduced one, (3, r, r)."""
     motion, _ = motion_of_all_dofs(low, reduced)
     mass, viscous, stiffness = (
@@ -104,10 +104,12 @@ def _reduced(low: StructuralModel, high: StructuralModel, reduced: ReducedModel)
             (high.stiffness_all, low.stiffness_all),
         )
     )
-    return np.array([mass, viscous + _modal(high, reduced) - _modal(low, reduced), stiffness])
+    return np.array(
+        [mass, viscous + _modal_damping_matrix(high, reduced) - _modal_damping_matrix(low, reduced), stiffness]
+    )
 
 
-def _modal(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
+def _modal_damping_matrix(model: StructuralModel, reduced: ReducedModel) -> FloatArray:
     """Damping matrix of a model's modal damping ratios, N s/m."""
     poles = undamped_poles(reduced.mass, reduced.stiffness)
     squares = np.maximum(poles.values.real, 0.0)

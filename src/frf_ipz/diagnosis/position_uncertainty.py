@@ -1,4 +1,4 @@
-"""How far sensors and blows may be from their places, for the stages that update the model."""
+"""How far sensors and excited points may be from their nominal positions, for the stages that update the model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def propagate_position_tolerance(
     model: StructuralModel, reduced: ReducedModel, labels: Sequence[FrfLabel], tolerance_m_per_m: float
 ) -> tuple[PositionUncertainty, ...]:
-    """Turn a tolerance of places into rows of the reduced model.
+    """Propagate a tolerance of positions into rows of the reduced model.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def propagate_position_tolerance(
     labels : sequence of FrfLabel
         What was measured.
     tolerance_m_per_m : float
-        Half width of what can be, over the size of the structure along an axis.
+        Half width of the tolerance, over the size of the structure along an axis.
 
     Returns
     -------
     tuple of PositionUncertainty
-        Of each sensor and each blow along each axis; none for lumped models, whose masses have no places.
+        Of each sensor and each excited point along each axis; none for lumped models, whose masses have no positions.
     """
     spans = measure_extents(model)
     ends = dict.fromkeys(end for label in labels for end in ((label.output_dof, True), (label.input_dof, False)))
@@ -45,17 +45,17 @@ def propagate_position_tolerance(
         PositionUncertainty(
             dof=dof,
             is_output=is_output,
-            row=tolerance_m_per_m * UNIFORM_STD * spans[axis] * _inside(model, reduced, row),
+            row=tolerance_m_per_m * UNIFORM_STD * spans[axis] * _reduce_row(model, reduced, row),
         )
         for dof, is_output in ends
         for axis, row in make_shift_rows(model, dof).items()
     )
 
 
-def _inside(model: StructuralModel, reduced: ReducedModel, row: FloatArray) -> FloatArray:
-    """Weights of all DOFs, as a row of the reduced model; DOFs that are held do not move."""
-    found = np.zeros(len(reduced.dofs))
+def _reduce_row(model: StructuralModel, reduced: ReducedModel, row: FloatArray) -> FloatArray:
+    """Weights of all DOFs, as a row of the reduced model; fixed DOFs do not move."""
+    reduced_row = np.zeros(len(reduced.dofs))
     for row_index in np.flatnonzero(row).tolist():
         if not model.fixed[row_index]:
-            found += row[row_index] * reduced.row(model.all_dofs[row_index])
-    return found
+            reduced_row += row[row_index] * reduced.row(model.all_dofs[row_index])
+    return reduced_row

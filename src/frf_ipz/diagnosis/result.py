@@ -34,7 +34,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """An effect at its place.
+    """An effect at its location.
 
     Parameters
     ----------
@@ -45,17 +45,17 @@ class Finding:
     parameters : mapping of str to Estimate or str
         By their names in the contract.
     probability : float
-        Of this effect, wherever it is, among all that were tried.
+        Of this effect, at any location, among all that were tried.
     log_evidence_gain : float
-        Natural logarithm of the evidence over that without this effect, nats.
+        Log Bayes factor (natural) over the explanation without this effect.
     statement : str
         A sentence for the user.
     location_set : tuple of mapping
-        All places that hold 95 % of the effect's probability, the most probable first.
+        All locations that hold 95 % of the effect's probability, the most probable first.
     is_significant : bool
         False where it was detected and lies within the user's tolerances.
     key : tuple
-        The place as the effect itself knows it.
+        The location as the effect itself knows it.
     values : tuple of float
         Values of the parameters as the effect itself knows them, in its own order.
     """
@@ -73,7 +73,7 @@ class Finding:
 
 
 def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
-    """Say between which places a test does not decide.
+    """Name the locations between which a test cannot decide.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
     Returns
     -------
     str
-        A sentence with a space before it; empty for a single place.
+        A sentence with a space before it; empty for a single location.
     """
     if len(locations) < 2:
         return ""
@@ -94,13 +94,13 @@ def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
         ]
         for kind, value in distinct[:1]:
             kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list | tuple) else (value,))
-    words = " or ".join(f"{kind} {_in_words(kind, parts)}" for kind, parts in kinds.items())
-    return f" The test tells its place no closer than {words}."
+    words = " or ".join(f"{kind} {_list_values(kind, parts)}" for kind, parts in kinds.items())
+    return f" The test locates it no closer than {words}."
 
 
-def _in_words(kind: str, parts: list[tuple[object, ...]]) -> str:
-    """Single numbers as runs, stretches of elements from their first to their last, others as they are."""
-    numbers = sorted(number for (number, *more) in parts if isinstance(number, int) and not more)
+def _list_values(kind: str, parts: list[tuple[object, ...]]) -> str:
+    """List single numbers as runs, segments of elements from first to last, others as they are."""
+    numbers = sorted(number for (number, *further) in parts if isinstance(number, int) and not further)
     if len(numbers) == len(parts):
         breaks = [i for i in range(len(numbers)) if i == 0 or numbers[i] > numbers[i - 1] + 1]
         runs = [numbers[a:b] for a, b in zip(breaks, [*breaks[1:], None], strict=True)]
@@ -163,9 +163,9 @@ class Ambiguity:
     effects : tuple of str
         Names, the most probable first.
     log_bayes_factor : float
-        How much more probable the first is than the last.
+        Log Bayes factor of the first over the last.
     resolve_by : str
-        The blow or sensor that would tell them apart.
+        The sensor or excitation that would distinguish them.
     """
 
     effects: tuple[str, ...]
@@ -174,9 +174,9 @@ class Ambiguity:
 
     @property
     def statement(self) -> str:
-        """What is not told apart and what would do so, in a sentence or two."""
-        *others, last = (effect.replace("_", " ") for effect in self.effects)
-        return f"These data cannot tell apart: {', '.join(others)} and {last}. {self.resolve_by}".strip()
+        """What cannot be distinguished and what would do so, in a sentence or two."""
+        *first, last = (effect.replace("_", " ") for effect in self.effects)
+        return f"These data cannot tell apart: {', '.join(first)} and {last}. {self.resolve_by}".strip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -213,11 +213,11 @@ class LinearisedLaw:
     ends : tuple of Dof
         Where it acts: against the ground at one DOF, or between two.
     stiffness, damping : float
-        About the motion in all blows together, N/m and N s/m.
-    motion_rms_m : (n_blows,) array
-        Root mean square motion of the place in each blow, ascending.
-    stiffness_each, damping_each : (n_blows,) array
-        About the motion in that blow alone, N/m and N s/m.
+        About the motion in all records together, N/m and N s/m.
+    motion_rms_m : (n_records,) array
+        Root mean square motion there in each record, ascending.
+    stiffness_by_record, damping_by_record : (n_records,) array
+        About the motion in that record alone, N/m and N s/m.
     """
 
     ends: tuple[Dof, ...]
@@ -235,23 +235,23 @@ class LinearisedLaw:
         )
         return (
             f"At the level of this test, a spring of {self.stiffness:.3g} N/m and a damper of {self.damping:.3g} N s/m "
-            f"stand for it in a linear model; with the level they go from {low} (weakest blow, "
+            f"stand for it in a linear model; with the level they go from {low} (weakest record, "
             f"{self.motion_rms_m[0]:.3g} m rms) to {high} (strongest, {self.motion_rms_m[-1]:.3g} m rms)."
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LawInTime:
-    """A force law at its place in time, to be drawn.
+    """A force law at its location in time, to be drawn.
 
     Parameters
     ----------
     motion_m, velocity_m_s, force_N : (n_times,) array
-        Of the place in the blow that moves it most, as far as the law was fitted to it, and of the law there.
+        Of its location in the record that moves it most, as far as the law was fitted to it, and of the law there.
     record : str
-        Whose response is shown; empty where all blows start in motion, which is not simulated.
+        Whose response is given; empty where all records start in motion, which is not simulated.
     is_held_out : bool
-        That blow was not shown to the fit.
+        True if that record was held out of the fit.
     channel, response, unit : str
         Which sensor, the one in which the law shows most, and what it measures: ``acceleration`` in ``m/s^2``, say.
     time_s : (n_samples,) array
@@ -283,7 +283,7 @@ class Diagnosis:
     verdict : str
         ``consistent``, ``explained`` or ``unexplained``.
     findings : tuple of Finding
-        What is missing, the heaviest first; with ``unexplained``, the part that is explained.
+        What is missing, the best supported first; with ``unexplained``, the part that is explained.
     alternatives : tuple of Finding
         Other explanations, the most probable first.
     mismatch_hz : (n,) array
@@ -298,9 +298,9 @@ class Diagnosis:
     before, updated, after : Misfit
         Of the model as it is, with what its tolerances allow, and with the findings.
     held_out_kind : str
-        What was not shown to the fit: ``records`` or ``lines``.
+        What was held out of the fit: ``records`` or ``lines``.
     ambiguity : tuple of Ambiguity
-        What cannot be told apart.
+        What cannot be distinguished.
     data_checks : tuple of DataCheck
         Checks of the measurement alone.
     detectability : mapping of str to mapping
@@ -308,14 +308,14 @@ class Diagnosis:
     statement : str
         The verdict in a few sentences.
     unexplained_part : str
-        What nothing explains, in words without a full stop; empty where nothing remains, and beside a force law.
+        What nothing explains, in words without a full stop; empty if nothing remains, and beside a force law.
     curves : Curves, optional
         FRFs to draw.
     numbers : mapping of str to float
-        What the verdict rests on: evidence, misfits, pulls, hypotheses tried.
+        What the verdict rests on: log Bayes factor, misfits, nuisance chi2, number of hypotheses.
     warnings : tuple of str
         What the user has to know.
-    linearised_law : Linearised, optional
+    linearised_law : LinearisedLaw, optional
         The force law among the findings, for linear models.
     law_in_time : LawInTime, optional
         The same in time, to be drawn.
@@ -354,92 +354,96 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "statement": self.statement,
-            "findings": [_finding(finding) for finding in self.findings],
-            "alternatives": [_finding(finding) for finding in self.alternatives],
+            "findings": [_finding_to_json(finding) for finding in self.findings],
+            "alternatives": [_finding_to_json(finding) for finding in self.alternatives],
             "mismatch": {
                 "frequency_hz": [round(float(value), 6) for value in self.mismatch_hz],
                 "where": self.mismatch_where,
-                "location": _location(self.mismatch_location),
+                "location": _location_to_json(self.mismatch_location),
             },
             "fit": {
-                "before": _misfit(self.before),
-                "updated_without_findings": _misfit(self.updated),
-                "after": _misfit(self.after),
+                "before": _misfit_to_json(self.before),
+                "updated_without_findings": _misfit_to_json(self.updated),
+                "after": _misfit_to_json(self.after),
                 "held_out_is": self.held_out_kind,
             },
             "ambiguity": [
                 {
-                    "effects": list(one.effects),
-                    "log_bayes_factor": _plain(one.log_bayes_factor),
-                    "resolve_by": one.resolve_by,
+                    "effects": list(ambiguity.effects),
+                    "log_bayes_factor": _plain_number(ambiguity.log_bayes_factor),
+                    "resolve_by": ambiguity.resolve_by,
                 }
-                for one in self.ambiguity
+                for ambiguity in self.ambiguity
             ],
             "data_checks": [
                 {
-                    "name": gate.name,
-                    "value": _plain(gate.value),
-                    "limit": _plain(gate.limit),
-                    "passed": gate.passed,
-                    "statement": gate.statement,
+                    "name": check.name,
+                    "value": _plain_number(check.value),
+                    "limit": _plain_number(check.limit),
+                    "passed": check.passed,
+                    "statement": check.statement,
                 }
-                for gate in self.data_checks
+                for check in self.data_checks
             ],
-            "detectability": {name: _all_plain(sizes) for name, sizes in self.detectability.items()},
-            "numbers": _all_plain(self.numbers),
+            "detectability": {name: _plain_values(sizes) for name, sizes in self.detectability.items()},
+            "numbers": _plain_values(self.numbers),
             "warnings": list(self.warnings),
-            **({} if self.linearised_law is None else {"linear_model": _linear(self.linearised_law)}),
+            **({} if self.linearised_law is None else {"linear_model": _law_to_json(self.linearised_law)}),
         }
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
+def _finding_to_json(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,
-        "location": _location(finding.location),
-        "parameters": {name: _parameter(value) for name, value in finding.parameters.items()},
-        "probability": _plain(finding.probability),
-        "log_evidence_gain": _plain(finding.log_evidence_gain),
+        "location": _location_to_json(finding.location),
+        "parameters": {name: _parameter_to_json(value) for name, value in finding.parameters.items()},
+        "probability": _plain_number(finding.probability),
+        "log_evidence_gain": _plain_number(finding.log_evidence_gain),
         "statement": finding.statement,
-        "location_set": [_location(location) for location in finding.location_set],
+        "location_set": [_location_to_json(location) for location in finding.location_set],
         "significant": finding.is_significant,
     }
 
 
-def _linear(law: LinearisedLaw) -> dict[str, Any]:
+def _law_to_json(law: LinearisedLaw) -> dict[str, Any]:
     return {
         "between": [dof.name for dof in law.ends],
-        "stiffness_N_m": _plain(law.stiffness),
-        "damping_Ns_m": _plain(law.damping),
-        "motion_rms_m": [_plain(value) for value in law.motion_rms_m],
-        "stiffness_at_N_m": [_plain(value) for value in law.stiffness_by_record],
-        "damping_at_Ns_m": [_plain(value) for value in law.damping_by_record],
+        "stiffness_N_m": _plain_number(law.stiffness),
+        "damping_Ns_m": _plain_number(law.damping),
+        "motion_rms_m": [_plain_number(value) for value in law.motion_rms_m],
+        "stiffness_at_N_m": [_plain_number(value) for value in law.stiffness_by_record],
+        "damping_at_Ns_m": [_plain_number(value) for value in law.damping_by_record],
     }
 
 
-def _location(location: Mapping[str, object]) -> dict[str, object]:
+def _location_to_json(location: Mapping[str, object]) -> dict[str, object]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
 
 
-def _parameter(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name
+def _parameter_to_json(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name
     if isinstance(value, str):
         return value
-    return {"value": _plain(value.value), "std": _plain(value.std), "ci95": [_plain(value.low), _plain(value.high)]}
-
-
-def _misfit(misfit: Misfit) -> dict[str, float | None]:
     return {
-        "training": _plain(misfit.training),
-        "held_out": _plain(misfit.held_out),
-        "training_over_noise": _plain(misfit.training_noise),
-        "held_out_over_noise": _plain(misfit.held_out_noise),
+        "value": _plain_number(value.value),
+        "std": _plain_number(value.std),
+        "ci95": [_plain_number(value.low), _plain_number(value.high)],
     }
 
 
-def _all_plain(values: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: _plain(value) for name, value in values.items()}
+def _misfit_to_json(misfit: Misfit) -> dict[str, float | None]:
+    return {
+        "training": _plain_number(misfit.training),
+        "held_out": _plain_number(misfit.held_out),
+        "training_over_noise": _plain_number(misfit.training_noise),
+        "held_out_over_noise": _plain_number(misfit.held_out_noise),
+    }
 
 
-def _plain(value: float) -> float | None:
+def _plain_values(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: _plain_number(value) for name, value in values.items()}
+
+
+def _plain_number(value: float) -> float | None:
     """JSON knows no NaN and no infinity."""
     number = float(value)
     return number if abs(number) < float("inf") else None

@@ -7,7 +7,7 @@ import pytest
 
 import frf_ipz
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.compare.corrected_model import LEAST_SQUARE, correct_model
+from frf_ipz.diagnosis.compare.corrected_model import MIN_SQUARE, correct_model
 from frf_ipz.diagnosis.compare.learnt_nuisance import learn, pose_state_problem, predict_unchanged_model
 from frf_ipz.diagnosis.compare.mass_loss import MassLoss
 from frf_ipz.diagnosis.measured.data_split import split_data
@@ -119,7 +119,7 @@ def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
     nuisance[problem.nuisance_prior.frequency_indices[0]] = -1.1 / problem.nuisance_prior.kappa_std[0, 0]
     found = solve_modes(correct_model(problem.make_hypothesis(()), nuisance)).natural_frequency_hz
     stated = solve_modes(nominal).natural_frequency_hz
-    assert found[0] == pytest.approx(np.sqrt(LEAST_SQUARE) * stated[0], rel=1e-6)
+    assert found[0] == pytest.approx(np.sqrt(MIN_SQUARE) * stated[0], rel=1e-6)
     np.testing.assert_allclose(found[1:4], stated[1:4], rtol=1e-6)
 
 

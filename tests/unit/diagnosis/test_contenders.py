@@ -168,7 +168,7 @@ def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypa
         return n_locations, effect.log_prior(context, location, np.array([1e3])) - np.log(n_locations)
 
     n_all, expected = prior()
-    monkeypatch.setattr(coupling_spring, "MOST_IN_A_ROW", 9)
+    monkeypatch.setattr(coupling_spring, "MAX_IN_A_ROW", 9)
     n_few, found = prior()
     assert n_few < n_all / 4
     assert found == pytest.approx(expected, abs=0.4)

@@ -216,7 +216,7 @@ class Cord(Effect):
         return (Parameter(name="pull_N_m", low=10.0, high=1e6),)
     def build(self, context, location):
         dof = next(dof for dof in context.moving_dofs if dof.node == 14)
-        unit = sparse.csr_array(sparse.diags_array(context.unit(dof)))
+        unit = sparse.csr_array(sparse.diags_array(context.unit_motion(dof)))
         return lambda values: Change(stiffness=values[0] * unit)
     def statement(self, context, location, values):
         return "A cord."

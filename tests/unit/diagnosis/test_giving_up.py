@@ -94,7 +94,7 @@ def test_the_modes_of_the_same_values_are_solved_for_once(problem, monkeypatch):
     assert_allclose(
         problem.make_hypothesis(hypothesis.components).modes(START, scattered).squares, second.squares, rtol=DIGITS
     )
-    for factor in range(1, hypotheses.REMEMBERED + 1):
+    for factor in range(1, hypotheses.N_REMEMBERED + 1):
         hypothesis.modes((1 + factor) * START, nothing)
     before = len(solved)
     hypothesis.modes(START, nothing)  # was forgotten

@@ -150,7 +150,7 @@ def test_a_cause_is_looked_for_beside_the_law_where_the_other_way_led_to_nothing
     for name, stub in replaced.items():
         monkeypatch.setattr(diagnose, name, stub)
     problem = SimpleNamespace(effects={"added_mass": None})
-    diagnose._nonlinear(nothing, problem, None, None, None, None, SimpleNamespace(verdict=verdict), None)
+    diagnose._diagnose_nonlinear(nothing, problem, None, None, None, None, SimpleNamespace(verdict=verdict), None)
     assert seen == asked
 
 

@@ -44,7 +44,7 @@ def test_a_wide_search_finds_values_closer_than_its_amplitudes_are_apart(problem
 
 
 def test_a_wide_search_looks_between_the_places_of_a_thinned_row(problem, monkeypatch):
-    monkeypatch.setattr(coupling_spring, "MOST_IN_A_ROW", 12)
+    monkeypatch.setattr(coupling_spring, "MAX_IN_A_ROW", 12)
     locations = problem.effects["coupling_spring"].locations(problem.context)
     assert ENDS not in [tuple(location.entries["nodes"]) for location in locations]
     best = scan_globally(problem, fit_null_model(problem))[0]

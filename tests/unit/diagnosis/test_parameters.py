@@ -9,7 +9,7 @@ from diagnosed import beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import apply_to_model
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.parameters import _modal, diagnosed_basis
+from frf_ipz.diagnosis.parameters import _modal_damping_matrix, diagnosed_basis
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses
@@ -75,4 +75,4 @@ def test_modal_damping_is_that_of_the_reduction(tmp_path, left):
     ends = {"actuators": (Dof(5, "z"),), "sensors": (Dof(12, "z"),), "points": ()}
     reduced = reduce_model(model, ReduceOptions(), band_hz=(10.0, 700.0), **ends)
     size = np.abs(reduced.damping).max()
-    np.testing.assert_allclose(_modal(model, reduced), reduced.damping, atol=ROUNDING * size)
+    np.testing.assert_allclose(_modal_damping_matrix(model, reduced), reduced.damping, atol=ROUNDING * size)

@@ -372,7 +372,7 @@ def a_component(name, location):
 
 def one_of(name, log_evidence):
     component = SimpleNamespace(effect=SimpleNamespace(name=name))
-    near = {"is_nearly_right": True, "is_nearly_all": True, "is_hopeless": False, "mean_misfit": 1.0}
+    near = {"is_nearly_right": True, "explains_nearly_all": True, "is_far_off": False, "mean_misfit": 1.0}
     return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence, **near)
 
 

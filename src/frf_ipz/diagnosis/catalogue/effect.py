@@ -79,7 +79,7 @@ class Location:
     Parameters
     ----------
     key : tuple
-        What tells it from others of the same effect.
+        Distinguishes it from other locations of the same effect.
     entries : mapping
         What `diagnosis.json` says of it: nodes, elements, springs, channels, an end, groups.
     text : mapping of str to str
@@ -122,10 +122,10 @@ class Effect(ABC):
     name: ClassVar[str]
     """As in `diagnosis.json`."""
     imitators: ClassVar[tuple[str, ...]] = ()
-    """Effects that look alike, the most alike first."""
+    """Effects that are hard to distinguish from it, the most alike first."""
 
     has_dynamics: ClassVar[bool] = False
-    """Something with dynamics of its own hangs at a place: two of that kind at one place imitate much."""
+    """Something with dynamics of its own hangs at a location: two of that kind at one location imitate many things."""
 
     @abstractmethod
     def locations(self, context: ModelContext) -> Sequence[Location]:
@@ -146,10 +146,10 @@ class Effect(ABC):
 
     @abstractmethod
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
-        """Say to the user what it is and where, in one sentence."""
+        """Say what it is and where, in one sentence for the user."""
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
-        """Give the effect as one dynamic stiffness, if it is one; else it is searched by `starts`."""
+        """Give the effect as one dynamic stiffness, if it is one; else it is searched from `start_values`."""
         del context, location
         return None
 
@@ -158,12 +158,12 @@ class Effect(ABC):
         return grid(self.parameters(context, location), 8)
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
-        """Say how likely values at a place are beside what is stated by bounds and the number of places, nats."""
+        """Say how likely values at a location are besides bounds and number of locations: log density."""
         del context, location, values
         return 0.0
 
     def implausibility(self, values: FloatArray) -> str:
-        """Say why values that explain a measurement are rather those of something else; empty where they are not."""
+        """Say why values that explain a measurement are implausible for this effect; empty where they are not."""
         del values
         return ""
 
@@ -173,12 +173,12 @@ class Effect(ABC):
         return value
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Places beside one, to look at when it is nearly right."""
+        """Locations beside one, to look at when it is nearly right."""
         del context, location
         return ()
 
     def surroundings(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Places further around one, with the same parameters; the best few are looked at if none beside is better."""
+        """Locations further around one, with the same parameters: the best few are tried if no neighbour is better."""
         del context, location
         return ()
 
@@ -191,7 +191,7 @@ def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
     parameters : sequence of Parameter
         What to spread over.
     count : int
-        How many along each.
+        Number of values along each.
 
     Returns
     -------
@@ -208,38 +208,38 @@ def grid(parameters: Sequence[Parameter], count: int) -> FloatArray:
 
 
 def list_node_locations(context: ModelContext) -> list[Location]:
-    """Every node that can move in a direction of the test.
+    """List every node that can move in a direction of the test.
 
     Parameters
     ----------
     context : ModelContext
-        What is tested.
+        Model, layout and tolerances.
 
     Returns
     -------
-    list of Place
+    list of Location
         Keys are node and direction.
     """
     return [Location(key=(dof.node, dof.direction), entries={"nodes": [dof.node]}) for dof in context.moving_dofs]
 
 
 def list_neighbouring_nodes(context: ModelContext, location: Location) -> list[Location]:
-    """Nodes next to one.
+    """List the nodes next to one.
 
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    location : Place
-        A place of `list_node_locations`.
+        Model, layout and tolerances.
+    location : Location
+        A location of `list_node_locations`.
 
     Returns
     -------
-    list of Place
+    list of Location
         The nearest ones.
     """
     node, direction = location.key
     return [
-        Location(key=(other, direction), entries={"nodes": [other]})
-        for other in context.nodes_near(int(str(node)), str(direction))
+        Location(key=(neighbour, direction), entries={"nodes": [neighbour]})
+        for neighbour in context.neighbouring_nodes(int(str(node)), str(direction))
     ]

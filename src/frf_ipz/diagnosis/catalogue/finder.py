@@ -46,10 +46,10 @@ def read_class(reference: str, folder: Path, kinds: tuple[type, ...]) -> type:
         raise InputError(f"{WHERE}: '{reference}' is not understood; write it as 'file.py:ClassName'")
     if not path.is_file():
         raise InputError(f"{WHERE}: there is no file {path}; paths are relative to the pipeline file")
-    found: dict[str, type] = {item.__name__: item for item in classes_in(_load(path), kinds)}
-    if class_name not in found:
-        raise InputError(f"{WHERE}: {path} has no effect '{class_name}'; {did_you_mean(class_name, found)}")
-    return found[class_name]
+    classes: dict[str, type] = {item.__name__: item for item in classes_in(_load(path), kinds)}
+    if class_name not in classes:
+        raise InputError(f"{WHERE}: {path} has no effect '{class_name}'; {did_you_mean(class_name, classes)}")
+    return classes[class_name]
 
 
 def classes_in(module: ModuleType, kinds: type | tuple[type, ...]) -> list[Any]:
@@ -91,8 +91,8 @@ def shipped_effects() -> dict[str, Effect]:
     dict of str to Effect
         By name.
     """
-    found: dict[str, Effect] = {}
-    for folder in pkgutil.walk_packages(catalogue.__path__, f"{catalogue.__name__}."):
-        if not folder.ispkg:
-            found |= {item.name: item() for item in classes_in(import_module(folder.name), Effect)}
-    return found
+    effects: dict[str, Effect] = {}
+    for module in pkgutil.walk_packages(catalogue.__path__, f"{catalogue.__name__}."):
+        if not module.ispkg:
+            effects |= {item.name: item() for item in classes_in(import_module(module.name), Effect)}
+    return effects

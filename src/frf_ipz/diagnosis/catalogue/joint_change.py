@@ -20,8 +20,8 @@ def build_together(context: ModelContext, effects: Sequence[tuple[Effect, Locati
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    effects : sequence of (Effect, Place)
+        Model, layout and tolerances.
+    effects : sequence of (Effect, Location)
         What acts, and where.
 
     Returns
@@ -36,8 +36,8 @@ def build_together(context: ModelContext, effects: Sequence[tuple[Effect, Locati
         model = typical_change(context, effect, location, build).model
         if model is not None:
             exchanged = replace(context, basis=replace(context.basis, model=model))
-            others = build_together(exchanged, [*effects[:number], *effects[number + 1 :]])
-            return (*others[:number], build, *others[number:])
+            remaining = build_together(exchanged, [*effects[:number], *effects[number + 1 :]])
+            return (*remaining[:number], build, *remaining[number:])
     return tuple(builders)
 
 
@@ -47,10 +47,10 @@ def typical_change(context: ModelContext, effect: Effect, location: Location, bu
     Parameters
     ----------
     context : ModelContext
-        What is tested.
+        Model, layout and tolerances.
     effect : Effect
         What acts.
-    location : Place
+    location : Location
         Where.
     build : Builder
         Of the effect there.
@@ -58,6 +58,6 @@ def typical_change(context: ModelContext, effect: Effect, location: Location, bu
     Returns
     -------
     Change
-        Only its places matter.
+        Only the motions that it acts on matter.
     """
     return build(np.array([parameter.typical for parameter in effect.parameters(context, location)]))

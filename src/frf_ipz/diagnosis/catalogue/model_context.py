@@ -1,4 +1,4 @@
-"""What effects may know about the structure and its test."""
+"""What effects may use of the structure and its test."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ NEAREST = 8  # nodes that count as neighbours where nodes are not in a row
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModelContext:
-    """A structure on its test bench.
+    """The nominal model, the layout of its test, and the tolerances.
 
     Parameters
     ----------
     basis : Basis
         The nominal model in few coordinates.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
     band_hz : pair of float
         Hz.
     contour : (n_points,) complex array
@@ -52,20 +52,20 @@ class ModelContext:
 
     @cached_property
     def directions(self) -> tuple[str, ...]:
-        """Directions of sensors and blows."""
+        """Directions of sensors and excited points."""
         dofs = (*(dof for _, dof in self.layout.outputs), *self.layout.inputs)
         return tuple(dict.fromkeys(dof.direction for dof in dofs))
 
     @cached_property
     def moving_dofs(self) -> tuple[Dof, ...]:
-        """DOFs in these directions that are not held, by node."""
+        """DOFs in these directions that are free, by node."""
         model = self.model
         free = [dof for dof, fixed in zip(model.all_dofs, model.fixed, strict=True) if not fixed]
         return tuple(sorted(dof for dof in free if dof.direction in self.directions))
 
     @cached_property
     def mass_kg(self) -> float:
-        """Mass of the structure, held parts included."""
+        """Mass of the structure, supported parts included."""
         direction = self.directions[0]
         rigid = np.array([float(dof.direction == direction) for dof in self.model.all_dofs])
         return float(rigid @ multiply(self.model.mass_all, rigid))
@@ -76,7 +76,7 @@ class ModelContext:
         geometry = self.model.geometry
         return dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
 
-    def unit(self, dof: Dof) -> FloatArray:
+    def unit_motion(self, dof: Dof) -> FloatArray:
         """Motion of one DOF, (n_all,) array."""
         motion = np.zeros(len(self.model.all_dofs))
         motion[self.model.full_index(dof)] = 1.0
@@ -91,23 +91,22 @@ class ModelContext:
         largest = float(np.max(np.sum(self.basis.loaded_shapes[:, elastic] ** 2 / squares[elastic], axis=1)))
         return 1.0 / max(compliance, 1e-6 * largest)
 
-    def nodes_near(self, node: int, direction: str, furthest: int = 2) -> list[int]:
-        """Nodes beside one that move in a direction: as many on each side in a row, the nearest ones elsewhere."""
+    def neighbouring_nodes(self, node: int, direction: str, furthest: int = 2) -> list[int]:
+        """Nodes near one that move in a direction: as many on each side in a row, the nearest ones elsewhere."""
         nodes = [dof.node for dof in self.moving_dofs if dof.direction == direction]
         if self.model.kind in ("beam", "lumped"):
-            return [other for other in nodes if 0 < abs(other - node) <= furthest]
+            return [neighbour for neighbour in nodes if 0 < abs(neighbour - node) <= furthest]
         here = self.positions[node]
-        return sorted((other for other in nodes if other != node), key=lambda other: self._distance(other, here))[
-            :NEAREST
-        ]
+        candidates = (neighbour for neighbour in nodes if neighbour != node)
+        return sorted(candidates, key=lambda neighbour: self._distance(neighbour, here))[:NEAREST]
 
-    def where(self, node: int) -> str:
-        """Say where a node is: its number, and its place on structures that have places."""
+    def describe_node(self, node: int) -> str:
+        """Name a node: its number, and its position on structures that have positions."""
         if self.model.kind == "lumped" or node not in self.positions:
             return f"node {node}"
         span = measure_extents(self.model)
-        location = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
-        return f"node {node} ({location})"
+        position = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
+        return f"node {node} ({position})"
 
     def _distance(self, node: int, here: FloatArray) -> float:
         return float(np.linalg.norm(self.positions[node] - here))

@@ -37,7 +37,8 @@ class Comparison:
     diagnosis : Diagnosis
         Of the state after against what the states before lead one to expect.
     expected : State
-        The state after as it was judged: its model if nothing had changed, and the measurement as far as it is trusted.
+        The state after as it was judged: its model if nothing had changed, and the measurement without known gains,
+        with what the model cannot follow as noise.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed: those stated, or what the states before show beyond them.
     """
@@ -73,8 +74,8 @@ def compare(
 ) -> Comparison:
     """Find out what changed between two states of a machine, by how much and where, or that nothing did.
 
-    The model need not be right: what it is wrong by is learned from the states before. Three and more of them also
-    teach what differs from test to test. What the user knows to be different in the state after goes into its model.
+    The model need not be right: what it is wrong by is learnt from the states before. Three and more of them also
+    show what differs from test to test. What the user knows to be different in the state after goes into its model.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def compare(
     options : CompareOptions, optional
         What the model may be wrong by, and what differs from test to test at least.
     progress : Progress
-        Told how far it is.
+        Receives the progress.
 
     Returns
     -------
@@ -103,36 +104,36 @@ def compare(
     return judge(learn(states, chosen), after, chosen, progress=progress)
 
 
-def judge(learned: LearntNuisance, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
-    """Judge a state by what the states before taught: for many states after the same ones.
+def judge(learnt: LearntNuisance, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
+    """Judge a state by what was learnt from the states before: for many states after the same ones.
 
     Parameters
     ----------
-    learned : LearntNuisance
+    learnt : LearntNuisance
         From `learn`.
     after : State
         The machine to be judged.
     options : CompareOptions
         As for `learn`.
     progress : Progress
-        Told how far it is.
+        Receives the progress.
 
     Returns
     -------
     Comparison
         What changed.
     """
-    observed = discount_unexplained(after.observed, learned.gains, learned.missed)
+    observed = discount_unexplained(after.observed, learnt.gains, learnt.unexplained_part)
     source = split_data(observed)
     nominal = replace(after, observed=observed)
-    expected = predict_unchanged_model(nominal, learned, options, source)
-    error = estimate_change_error(replace(nominal, model=expected), source, learned, options)
+    expected = predict_unchanged_model(nominal, learnt, options, source)
+    error = estimate_change_error(replace(nominal, model=expected), source, learnt, options)
     scatter = replace(
-        learned.scatter,
-        stiffness_tolerance=float(np.hypot(learned.scatter.stiffness_tolerance, error)),
-        frequency_tolerance=float(np.hypot(learned.scatter.frequency_tolerance, error)),
+        learnt.scatter,
+        stiffness_tolerance=float(np.hypot(learnt.scatter.stiffness_tolerance, error)),
+        frequency_tolerance=float(np.hypot(learnt.scatter.frequency_tolerance, error)),
         effects=options.effects,
         extra_effects=(MASS_LOSS,),
     )
-    found = diagnose(expected, observed, scatter, progress=progress)
-    return Comparison(diagnosis=found, expected=replace(nominal, model=expected), scatter=scatter)
+    diagnosis = diagnose(expected, observed, scatter, progress=progress)
+    return Comparison(diagnosis=diagnosis, expected=replace(nominal, model=expected), scatter=scatter)

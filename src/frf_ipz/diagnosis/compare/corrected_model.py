@@ -1,4 +1,4 @@
-"""A model as its measurement showed it: what was fitted within tolerances, put into the matrices.
+"""A model corrected by its measurement: the nuisance that was fitted within tolerances, put into the matrices.
 
 Errors of mass and stiffness act on the modes of the band. With their shapes Phi and with 1 + mu and Lambda + kappa for
 mass and stiffness there, ``M + (M Phi) mu (M Phi)^T`` and ``K + (M Phi) kappa (M Phi)^T`` have exactly the fitted
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.modes import Modes
     from frf_ipz.structure import StructuralModel
 
-LEAST_SQUARE = 0.01  # of the model's: a mode below the band is pulled wherever lines above it want, but stays stable
+MIN_SQUARE = 0.01  # of the model's: a mode below the band follows lines above it, but stays stable
 
 
 def correct_model(hypothesis: Hypothesis, nuisance: FloatArray) -> StructuralModel:
@@ -30,10 +30,10 @@ def correct_model(hypothesis: Hypothesis, nuisance: FloatArray) -> StructuralMod
     Parameters
     ----------
     hypothesis : Hypothesis
-        Nothing is missing: no causes.
+        Nothing is missing: no components.
     nuisance : (n_nuisance,) array
-        What was fitted, in standard deviations. Scatter of stiffness, mass and damping is used; places and gains
-        belong to the test, and cords to the way it was hung.
+        What was fitted, in standard deviations. Scatter of stiffness, mass and damping is used; positions, gains and
+        suspension belong to the test.
 
     Returns
     -------
@@ -42,16 +42,16 @@ def correct_model(hypothesis: Hypothesis, nuisance: FloatArray) -> StructuralMod
     """
     values = nuisance.copy()
     sizes = hypothesis.nuisance_prior.sizes
-    values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # cords
+    values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # suspension
     modes = hypothesis.modes(np.zeros(0), values)
     model, m = hypothesis.context.model, hypothesis.nuisance_prior.n_modes
     plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)
     momentum = multiply(model.mass_all, hypothesis.basis.vectors @ plain)
-    momentum[model.fixed] = 0.0  # a support that gives way keeps the mass that it had
-    back = linalg.inv(modes.rotation)
-    mass = back.T @ back - np.eye(m)
-    squares = np.maximum(modes.squares[:m], LEAST_SQUARE * modes.omega[:m] ** 2)
-    stiffness = back.T @ np.diag(squares) @ back - np.diag(modes.omega[:m] ** 2)
+    momentum[model.fixed] = 0.0  # a compliant support keeps its mass
+    inverse = linalg.inv(modes.rotation)
+    mass = inverse.T @ inverse - np.eye(m)
+    squares = np.maximum(modes.squares[:m], MIN_SQUARE * modes.omega[:m] ** 2)
+    stiffness = inverse.T @ np.diag(squares) @ inverse - np.diag(modes.omega[:m] ** 2)
     return replace(
         model,
         mass_all=_add_block(model.mass_all, momentum, mass),

@@ -1,4 +1,4 @@
-"""What the states before teach: how the model has to be corrected, and what differs although nothing has changed."""
+"""The nuisance prior learnt from states before: corrections of the model, and scatter although nothing changed."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that
-ENOUGH_REPEATS = 3  # states: fewer tell nothing of scatter
-ENOUGH_STATES = 0.9  # of the states before that have to be explained by what was learned
+ENOUGH_REPEATS = 3  # states: fewer show no scatter
+ENOUGH_STATES = 0.9  # of the states before that must be explained by what was learnt
 ENOUGH_FOR_MEDIANS = 10  # states
 NORMAL_OF_MEDIAN = 1.4826  # standard deviation over the median distance from the median
 COARSER = 4.0  # errors of fits to the states before, from try to try
 GROWTH = 1.6  # of the tolerance from try to try
-MOST_TOLERANCE = 0.3
-MOST_ERROR = 0.05  # tolerance of fits to the states before: what is larger is no matter of tolerances
-NEAR_A_PEAK = 3.0  # standard deviations of a frequency: so far from a peak of the measurement a mode may start
-MOST_START = 1.5  # standard deviations of a damping ratio
+MAX_TOLERANCE = 0.3
+MAX_ERROR = 0.05  # tolerance of fits to the states before: beyond, it is no matter of tolerances
+NEAR_A_PEAK = 3.0  # standard deviations of a frequency: a mode may start so far from a peak of the measurement
+MAX_START = 1.5  # standard deviations of a damping ratio
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LearntNuisance:
-    """What the states before teach.
+    """What was learnt from the states before.
 
     Parameters
     ----------
@@ -54,23 +54,23 @@ class LearntNuisance:
         Of the channels, as factors.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed.
-    missed : UnexplainedPart, optional
+    unexplained_part : UnexplainedPart, optional
         What the model cannot follow whatever is corrected; None where it follows all within `options.scatter`.
     """
 
     correction: FloatArray
     gains: Mapping[str, float]
     scatter: DiagnoseOptions
-    missed: UnexplainedPart | None
+    unexplained_part: UnexplainedPart | None
 
 
 def learn(before: Sequence[State], options: CompareOptions) -> LearntNuisance:
-    """Fit the states before, and see how far apart they are.
+    """Fit the states before, and measure their scatter.
 
     Parameters
     ----------
     before : sequence of State
-        Healthy ones; with three and more their scatter is learned.
+        Healthy ones; of three and more the scatter is learnt.
     options : CompareOptions
         What the model may be wrong by, and what differs from test to test at least.
 
@@ -87,33 +87,35 @@ def learn(before: Sequence[State], options: CompareOptions) -> LearntNuisance:
     if not before:
         raise InputError("there is no state before to compare with; give at least one")
     sources = [split_data(state.observed) for state in before]
-    fits, errors = _fits(list(zip(before, sources, strict=True)), options)
+    fits, errors = _fit_states(list(zip(before, sources, strict=True)), options)
     if len({fit.hypothesis.context.layout.channels for fit in fits}) > 1:
         raise InputError("the states to compare were measured with different channels; give FRFs of the same labels")
     if len({len(fit.nuisance) for fit in fits}) > 1:
         raise InputError("the models of the states have different numbers of modes in the band; narrow the band")
-    corrections = np.array([fit.nuisance * mode_signs(fit) for fit in fits])
+    corrections = np.array([fit.nuisance * find_mode_signs(fit) for fit in fits])
     gains = np.array([fit.hypothesis.nuisance_prior.unpack(fit.nuisance).gains for fit in fits])
     by_channel = dict(zip(fits[0].hypothesis.context.layout.channels, np.exp(np.median(gains, 0)), strict=True))
-    learned = LearntNuisance(
+    learnt = LearntNuisance(
         correction=np.median(corrections, 0),
         gains=by_channel,
-        scatter=_scatter(fits, options.scatter),
-        missed=None
+        scatter=_estimate_scatter(fits, options.scatter),
+        unexplained_part=None
         if errors == options.scatter
         else find_unexplained_part([state.observed.frfs for state in before], fits),
     )
-    return _widen_tolerance(before, sources, learned, options)
+    return _widen_tolerance(before, sources, learnt, options)
 
 
-def _fits(before: Sequence[tuple[State, DataSplit]], options: CompareOptions) -> tuple[list[Fit], DiagnoseOptions]:
+def _fit_states(
+    before: Sequence[tuple[State, DataSplit]], options: CompareOptions
+) -> tuple[list[Fit], DiagnoseOptions]:
     """Fit the models, as closely as nearly all of them can follow what was measured."""
     errors = options.scatter
     while True:
         problems = [pose_state_problem(state, source, options.model, errors) for state, source in before]
         fits = [fit_from_peaks(problem, source) for problem, (_, source) in zip(problems, before, strict=True)]
         are_good = [assess_goodness(problem, fit).is_good for problem, fit in zip(problems, fits, strict=True)]
-        if np.mean(are_good) >= ENOUGH_STATES or errors.stiffness_tolerance > MOST_ERROR:
+        if np.mean(are_good) >= ENOUGH_STATES or errors.stiffness_tolerance > MAX_ERROR:
             return fits, errors
         errors = replace(errors, stiffness_tolerance=COARSER * errors.stiffness_tolerance)
 
@@ -131,29 +133,29 @@ def fit_from_peaks(problem: InferenceProblem, source: DataSplit) -> Fit:
     Returns
     -------
     Fit
-        The better one of the fits from there and from the model as it is.
+        The better one of the fits from there and from the nominal model.
     """
-    nothing, nuisance_prior, peaks = problem.make_hypothesis(()), problem.nuisance_prior, source.survey.resonances
-    modes = nothing.modes(np.zeros(0), np.zeros(nuisance_prior.size))
+    null, nuisance_prior, peaks = problem.make_hypothesis(()), problem.nuisance_prior, source.survey.resonances
+    modes = null.modes(np.zeros(0), np.zeros(nuisance_prior.size))
     start = np.zeros(nuisance_prior.size)
     for mode in range(nuisance_prior.n_rigid, nuisance_prior.n_modes):
-        apart = np.abs(np.log(peaks.omega_rad_s / modes.omega[mode]))
+        distance = np.abs(np.log(peaks.omega_rad_s / modes.omega[mode]))
         reach = NEAR_A_PEAK * nuisance_prior.kappa_std[mode, mode] / 2
-        if apart.size and apart.min() < reach:
-            found = int(np.argmin(apart))
-            off = (peaks.omega_rad_s[found] / modes.omega[mode]) ** 2 - 1
+        if distance.size and distance.min() < reach:
+            nearest = int(np.argmin(distance))
+            off = (peaks.omega_rad_s[nearest] / modes.omega[mode]) ** 2 - 1
             start[nuisance_prior.frequency_indices[mode]] = off / nuisance_prior.kappa_std[mode, mode]
-            ratio = peaks.decay_1_s[found] / peaks.omega_rad_s[found] / max(modes.stated_ratio[mode], 1e-9) - 1
+            ratio = peaks.decay_1_s[nearest] / peaks.omega_rad_s[nearest] / max(modes.stated_ratio[mode], 1e-9) - 1
             damping = nuisance_prior.damping_std[mode]
-            start[nuisance_prior.damping_indices[mode]] = np.clip(ratio / damping, -MOST_START, MOST_START)
-    fits = [fit_map(nothing, problem.data, np.zeros(0), nuisance=start, iterations=30), fit_null_model(problem)]
+            start[nuisance_prior.damping_indices[mode]] = np.clip(ratio / damping, -MAX_START, MAX_START)
+    fits = [fit_map(null, problem.data, np.zeros(0), nuisance=start, iterations=30), fit_null_model(problem)]
     return min(fits, key=lambda fit: fit.cost)
 
 
 def pose_state_problem(
     state: State, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
 ) -> InferenceProblem:
-    """Bring a state's model and measurement together, with no effects to look for.
+    """Pose the inference problem of a state, with no effects to search for.
 
     Parameters
     ----------
@@ -180,15 +182,15 @@ def pose_state_problem(
 
 
 def predict_unchanged_model(
-    state: State, learned: LearntNuisance, options: CompareOptions, source: DataSplit
+    state: State, learnt: LearntNuisance, options: CompareOptions, source: DataSplit
 ) -> StructuralModel:
-    """Give the model that a state would show if nothing had changed.
+    """Predict the model of a state if nothing had changed.
 
     Parameters
     ----------
     state : State
         With a model of the same modes as the states before.
-    learned : LearntNuisance
+    learnt : LearntNuisance
         From them.
     options : CompareOptions
         As for `learn`.
@@ -201,18 +203,21 @@ def predict_unchanged_model(
         Its model, corrected.
     """
     problem = pose_state_problem(state, source, options.model)
-    nothing = problem.make_hypothesis(())
-    at_rest = np.zeros(problem.nuisance_prior.size)
-    if len(at_rest) != len(learned.correction):
+    null = problem.make_hypothesis(())
+    no_nuisance = np.zeros(problem.nuisance_prior.size)
+    if len(no_nuisance) != len(learnt.correction):
         raise InputError("the state after has other channels or another number of modes in the band than those before")
     signs = _signs(
-        nothing.modes(np.zeros(0), at_rest), problem.nuisance_prior.n_modes, nothing.nuisance_prior.pairs, len(at_rest)
+        null.modes(np.zeros(0), no_nuisance),
+        problem.nuisance_prior.n_modes,
+        null.nuisance_prior.pairs,
+        len(no_nuisance),
     )
-    return correct_model(nothing, learned.correction * signs)
+    return correct_model(null, learnt.correction * signs)
 
 
 def estimate_change_error(
-    corrected: State, source: DataSplit, learned: LearntNuisance, options: CompareOptions
+    corrected: State, source: DataSplit, learnt: LearntNuisance, options: CompareOptions
 ) -> float:
     """Estimate how wrong the model's answer to a change may be: its corrections are those of the states before.
 
@@ -222,7 +227,7 @@ def estimate_change_error(
         The state after, with its corrected model.
     source : DataSplit
         What was measured in it.
-    learned : LearntNuisance
+    learnt : LearntNuisance
         From the states before.
     options : CompareOptions
         As for `learn`.
@@ -232,7 +237,7 @@ def estimate_change_error(
     float
         Largest relative change of a frequency in the band, times what the model may be wrong by.
     """
-    fit = fit_from_peaks(pose_state_problem(corrected, source, options.model, learned.scatter), source)
+    fit = fit_from_peaks(pose_state_problem(corrected, source, options.model, learnt.scatter), source)
     change = _frequency_change(fit.hypothesis, fit.nuisance)
     return options.model.stiffness_tolerance * float(np.abs(change).max(initial=0.0))
 
@@ -244,11 +249,11 @@ def _frequency_change(hypothesis: Hypothesis, nuisance: FloatArray) -> FloatArra
     squares, omega = (
         values[nuisance_prior.n_rigid : nuisance_prior.n_modes] for values in (modes.squares, modes.omega)
     )
-    inside = _in_band(hypothesis)
+    inside = _mask_modes_in_band(hypothesis)
     return np.asarray(np.sqrt(np.abs(squares[inside])) / omega[inside] - 1)
 
 
-def _in_band(hypothesis: Hypothesis) -> BoolArray:
+def _mask_modes_in_band(hypothesis: Hypothesis) -> BoolArray:
     """Tell which elastic modes lie in the band: nothing is known of others."""
     nuisance_prior = hypothesis.nuisance_prior
     modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance_prior.size))
@@ -257,13 +262,13 @@ def _in_band(hypothesis: Hypothesis) -> BoolArray:
     return np.asarray((frequency > low) & (frequency < high))
 
 
-def mode_signs(fit: Fit) -> FloatArray:
-    """Signs of what acts between two modes, which have none of their own: those of the shapes at the first sensor.
+def find_mode_signs(fit: Fit) -> FloatArray:
+    """Signs of the parameters between two modes: those of the shapes at the first sensor, for modes have none.
 
     Parameters
     ----------
     fit : Fit
-        Without a cause.
+        Without a component.
 
     Returns
     -------
@@ -276,29 +281,29 @@ def mode_signs(fit: Fit) -> FloatArray:
 
 
 def _signs(modes: Modes, n_modes: int, pairs: tuple[IntArray, IntArray], size: int) -> FloatArray:
-    own = np.where(modes.outputs[0, :n_modes] < 0, -1.0, 1.0)
-    signs, between = np.ones(size), own[pairs[0]] * own[pairs[1]]
+    shape_signs = np.where(modes.outputs[0, :n_modes] < 0, -1.0, 1.0)
+    signs, between = np.ones(size), shape_signs[pairs[0]] * shape_signs[pairs[1]]
     signs[: 2 * len(between)] = np.concatenate([between, between])
     return signs
 
 
-def _scatter(fits: Sequence[Fit], least: DiagnoseOptions) -> DiagnoseOptions:
+def _estimate_scatter(fits: Sequence[Fit], stated: DiagnoseOptions) -> DiagnoseOptions:
     """Tolerances of frequencies, damping and gains that repeated states show, or those stated where they are larger."""
     n = len(fits)
     if n < ENOUGH_REPEATS:
-        return least
+        return stated
     frequency = np.array([_frequency_change(fit.hypothesis, fit.nuisance) for fit in fits])
     nuisance_values = [fit.hypothesis.nuisance_prior.unpack(fit.nuisance) for fit in fits]
     elastic = slice(fits[0].hypothesis.nuisance_prior.n_rigid, None)
-    inside = _in_band(fits[0].hypothesis)
+    inside = _mask_modes_in_band(fits[0].hypothesis)
     damping = np.array([np.log1p(nuisance.damping)[elastic][inside] for nuisance in nuisance_values])
     gains = np.array([nuisance.gains for nuisance in nuisance_values])
     wider = HALF_WIDTH * np.sqrt(1 + 1 / n)  # the mean that they are compared with is not exact either
     return replace(
-        least,
-        frequency_tolerance=max(least.frequency_tolerance, wider * _std_over_states(frequency)),
-        damping_tolerance=max(least.damping_tolerance, wider * _std_over_states(damping)),
-        gain_tolerance=max(least.gain_tolerance, wider * _std_over_states(gains)),
+        stated,
+        frequency_tolerance=max(stated.frequency_tolerance, wider * _std_over_states(frequency)),
+        damping_tolerance=max(stated.damping_tolerance, wider * _std_over_states(damping)),
+        gain_tolerance=max(stated.gain_tolerance, wider * _std_over_states(gains)),
     )
 
 
@@ -309,29 +314,29 @@ def _std_over_states(values: FloatArray) -> float:
         return 0.0
     if n < ENOUGH_FOR_MEDIANS:
         return float(np.sqrt(np.mean(values.var(0, ddof=1))))
-    apart = np.abs(values - np.median(values, 0))
-    return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(apart, 0)) ** 2)))
+    distance = np.abs(values - np.median(values, 0))
+    return float(np.sqrt(np.mean((NORMAL_OF_MEDIAN * np.median(distance, 0)) ** 2)))
 
 
 def _widen_tolerance(
-    before: Sequence[State], sources: Sequence[DataSplit], learned: LearntNuisance, options: CompareOptions
+    before: Sequence[State], sources: Sequence[DataSplit], learnt: LearntNuisance, options: CompareOptions
 ) -> LearntNuisance:
     """Widen the tolerance of the model until nothing has changed in the states before, by the rules for those after."""
     nominals = [
         State(
-            model=predict_unchanged_model(state, learned, options, source),
-            observed=discount_unexplained(state.observed, learned.gains, learned.missed),
+            model=predict_unchanged_model(state, learnt, options, source),
+            observed=discount_unexplained(state.observed, learnt.gains, learnt.unexplained_part),
         )
         for state, source in zip(before, sources, strict=True)
     ]
     sources = [split_data(state.observed) for state in nominals]
-    scatter = learned.scatter
-    while scatter.stiffness_tolerance < MOST_TOLERANCE:
+    scatter = learnt.scatter
+    while scatter.stiffness_tolerance < MAX_TOLERANCE:
         are_explained = [_is_explained(state, source, scatter) for state, source in zip(nominals, sources, strict=True)]
         if np.mean(are_explained) >= ENOUGH_STATES:
             break
         scatter = replace(scatter, stiffness_tolerance=GROWTH * scatter.stiffness_tolerance)
-    return replace(learned, scatter=scatter)
+    return replace(learnt, scatter=scatter)
 
 
 def _is_explained(state: State, source: DataSplit, scatter: DiagnoseOptions) -> bool:

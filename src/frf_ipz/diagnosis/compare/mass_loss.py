@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 SMALLEST = 1e-5  # of the mass of the structure
-WORTH_A_LOOK = 1e-3  # of the mass of the structure: nodes that have less cannot lose it
-MOST = 0.999  # of what a node has: what is left still moves
+MIN_MASS = 1e-3  # of the mass of the structure: nodes that have less cannot lose it
+MAX_PART = 0.999  # of what a node has: what is left still moves
 
 
 class MassLoss(Effect):
@@ -38,17 +38,19 @@ class MassLoss(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that has something to lose."""
-        least = WORTH_A_LOOK * context.mass_kg
+        least = MIN_MASS * context.mass_kg
         first = {location.key[0]: location for location in reversed(list_node_locations(context))}
-        had = _mass_there(context.model, [str(location.key[1]) for location in first.values()], list(first))
+        masses = _removable_masses(context.model, [str(location.key[1]) for location in first.values()], list(first))
         return [
-            location for location, mass in sorted(zip(first.values(), had, strict=True), key=_by_node) if mass > least
+            location
+            for location, mass in sorted(zip(first.values(), masses, strict=True), key=_by_node)
+            if mass > least
         ]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Mass, at most what the node has."""
-        (had,) = _mass_there(context.model, [str(location.key[1])], [location.key[0]])
-        return (Parameter(name="mass_kg", low=SMALLEST * context.mass_kg, high=MOST * had),)
+        (removable,) = _removable_masses(context.model, [str(location.key[1])], [location.key[0]])
+        return (Parameter(name="mass_kg", low=SMALLEST * context.mass_kg, high=MAX_PART * removable),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Less mass in all translational directions of the node."""
@@ -62,7 +64,7 @@ class MassLoss(Effect):
         dof = next(d for d in context.moving_dofs if (d.node, d.direction) == (node, direction))
         (parameter,) = self.parameters(context, location)
         return Signature(
-            motion=context.unit(dof),
+            motion=context.unit_motion(dof),
             shapes=-(context.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,
@@ -70,15 +72,15 @@ class MassLoss(Effect):
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside that have something to lose."""
-        known = {other.key for other in self.locations(context)}
-        return [other for other in list_neighbouring_nodes(context, location) if other.key in known]
+        known = {candidate.key for candidate in self.locations(context)}
+        return [candidate for candidate in list_neighbouring_nodes(context, location) if candidate.key in known]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much is gone from where."""
         mass = values["mass_kg"]
         return (
             f"A mass of {1e3 * mass.value:.3g} g (+- {1e3 * mass.std:.2g} g) is gone from "
-            f"{context.where(int(str(location.key[0])))}."
+            f"{context.describe_node(int(str(location.key[0])))}."
         )
 
 
@@ -86,16 +88,16 @@ def _by_node(entry: tuple[Location, float]) -> int:
     return int(str(entry[0].key[0]))
 
 
-def _mass_there(model: StructuralModel, directions: Sequence[str], nodes: Sequence[object]) -> list[float]:
+def _removable_masses(model: StructuralModel, directions: Sequence[str], nodes: Sequence[object]) -> list[float]:
     """Largest masses that could be taken from nodes with the mass matrix still positive, ``1 / (M^-1)_uu``, kg."""
     free = np.flatnonzero(~model.fixed)
-    number = {int(row): index for index, row in enumerate(free)}
-    rows = {(dof.node, dof.direction): number[row] for dof, row in model.full_indices.items() if row in number}
+    free_index = {int(row): index for index, row in enumerate(free)}
+    rows = {(dof.node, dof.direction): free_index[row] for dof, row in model.full_indices.items() if row in free_index}
     loads = np.zeros((len(free), len(nodes)))
-    wanted = [rows[int(str(node)), direction] for node, direction in zip(nodes, directions, strict=True)]
-    loads[wanted, np.arange(len(wanted))] = 1.0
+    required_rows = [rows[int(str(node)), direction] for node, direction in zip(nodes, directions, strict=True)]
+    loads[required_rows, np.arange(len(required_rows))] = 1.0
     try:
         solved = splu(model.mass.tocsc()).solve(loads)
     except RuntimeError:  # DOFs without mass: nothing is known to be there
-        return [0.0] * len(wanted)
-    return [float(1 / solved[row, column]) for column, row in enumerate(wanted)]
+        return [0.0] * len(required_rows)
+    return [float(1 / solved[row, column]) for column, row in enumerate(required_rows)]

@@ -28,7 +28,7 @@ class State:
     model : StructuralModel
         The FE model, with damping, and with everything that is known to be different in this state.
     observed : Observations
-        Blows, records or FRFs.
+        Records or FRFs.
     """
 
     model: StructuralModel
@@ -42,7 +42,7 @@ class CompareOptions:
     Parameters
     ----------
     model : DiagnoseOptions
-        What the model may be wrong by in every state: this is learned from the states before, and then forgiven.
+        What the model may be wrong by in every state: this is learnt from the states before, and then allowed for.
     scatter : DiagnoseOptions
         What differs from test to test with nothing changed; what repeated states before show beyond that is added.
     effects : tuple of str

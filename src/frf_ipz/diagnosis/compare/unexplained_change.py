@@ -51,26 +51,26 @@ def find_unexplained_part(measured: Sequence[FrfSet | None], fits: Sequence[Fit]
     UnexplainedPart or None
         None where there are no FRFs on lines.
     """
-    frfs = [one for one in measured if one is not None]
+    frfs = [frf_set for frf_set in measured if frf_set is not None]
     if len(frfs) < len(fits):
         return None
     frequency = frfs[0].frequency_hz[frfs[0].in_band(fits[0].hypothesis.context.band_hz)]
     s = np.asarray(2j * np.pi * frequency, np.complex128)
-    found = []
-    for one, fit in zip(frfs, fits, strict=True):
-        values = np.stack([np.interp(frequency, one.frequency_hz, column) for column in one.values.T], axis=1)
+    parts = []
+    for frf_set, fit in zip(frfs, fits, strict=True):
+        values = np.stack([np.interp(frequency, frf_set.frequency_hz, column) for column in frf_set.values.T], axis=1)
         model = fit.hypothesis.respond(fit.values, fit.nuisance, s).values
         size = np.maximum(np.abs(values), np.finfo(float).tiny)
-        across, own = np.sum((model.conj() * values).real / size**2, 0), np.sum(np.abs(model) ** 2 / size**2, 0)
-        scale = np.ones(one.n_frfs) if one.unknown_scale == "none" else across / own
-        found.append(np.abs(values - scale * model) / size)
-    return UnexplainedPart(frequency_hz=frequency, part=np.median(found, axis=0))
+        products, squares = np.sum((model.conj() * values).real / size**2, 0), np.sum(np.abs(model) ** 2 / size**2, 0)
+        scale = np.ones(frf_set.n_frfs) if frf_set.unknown_scale == "none" else products / squares
+        parts.append(np.abs(values - scale * model) / size)
+    return UnexplainedPart(frequency_hz=frequency, part=np.median(parts, axis=0))
 
 
 def discount_unexplained(
-    observed: Observations, gains: Mapping[str, float], missed: UnexplainedPart | None
+    observed: Observations, gains: Mapping[str, float], unexplained: UnexplainedPart | None
 ) -> Observations:
-    """Take the gains that channels had before out of what was observed, and trust it where the model can follow it.
+    """Remove known gains from what was observed, and discount what the model cannot follow.
 
     Parameters
     ----------
@@ -78,25 +78,27 @@ def discount_unexplained(
         Of a state.
     gains : mapping of str to float
         Factors by channel.
-    missed : UnexplainedPart, optional
+    unexplained : UnexplainedPart, optional
         By the states before.
 
     Returns
     -------
     Observations
-        Without gains; where something is missed it is a part of the variance of the FRFs, and blows are left out.
+        Without gains; what is unexplained is a part of the variance of the FRFs, and records are left out.
     """
-    plain = _without_gains(observed, gains)
-    frfs = plain.frfs
-    if frfs is None or missed is None:
-        return plain
-    part = np.stack([np.interp(frfs.frequency_hz, missed.frequency_hz, column) for column in missed.part.T], axis=1)
+    without_gains = _remove_gains(observed, gains)
+    frfs = without_gains.frfs
+    if frfs is None or unexplained is None:
+        return without_gains
+    part = np.stack(
+        [np.interp(frfs.frequency_hz, unexplained.frequency_hz, column) for column in unexplained.part.T], axis=1
+    )
     known = np.where(np.isfinite(frfs.variance), frfs.variance, 0.0)
     variance = known + SHARING_POINTS * (part * np.abs(frfs.values)) ** 2
-    return replace(plain, kind="frf", records=(), frfs=replace(frfs, variance=variance))
+    return replace(without_gains, kind="frf", records=(), frfs=replace(frfs, variance=variance))
 
 
-def _without_gains(observed: Observations, gains: Mapping[str, float]) -> Observations:
+def _remove_gains(observed: Observations, gains: Mapping[str, float]) -> Observations:
     records = tuple(
         replace(
             record,

@@ -15,37 +15,37 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.response import Response
 
 FAR_OFF = 300.0  # mean squared misfit
-NEARLY_RIGHT = 20.0  # the same: small effects are looked for on top of such a fit
+NEARLY_RIGHT = 20.0  # the same: small effects are searched on top of such a fit
 NEARLY_ALL = 2.0  # the same: nothing large can be missing
-SMALL_NUISANCE_CHI2 = 600.0  # and this little is explained by what cannot be known
+SMALL_NUISANCE_CHI2 = 600.0  # and this little is explained by nuisance parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fit:
-    """A hypothesis at its best.
+    """The maximum a posteriori (MAP) fit of a hypothesis.
 
     Parameters
     ----------
     hypothesis : Hypothesis
-        Causes at their places.
+        Components at their locations.
     values : (n_parameters,) array
         Physical values of the parameters.
     nuisance : (n_nuisance,) array
-        What cannot be known, in standard deviations.
+        Nuisance parameters, in standard deviations.
     misfit : float
         Sum of squares of the whitened misfit.
     nuisance_chi2 : float
-        Sum of squares of the pulls of `nuisance`.
+        Twice the prior's cost of `nuisance`: their sum of squares, more where they exceed a tolerance.
     log_evidence : float
-        nats, up to a constant that all hypotheses share.
+        Natural logarithm, up to a constant that all hypotheses share.
     covariance : (n_parameters, n_parameters) array
         Of the parameters as searched (logarithms, parts of ranges).
     has_converged : bool
-        The last step was small.
+        True if the last step was small.
     n_determined : float
-        How many of what cannot be known the data determine: what `nuisance_chi2` is expected to be at most.
+        Number of nuisance parameters that the data determine: what `nuisance_chi2` is expected to be at most.
     n_values : int
-        Real numbers that it was fitted to.
+        Number of real values that it was fitted to.
     """
 
     hypothesis: Hypothesis
@@ -71,12 +71,12 @@ class Fit:
 
     @property
     def is_far_off(self) -> bool:
-        """So far off that its causes are wrong or some are missing: no time is spent on its places."""
+        """So far off that its components are wrong or some are missing: its locations are not searched."""
         return self.mean_misfit > FAR_OFF
 
     @property
     def is_nearly_right(self) -> bool:
-        """What it leaves is so little that small effects can explain it: they are searched on top of it."""
+        """Its misfit is so small that small effects can explain it: they are searched on top of it."""
         return self.mean_misfit < NEARLY_RIGHT
 
     @property
@@ -96,10 +96,9 @@ class Data:
     whitening : Whitening
         Of their errors.
     free_gains : str
-        ``none``, ``common`` or ``per_channel``: gains that nobody knows; the model's FRFs are scaled to the measured
-        ones.
+        ``none``, ``common`` or ``per_channel``: unknown gains; the model's FRFs are scaled to the measured ones.
     is_bounded : bool
-        Tolerances are bounds; without them far steps are easier.
+        Tolerances are bounds; without them long steps are easier.
     """
 
     measured: TransferFunctions
@@ -112,18 +111,18 @@ class Data:
         n_frfs = len(self.measured.labels)
         if self.free_gains == "none":
             return np.ones(n_frfs)
-        model, measured = self._compared(response.values), self._compared(self.measured.values)
-        across, own = np.sum(model * measured, 1), np.sum(model**2, 1)
+        model, measured = self._weigh(response.values), self._weigh(self.measured.values)
+        products, squares = np.sum(model * measured, 1), np.sum(model**2, 1)
         if self.free_gains == "common":
-            return np.full(n_frfs, across.sum() / own.sum())
-        return np.asarray(across / own)
+            return np.full(n_frfs, products.sum() / squares.sum())
+        return np.asarray(products / squares)
 
     def misfit(self, response: Response) -> FloatArray:
         """Whitened difference of measurement and model, (n_data,) array."""
         return self.whitening(self.measured.values - self.gains(response) * response.values)
 
     def slopes(self, response: Response, changes: ComplexArray) -> FloatArray:
-        """Whitened changes of the model's FRFs, (n_data, n) array, without what gains that nobody knows make up for.
+        """Whitened changes of the model's FRFs, (n_data, n) array, projected on what unknown gains cannot change.
 
         [Kaufman1975] L. Kaufman, A variable projection method for solving separable nonlinear least squares problems,
         BIT 15 (1975) 49-57.
@@ -131,14 +130,15 @@ class Data:
         white = self.whitening(self.gains(response)[:, None] * changes)
         if self.free_gains == "none":
             return white
-        model = self._compared(response.values)
+        model = self._weigh(response.values)
         by_frf = white.reshape(len(model), model.shape[1], -1)
-        across, own = np.einsum("fd,fdn->fn", model, by_frf), np.sum(model**2, 1)[:, None]
+        products, squares = np.einsum("fd,fdn->fn", model, by_frf), np.sum(model**2, 1)[:, None]
         if self.free_gains == "common":
-            across, own = np.broadcast_to(across.sum(0), across.shape), np.broadcast_to(own.sum(), own.shape)
-        return np.asarray((by_frf - model[:, :, None] * (across / own)[:, None]).reshape(white.shape))
+            products = np.broadcast_to(products.sum(0), products.shape)
+            squares = np.broadcast_to(squares.sum(), squares.shape)
+        return np.asarray((by_frf - model[:, :, None] * (products / squares)[:, None]).reshape(white.shape))
 
-    def _compared(self, values: ComplexArray) -> FloatArray:
+    def _weigh(self, values: ComplexArray) -> FloatArray:
         """Weigh FRFs as misfits are weighed, (n_frfs, 2 n_points) array; by their size where there is no whitening."""
         if self.whitening.factors.size:
             return self.whitening(values).reshape(len(self.measured.labels), -1)

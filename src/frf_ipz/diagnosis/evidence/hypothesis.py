@@ -1,4 +1,4 @@
-"""A hypothesis: causes at their places, ready to be evaluated for any values of their parameters."""
+"""A hypothesis: components at their locations, ready to be evaluated for any values of their parameters."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 
 
-REMEMBERED = 4  # sets of values
+N_REMEMBERED = 4  # sets of values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Component:
-    """An effect at a place.
+    """An effect at a location.
 
     Parameters
     ----------
     effect : Effect
-        What.
-    location : Place
-        Where.
+        The effect.
+    location : Location
+        Its location.
     n_locations : int
-        How many places it could have been: the prior of this one.
+        Number of possible locations: the prior of this one.
     """
 
     effect: Effect
@@ -50,32 +50,32 @@ class Component:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What tells it from others."""
+        """Distinguishes it from others."""
         return (self.effect.name, *self.location.key)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hypothesis:
-    """Causes together, with the coordinates that they need.
+    """Components together, with the coordinates that they need.
 
     Parameters
     ----------
-    components : tuple of Cause
+    components : tuple of Component
         Empty for the nominal model.
     parameters : tuple of Parameter
-        Of all causes in turn.
+        Of all components in turn.
     builders : tuple of Builder
-        Of each cause.
+        Of each component.
     counts : tuple of int
-        Number of parameters of each cause.
+        Number of parameters of each component.
     basis : Basis
         Coordinates.
     rows : MotionRows
-        Sensors and blows in them.
+        Sensors and excited points in them.
     context : ModelContext
-        What is tested.
-    nuisance_prior : Nuisance
-        What cannot be known.
+        Model, layout and tolerances.
+    nuisance_prior : NuisancePrior
+        Nuisance parameters.
     """
 
     components: tuple[Component, ...]
@@ -90,27 +90,27 @@ class Hypothesis:
 
     @property
     def key(self) -> tuple[tuple[object, ...], ...]:
-        """What tells it from others."""
+        """Distinguishes it from others."""
         return tuple(component.key for component in self.components)
 
     @property
     def low(self) -> FloatArray:
-        """Lower bounds as searched."""
+        """Lower bounds in search coordinates."""
         return self.to_searched(np.array([parameter.low for parameter in self.parameters]))
 
     @property
     def high(self) -> FloatArray:
-        """Upper bounds as searched."""
+        """Upper bounds in search coordinates."""
         return self.to_searched(np.array([parameter.high for parameter in self.parameters]))
 
     def clip_to_searched(self, values: FloatArray) -> FloatArray:
-        """Turn physical values, brought within the bounds, into what is searched along."""
+        """Clip physical values to the bounds and transform them to search coordinates."""
         bounds = [(parameter.low, parameter.high) for parameter in self.parameters]
         inside = [np.clip(value, low, high) for value, (low, high) in zip(values, bounds, strict=True)]
         return np.clip(self.to_searched(np.array(inside)), self.low, self.high)
 
     def to_searched(self, values: FloatArray) -> FloatArray:
-        """Turn physical values into what is searched along: logarithms, or parts of the range."""
+        """Transform physical values to search coordinates: logarithms, or parts of the range."""
         return np.array(
             [
                 np.log(value) if parameter.is_log else value / (parameter.high - parameter.low)
@@ -119,7 +119,7 @@ class Hypothesis:
         )
 
     def to_physical(self, searched: FloatArray) -> FloatArray:
-        """Turn what is searched along into physical values."""
+        """Transform search coordinates to physical values."""
         return np.array(
             [
                 np.exp(value) if parameter.is_log else value * (parameter.high - parameter.low)
@@ -130,42 +130,40 @@ class Hypothesis:
     def change(self, values: FloatArray) -> Change:
         """Everything that is changed for physical values of the parameters."""
         total = NO_CHANGE
-        for build, own in zip(self.builders, self._split(values), strict=True):
-            total = total + build(own)
+        for build, part in zip(self.builders, self._split(values), strict=True):
+            total = total + build(part)
         return total
 
     def implausibilities(self, values: FloatArray) -> tuple[str, ...]:
-        """Why each cause is rather something else; empty where it is not."""
-        own = self._split(values)
-        return tuple(
-            component.effect.implausibility(mine) for component, mine in zip(self.components, own, strict=True)
-        )
+        """Why each component is implausible with its values; empty where it is not."""
+        parts = zip(self.components, self._split(values), strict=True)
+        return tuple(component.effect.implausibility(part) for component, part in parts)
 
     def log_prior(self, values: FloatArray) -> float:
-        """How likely the places are, and the values beside their bounds, nats."""
+        """Log prior of the locations, and of the values within their bounds."""
         return sum(
-            component.effect.log_prior(self.context, component.location, own) - float(np.log(component.n_locations))
-            for component, own in zip(self.components, self._split(values), strict=True)
+            component.effect.log_prior(self.context, component.location, part) - float(np.log(component.n_locations))
+            for component, part in zip(self.components, self._split(values), strict=True)
         )
 
     def _split(self, values: FloatArray) -> list[FloatArray]:
         return np.split(values, np.cumsum(self.counts)[:-1]) if self.counts else []
 
     def modes(self, values: FloatArray, nuisance: FloatArray) -> Modes:
-        """Modes for physical values of the parameters, and of what cannot be known in standard deviations."""
+        """Modes for physical values of the parameters, and nuisance parameters in standard deviations."""
         return scatter_modes(self.basis, self._modified(values), self.rows, self.nuisance_prior.unpack(nuisance))
 
     def respond(self, values: FloatArray, nuisance: FloatArray, s: ComplexArray) -> Response:
-        """FRFs for physical values of the parameters, and of what cannot be known in standard deviations."""
+        """FRFs for physical values of the parameters, and nuisance parameters in standard deviations."""
         modified, nuisance_values = self._modified(values), self.nuisance_prior.unpack(nuisance)
         modes = scatter_modes(self.basis, modified, self.rows, nuisance_values)
         return respond(modes, modified.change, self.context.layout, nuisance_values, s, self.basis)
 
     def _modified(self, values: FloatArray) -> ModifiedStructure:
-        """Solve without scatter, once for the latest values: steps try several scatters for the same."""
+        """Solve without scatter, once for the latest values: a fit tries several nuisance values with the same."""
         key = values.tobytes()
         if key not in self._latest:
-            if len(self._latest) >= REMEMBERED:
+            if len(self._latest) >= N_REMEMBERED:
                 self._latest.pop(next(iter(self._latest)))
             self._latest[key] = modify_structure(self.basis, self.change(values))
         return self._latest[key]
@@ -179,14 +177,14 @@ def make_hypothesis(
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    nuisance_prior : Nuisance
-        What cannot be known.
-    components : tuple of Cause
+        Model, layout and tolerances.
+    nuisance_prior : NuisancePrior
+        Prior of the nuisance parameters.
+    components : tuple of Component
         Empty for the nominal model.
     exact : bool
-        Add the static shapes that the last cause needs; without them a wide search is faster. Those of the causes
-        before it are added always: what one more cause changes is compared with a fit of theirs.
+        Add the static shapes that the last component needs; without them a global scan is faster. Those of the
+        components before it are added always: what one more component changes is compared with a fit of theirs.
 
     Returns
     -------
@@ -200,15 +198,17 @@ def make_hypothesis(
         (component is not components[-1], typical_change(context, component.effect, component.location, build))
         for component, build in zip(components, builders, strict=True)
     ]
-    for is_known, typical in sorted(typicals, key=lambda one: one[1].model is None):  # an exchanged model comes first
+    for is_known, typical in sorted(
+        typicals, key=lambda entry: entry[1].model is None
+    ):  # an exchanged model comes first
         moved = moved + Change(moved=typical.moved)
         if exact or is_known or typical.released or typical.model is not None:
             basis = enrich_basis(basis, typical)
     return Hypothesis(
         components=components,
-        parameters=tuple(parameter for own in parameters for parameter in own),
+        parameters=tuple(parameter for group in parameters for parameter in group),
         builders=builders,
-        counts=tuple(len(own) for own in parameters),
+        counts=tuple(len(group) for group in parameters),
         basis=basis,
         rows=make_motion_rows(basis, context.layout, moved, nuisance_prior),
         context=context,

@@ -31,34 +31,34 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.structure import StructuralModel
 
-LAST_STEPS = 90  # along a bent valley many are small
+LAST_STEPS = 90  # along a curved valley many are small
 MANY_POINTS = 120  # of a contour: every other one is enough for first steps
-FEW_POINTS = 110  # of a contour: what a first look at small effects needs
-EARLY_FLOOR = 8.0  # times the model's errors: first steps see past narrow peaks
+FEW_POINTS = 110  # of a contour: what a score test of small effects needs
+ROUGH_FLOOR = 8.0  # times the model's errors: first steps overlook narrow peaks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InferenceProblem:
-    """Everything a search works with.
+    """Model, nuisance prior, effects and measurement: everything that hypotheses are fitted with.
 
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    nuisance_prior : Nuisance
-        What cannot be known.
+        Model, layout and tolerances.
+    nuisance_prior : NuisancePrior
+        Prior of the nuisance parameters.
     effects : mapping of str to Effect
-        What is looked for.
+        The effects to search for.
     coarse, middle : TransferFunctions
         Transfer functions far from the axis, and on the way to it.
     data : Data
         Those near the axis, with their errors.
     rough_data : Data
-        The same, with larger errors: for first steps.
+        The same with inflated errors, for first steps.
     sparse_data : Data
-        Fewer points near the axis: for a first look at small effects.
+        Fewer points near the axis, for score tests of small effects.
     kind : str
-        What was looked at: blows of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
+        What was measured: impacts of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     """
 
     context: ModelContext
@@ -76,32 +76,39 @@ class InferenceProblem:
         return make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
 
     def fit(self, components: tuple[Component, ...], values: FloatArray, *, cost_limit: float = np.inf) -> Fit:
-        """Fit causes, from values of their parameters; given up where the cost does not come below a bar."""
+        """Fit components, from values of their parameters; stopped early if the cost cannot come below a limit."""
         return self.fit_exactly(self.fit_roughly(components, values), cost_limit=cost_limit)
 
     def fit_roughly(
         self, components: tuple[Component, ...], values: FloatArray, nuisance: FloatArray | None = None
     ) -> Fit:
-        """Fit causes with large errors, from values of their parameters, and from some scatter if it is known."""
+        """Fit components with inflated errors, from values of their parameters and, if given, of the nuisance."""
         return fit_map(
             self.make_hypothesis(components), self.rough_data, values, nuisance=nuisance, iterations=6, tolerance=1.0
         )
 
     def fit_exactly(self, fit: Fit, *, cost_limit: float = np.inf) -> Fit:
-        """Fit exactly, from a fit with large errors; given up where the cost does not come below a bar."""
+        """Fit exactly, from a fit with inflated errors; stopped early if the cost cannot come below a limit."""
         freely = replace(self.data, is_bounded=False)  # costs no more than with bounds
-        near = fit_map(fit.hypothesis, freely, fit.values, nuisance=fit.nuisance, iterations=16, cost_limit=cost_limit)
-        iterations = 12 if near.cost < cost_limit else 0
+        unbounded = fit_map(
+            fit.hypothesis, freely, fit.values, nuisance=fit.nuisance, iterations=16, cost_limit=cost_limit
+        )
+        iterations = 12 if unbounded.cost < cost_limit else 0
         return fit_map(
-            fit.hypothesis, self.data, near.values, nuisance=near.nuisance, iterations=iterations, cost_limit=cost_limit
+            fit.hypothesis,
+            self.data,
+            unbounded.values,
+            nuisance=unbounded.nuisance,
+            iterations=iterations,
+            cost_limit=cost_limit,
         )
 
     def fit_from_base(
         self, hypothesis: Hypothesis, values: FloatArray, base: Fit, *, cost_limit: float = np.inf
     ) -> Fit:
-        """Fit a small effect exactly, with the scatter of a fit without it or with that fit's frequencies.
+        """Fit a small effect exactly, with the nuisance of a fit without it or with that fit's frequencies.
 
-        It is given up where the cost does not come below a bar.
+        It is stopped early if the cost cannot come below a limit.
         """
         inside, nuisance = self.nearest_start(hypothesis, (values,), base)
         return fit_map(
@@ -111,10 +118,12 @@ class InferenceProblem:
     def nearest_start(
         self, hypothesis: Hypothesis, starts: Sequence[FloatArray], fit: Fit
     ) -> tuple[FloatArray, FloatArray]:
-        """Choose the start that is nearest to the data, with the scatter of a fit or with its frequencies."""
+        """Choose the start that is nearest to the data, with the nuisance of a fit or with its frequencies."""
         inside = [hypothesis.to_physical(hypothesis.clip_to_searched(values)) for values in starts]
-        both = [(at, nuisance) for at in inside for nuisance in (fit.nuisance, adopt_modes(hypothesis, at, fit))]
-        return min(both, key=lambda start: self._cost(hypothesis, *start))
+        candidates = [
+            (start, nuisance) for start in inside for nuisance in (fit.nuisance, adopt_modes(hypothesis, start, fit))
+        ]
+        return min(candidates, key=lambda start: self._cost(hypothesis, *start))
 
     def _cost(self, hypothesis: Hypothesis, values: FloatArray, nuisance: FloatArray) -> float:
         white = self.data.misfit(hypothesis.respond(values, nuisance, self.data.measured.s))
@@ -122,12 +131,12 @@ class InferenceProblem:
         return float(white @ white + whitened_nuisance @ whitened_nuisance)
 
     def fit_to_convergence(self, fit: Fit) -> Fit:
-        """Go on with a fit that has not converged."""
+        """Continue a fit that has not converged."""
         return fit_map(fit.hypothesis, self.data, fit.values, nuisance=fit.nuisance, iterations=LAST_STEPS)
 
 
 def compute_weights(measured: TransferFunctions, error: float) -> FloatArray:
-    """Weigh squared misfits, line by line.
+    """Compute the weights of squared misfits, line by line.
 
     Parameters
     ----------
@@ -154,7 +163,7 @@ def pose_problem(
     *,
     free_gains: str = "none",
 ) -> InferenceProblem:
-    """Bring model and measurement together.
+    """Pose the inference problem of a model and a measurement.
 
     Parameters
     ----------
@@ -167,9 +176,9 @@ def pose_problem(
     options : DiagnoseOptions
         Tolerances.
     effects : mapping of str to Effect
-        What is looked for.
+        The effects to search for.
     free_gains : str
-        ``none``, ``common`` or ``per_channel``: gains that nobody knows.
+        ``none``, ``common`` or ``per_channel``: unknown gains.
 
     Returns
     -------
@@ -187,12 +196,14 @@ def pose_problem(
     nuisance_prior = make_nuisance_prior(basis, layout, options)
     coarse, middle = source.coarse, source.middle
     if free_gains != "none":
-        coarse, middle = (_scale_to_nominal(one, basis, layout, nuisance_prior, free_gains) for one in (coarse, middle))
+        coarse, middle = (
+            _scale_to_nominal(measured, basis, layout, nuisance_prior, free_gains) for measured in (coarse, middle)
+        )
     n_points = len(source.training.s)
     half = select_points(source.training, np.arange(0, n_points, 2 if n_points > MANY_POINTS else 1))
-    few = select_points(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
+    sparse = select_points(source.training, np.arange(0, n_points, -(-n_points // FEW_POINTS)))
     context = ModelContext(basis=basis, layout=layout, band_hz=band_hz, contour=source.coarse.s, options=options)
-    rough = make_data(half, options, free_gains=free_gains, floor=EARLY_FLOOR)
+    rough = make_data(half, options, free_gains=free_gains, floor=ROUGH_FLOOR)
     return InferenceProblem(
         context=context,
         nuisance_prior=nuisance_prior,
@@ -201,7 +212,7 @@ def pose_problem(
         middle=middle,
         data=make_data(source.training, options, free_gains=free_gains),
         rough_data=replace(rough, is_bounded=False),
-        sparse_data=make_data(few, options, free_gains=free_gains),
+        sparse_data=make_data(sparse, options, free_gains=free_gains),
         kind=source.kind,
     )
 
@@ -209,7 +220,7 @@ def pose_problem(
 def make_data(
     measured: TransferFunctions, options: DiagnoseOptions, *, free_gains: str = "none", floor: float = 1.0
 ) -> Data:
-    """Put tolerances beside measurements.
+    """Make the data of measurements and tolerances.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Fits a hypothesis to measured transfer functions, and weighs its evidence.
+"""Fits a hypothesis to measured transfer functions at the maximum of its posterior, and approximates its evidence.
 
-Levenberg-Marquardt on the parameters of the causes and on everything that cannot be known, which has a prior. The
-evidence is Laplace's: the likelihood at the top, times the volume of the posterior over that of the prior.
+Levenberg-Marquardt on the parameters of the components and on the nuisance parameters, which have a prior. The
+evidence is Laplace's: the likelihood at the maximum, times the volume of the posterior over that of the prior.
 
 [MacKay2003] D. J. C. MacKay, Information theory, inference, and learning algorithms, Cambridge University Press, 2003,
 chapters 27 and 28.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.response import Response
 
 STEP = 1e-6  # of the logarithm of a parameter, to both sides: peaks are so narrow that one side is not exact enough
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-5, 1e-9, 1e6
+FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-5, 1e-9, 1e6
 FASTER, SLOWER = 0.2, 6.0  # what damping is multiplied with after a good and a bad step
 LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear range
 PRIOR_CURVATURE = 12.0  # over the squared range: that of a uniform prior, where the data say nothing
@@ -35,7 +35,7 @@ MAX_CORRECTION = 0.1  # of a squared frequency: more is no small correction
 LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
 MIN_INFLUENCE = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
-PATIENCE = 3  # steps after which a fit may be given up
+PATIENCE = 3  # steps after which a fit may be stopped early
 LARGE_STEP = 0.3  # of the longest step: parameters that move so much are still on their way
 FURTHER_GAIN = 6.0  # times the last gain: what further steps may gain together
 ROUNDING = 1e-9  # of a diagonal entry: what a sum of squares of many lines is exact to
@@ -49,7 +49,7 @@ class _Point:
     nuisance: FloatArray
     misfit: FloatArray
     response: Response
-    whitened_nuisance: FloatArray  # of the unknown
+    whitened_nuisance: FloatArray
     slopes: FloatArray
 
     @property
@@ -67,29 +67,29 @@ def fit_map(
     tolerance: float = 0.02,
     cost_limit: float = np.inf,
 ) -> Fit:
-    """Fit a hypothesis.
+    """Find the maximum a posteriori (MAP) of a hypothesis.
 
     Parameters
     ----------
     hypothesis : Hypothesis
-        Causes at their places.
+        Components at their locations.
     data : Data
         What to fit to.
     values : (n_parameters,) array
         Physical values to start from.
     nuisance : (n_nuisance,) array, optional
-        What cannot be known, to start from; zero where it is left out.
+        Nuisance parameters to start from; zero where they are left out.
     iterations : int
-        At most that many.
+        At most so many.
     tolerance : float
         Stop when a step changes the objective by less, in squared standard deviations.
     cost_limit : float
-        Cost, half the objective, that a fit is wanted below: one whose last step does not lead there is given up.
+        Cost, half the objective, below which a fit is of use: one that is unlikely to get there is stopped early.
 
     Returns
     -------
     Fit
-        The best found.
+        At the maximum, or where it was stopped.
     """
     start = hypothesis.clip_to_searched(values)
     point = _evaluate(
@@ -97,9 +97,9 @@ def fit_map(
     )
     slope = _linearise(hypothesis, data, point)
     damping, has_converged = FIRST_DAMPING, False
-    for done in range(iterations):
+    for iteration in range(iterations):
         gain = 0.0
-        while damping < MOST_DAMPING:
+        while damping < MAX_DAMPING:
             trial = _step(hypothesis, data, point, slope, damping)
             gain = point.objective - trial.objective
             if gain > 0 or abs(gain) < tolerance:
@@ -107,29 +107,29 @@ def fit_map(
             damping *= SLOWER
         is_far = bool(np.any(np.abs(trial.searched - point.searched) > LARGE_STEP * _longest_step(hypothesis)))
         if gain > 0:
-            point, damping = trial, max(FASTER * damping, LEAST_DAMPING)
+            point, damping = trial, max(FASTER * damping, MIN_DAMPING)
             slope = _linearise(hypothesis, data, point)
         if gain < tolerance:
             has_converged = True
             break
-        if done >= PATIENCE and not is_far and point.objective - FURTHER_GAIN * gain > 2 * cost_limit:
+        if iteration >= PATIENCE and not is_far and point.objective - FURTHER_GAIN * gain > 2 * cost_limit:
             break
     return _finish(hypothesis, point, slope, has_converged=has_converged)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Linearisation:
-    """How everything changes around a point: first by the parameters, then by the unknowns that matter."""
+    """How everything changes around a point: first by the parameters, then by the nuisance parameters that matter."""
 
     jacobian: FloatArray
     used: BoolArray
     squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies
-    scatter: FloatArray  # (m, n_unknowns), of the same
+    scatter: FloatArray  # (m, n_nuisance), of the same
     ratios: FloatArray  # (m, n_parameters), of their damping ratios without scatter
-    slopes: FloatArray  # of the unknowns' pulls
+    slopes: FloatArray  # of the whitened nuisance
 
     def curvature(self, hypothesis: Hypothesis) -> FloatArray:
-        """Sum the data's curvature, the unknowns' priors, and uniform priors where data say nothing."""
+        """Sum the data's curvature, the prior of the nuisance, and uniform priors where data say nothing."""
         n_parameters = len(hypothesis.parameters)
         prior = np.ones(self.jacobian.shape[1])
         prior[:n_parameters] = PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2
@@ -204,7 +204,7 @@ def _longest_step(hypothesis: Hypothesis) -> FloatArray:
 def _correct_modes(
     hypothesis: Hypothesis, point: _Point, slope: _Linearisation, searched: FloatArray, nuisance: FloatArray
 ) -> FloatArray:
-    """Bring frequencies and damping of the modes to where the linear step wants them.
+    """Bring frequencies and damping of the modes to where the linear step puts them.
 
     A sharp peak allows no long step, unless the scatter of its frequency makes up for what the step does to it beyond
     the linear: the data fix frequencies, not the parameters that they depend on.
@@ -223,17 +223,17 @@ def _correct_modes(
     indices = nuisance_prior.damping_indices
     linear_ratio = here.stated_ratio[:m] + slope.ratios @ moved
     old, new = point.nuisance[indices] * nuisance_prior.damping_std, nuisance[indices] * nuisance_prior.damping_std
-    wanted_ratio = linear_ratio * (1 + old) + here.stated_ratio[:m] * (new - old)
+    required_ratio = linear_ratio * (1 + old) + here.stated_ratio[:m] * (new - old)
     damped = slope.used[indices] & (there.stated_ratio[:m] > 0)
     least = LEAST_OF_RATIO * there.stated_ratio[:m]
     stated = np.where(damped, there.stated_ratio[:m], 1.0)
-    relative = np.maximum(wanted_ratio, least) / stated - 1
+    relative = np.maximum(required_ratio, least) / stated - 1
     corrected[indices] = np.where(damped, relative / nuisance_prior.damping_std, nuisance[indices])
     return corrected
 
 
 def _scatter_of_squares(modes: Modes, nuisance_prior: NuisancePrior) -> FloatArray:
-    """Change of the squared frequencies by what cannot be known, (m, n_nuisance)."""
+    """Change of the squared frequencies by nuisance parameters, (m, n_nuisance)."""
     m = nuisance_prior.n_modes
     i, j = nuisance_prior.pairs
     turned = modes.rotation[i] * modes.rotation[j] * np.where(i == j, 1.0, 2.0)[:, None]
@@ -241,20 +241,20 @@ def _scatter_of_squares(modes: Modes, nuisance_prior: NuisancePrior) -> FloatArr
     kappa = turned * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j])[:, None]
     mu = -turned * modes.squares[:m] * nuisance_prior.mu_std[i, j][:, None]
     suspension = modes.rotation[: nuisance_prior.n_rigid] ** 2 * nuisance_prior.suspension_std
-    found = np.zeros((m, nuisance_prior.size))
+    derivatives = np.zeros((m, nuisance_prior.size))
     size = len(i)
-    found[:, :size], found[:, size : 2 * size] = kappa.T, mu.T
-    found[:, 2 * size + m : 2 * size + m + nuisance_prior.n_rigid] = suspension.T
-    return found
+    derivatives[:, :size], derivatives[:, size : 2 * size] = kappa.T, mu.T
+    derivatives[:, 2 * size + m : 2 * size + m + nuisance_prior.n_rigid] = suspension.T
+    return derivatives
 
 
 def adopt_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatArray:
-    """Give a hypothesis the frequencies and damping ratios of a fit: the data fix them, whatever their cause.
+    """Give a hypothesis the frequencies and damping ratios of a fit: the data fix them, whatever explains them.
 
     Parameters
     ----------
     hypothesis : Hypothesis
-        Causes near those of the fit.
+        Components near those of the fit.
     values : (n_parameters,) array
         Physical values of its parameters.
     fit : Fit
@@ -263,7 +263,7 @@ def adopt_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatAr
     Returns
     -------
     (n_nuisance,) array
-        What cannot be known, in standard deviations: zero but for frequencies, damping and gains.
+        Nuisance parameters, in standard deviations: zero but for frequencies, damping and gains.
     """
     nuisance_prior = hypothesis.nuisance_prior
     m, nuisance, spread = nuisance_prior.n_modes, np.zeros(nuisance_prior.size), np.diag(nuisance_prior.kappa_std)

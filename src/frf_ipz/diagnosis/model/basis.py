@@ -1,9 +1,9 @@
-"""A model in few coordinates: its modes, and the static shapes that sensors, blows and effects need.
+"""A model in few coordinates: its modes, and the static shapes that sensors, excited points and effects need.
 
-The modes go well beyond the band. Static deflections under unit loads at sensors and blows make the basis exact at low
-frequency there; those under the loads that an effect makes (a support that gives way, elements that are softer) do the
+The modes go well beyond the band. Static deflections under unit loads at sensors and excited points make the basis
+exact at low frequency there; those under the loads that an effect makes (a compliant support, softer elements) do the
 same for the effect, so that a large change is as exact as a small one. One basis serves every value of an effect's
-parameters at a place.
+parameters at a location.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.structure import StructuralModel
 
-MODES_UP_TO = 4.0  # times the highest frequency: modes that are kept
+MODES_UP_TO = 4.0  # times the highest frequency: modes of the basis
 MIN_MODES = 12
-INDEPENDENT = 1e-8  # of a vector: what is left of it beside the basis
+INDEPENDENT = 1e-8  # of a vector: what the basis does not span
 DEPENDENT = 1e-12  # of the sum of squares: new shapes that are combinations of others
 LOADED_MODES = 1.5  # times the highest frequency: modes whose loads by an effect get a static shape
 
@@ -52,7 +52,7 @@ class Basis:
     highest_rad_s : float
         Top of the band.
     measured_rows : tuple of int
-        Rows of all DOFs where sensors and blows are.
+        Rows of all DOFs where sensors and excited points are.
     """
 
     model: StructuralModel
@@ -86,7 +86,7 @@ class Basis:
 
 
 def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequence[int]) -> Basis:
-    """Find the modes of a model, and the static shapes of its sensors and blows.
+    """Find the modes of a model, and the static shapes of its sensors and excited points.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequ
     highest_rad_s : float
         Top of the band.
     measured_rows : sequence of int
-        Rows of all DOFs where sensors and blows are.
+        Rows of all DOFs where sensors and excited points are.
 
     Returns
     -------
@@ -135,12 +135,12 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
     basis : Basis
         Of the nominal model.
     change : Change
-        An effect at typical values of its parameters; only the place matters.
+        An effect at typical values of its parameters; only the location matters.
 
     Returns
     -------
     Basis
-        For this effect at this place.
+        For this effect at this location.
     """
     if change.model is not None:
         basis = _exchanged(change.model, basis.highest_rad_s, basis.measured_rows)
@@ -165,7 +165,7 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
     return _add_shapes(basis, np.hstack(shapes))
 
 
-@lru_cache(maxsize=2)  # a search asks for the same one again and again
+@lru_cache(maxsize=2)  # every hypothesis with an exchanged model asks for it
 def _exchanged(model: StructuralModel, highest_rad_s: float, measured_rows: tuple[int, ...]) -> Basis:
     return make_basis(model, highest_rad_s, measured_rows)
 
@@ -212,22 +212,22 @@ def _unit_loads(basis: Basis, nodes: tuple[int, ...]) -> FloatArray:
 
 
 def _to_all_dofs(model: StructuralModel, shapes: FloatArray) -> FloatArray:
-    everywhere = np.zeros((len(model.all_dofs), shapes.shape[1]))
-    everywhere[~model.fixed] = shapes
-    return everywhere
+    all_shapes = np.zeros((len(model.all_dofs), shapes.shape[1]))
+    all_shapes[~model.fixed] = shapes
+    return all_shapes
 
 
 def _deflections(basis: Basis, loads: FloatArray) -> FloatArray:
     """(K + tau M)^-1 times loads at the free DOFs, without what is not independent."""
     free = loads[~basis.model.fixed]
     sizes = np.linalg.norm(free, axis=0)
-    left, sizes, _ = np.linalg.svd(free[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
-    free = left[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
+    columns, sizes, _ = np.linalg.svd(free[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
+    free = columns[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
     return _to_all_dofs(basis.model, basis.modes.factor.solve(free))
 
 
 def _constraint_shapes(basis: Basis, released: tuple[int, ...]) -> FloatArray:
-    """Motion of everything when one held DOF after the other is moved by 1."""
+    """Motion of all DOFs when one fixed DOF after the other is moved by 1."""
     model, free = basis.model, np.flatnonzero(~basis.model.fixed)
     shapes = np.zeros((len(model.all_dofs), len(released)))
     for column, row in enumerate(released):
@@ -242,7 +242,7 @@ def _inertia(model: StructuralModel, shapes: FloatArray) -> FloatArray:
 
 
 def _add_shapes(basis: Basis, shapes: FloatArray) -> Basis:
-    """Add shapes, made orthonormal in mass; those that the basis holds already are left out."""
+    """Add shapes, made orthonormal in mass; those that the basis spans already are dropped."""
     model = basis.model
     for _ in range(2):  # the second time takes off what rounding left in the first
         sizes = _sizes(model, shapes)
@@ -251,8 +251,8 @@ def _add_shapes(basis: Basis, shapes: FloatArray) -> Basis:
         shapes = shapes[:, _sizes(model, shapes) > INDEPENDENT]
     shapes = shapes / _sizes(model, shapes)
     values, axes = linalg.eigh(shapes.T @ multiply(model.mass_all, shapes))
-    kept = values > DEPENDENT
-    fresh = shapes @ (axes[:, kept] / np.sqrt(values[kept]))
+    independent = values > DEPENDENT
+    fresh = shapes @ (axes[:, independent] / np.sqrt(values[independent]))
     vectors = np.hstack([basis.vectors, fresh])
     return Basis(
         model=model,

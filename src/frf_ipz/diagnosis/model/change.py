@@ -35,8 +35,8 @@ class Attachment:
     stiffness : callable
         Dynamic stiffness against each of the motions, N/m or N m/rad.
     matrices : tuple of (1 + n, 1 + n) arrays, optional
-        The same as mass, damping and stiffness between one motion and n motions of its own: what brings it into a model
-        that has matrices only. Without them it cannot be brought there.
+        The same as mass, damping and stiffness between one motion and n motions of its own: with them it can be put
+        into a model that has matrices only.
     """
 
     motions: FloatArray
@@ -46,7 +46,7 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Change:
-    """Everything that an effect changes; what is left out stays.
+    """Everything that an effect changes; the rest stays.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ class Change:
     mass, stiffness : (n_all, n_all) sparse array, optional
         What is added to the matrices of all DOFs.
     released : tuple of int
-        Held DOFs (rows of all) that may move; `stiffness` says what holds them.
+        Fixed DOFs (rows of all) that may move; `stiffness` says what supports them.
     floating : bool
-        A free structure stays free: what is added hangs as softly as the structure, whose rigid-body modes stay.
+        A free structure stays free: what is added floats with it, and its rigid-body modes stay.
     attachments : tuple of Attachment
-        What has dynamics of its own. Modal damping is that of the structure without them.
+        What has dynamics of its own. Modal damping is that of the structure without it.
     modal_ratio : float, optional
         Damping ratio of all modes, instead of the model's.
     added_ratio : float
@@ -91,22 +91,22 @@ class Change:
     channels: Mapping[str, Transfer] = field(default_factory=dict)
     moved: Mapping[str, int] = field(default_factory=dict)
 
-    def __add__(self, other: Change) -> Change:
+    def __add__(self, second: Change) -> Change:
         """Put two effects together."""
         return Change(
-            model=self.model if other.model is None else other.model,
-            mass=_sum(self.mass, other.mass),
-            stiffness=_sum(self.stiffness, other.stiffness),
-            released=tuple(dict.fromkeys((*self.released, *other.released))),
-            floating=self.floating or other.floating,
-            attachments=(*self.attachments, *other.attachments),
-            modal_ratio=self.modal_ratio if other.modal_ratio is None else other.modal_ratio,
-            added_ratio=self.added_ratio + other.added_ratio,
-            loss_factor=self.loss_factor + other.loss_factor,
-            reference_rad_s=self.reference_rad_s or other.reference_rad_s,
-            keeps_modes=self.keeps_modes or other.keeps_modes,
-            channels=_product(self.channels, other.channels),
-            moved={**self.moved, **other.moved},
+            model=self.model if second.model is None else second.model,
+            mass=_sum(self.mass, second.mass),
+            stiffness=_sum(self.stiffness, second.stiffness),
+            released=tuple(dict.fromkeys((*self.released, *second.released))),
+            floating=self.floating or second.floating,
+            attachments=(*self.attachments, *second.attachments),
+            modal_ratio=self.modal_ratio if second.modal_ratio is None else second.modal_ratio,
+            added_ratio=self.added_ratio + second.added_ratio,
+            loss_factor=self.loss_factor + second.loss_factor,
+            reference_rad_s=self.reference_rad_s or second.reference_rad_s,
+            keeps_modes=self.keeps_modes or second.keeps_modes,
+            channels=_product(self.channels, second.channels),
+            moved={**self.moved, **second.moved},
         )
 
 
@@ -117,10 +117,10 @@ def _sum(first: Matrix | None, second: Matrix | None) -> Matrix | None:
 
 
 def _product(first: Mapping[str, Transfer], second: Mapping[str, Transfer]) -> dict[str, Transfer]:
-    both = {**first, **second}
+    combined = {**first, **second}
     for name in first.keys() & second.keys():
-        both[name] = _product_of(first[name], second[name])
-    return both
+        combined[name] = _product_of(first[name], second[name])
+    return combined
 
 
 def _product_of(first: Transfer, second: Transfer) -> Transfer:
@@ -141,12 +141,12 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
     model : StructuralModel
         The nominal model.
     change : Change
-        What is different; its channels are left alone.
+        What is different; its channels are ignored.
 
     Returns
     -------
     StructuralModel
-        With further DOFs at new nodes where something is attached that moves by itself.
+        With further DOFs at new nodes where something with motions of its own is attached.
     """
     changed = model if change.model is None else change.model
     fixed = changed.fixed.copy()
@@ -171,24 +171,25 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
 
 
 def _attach(model: StructuralModel, attachment: Attachment) -> StructuralModel:
-    """Put mass, damping and stiffness between the motions of an attachment and motions of its own."""
+    """Put mass, damping and stiffness between the motions of an attachment and its own motions."""
     if attachment.matrices is None:
         return model
-    own = attachment.matrices[0].shape[0] - 1
+    n_added = attachment.matrices[0].shape[0] - 1
     mass, damping, stiffness = (
-        _enlarge(matrix, own) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
+        _enlarge(matrix, n_added) for matrix in (model.mass_all, model.damping_all, model.stiffness_all)
     )
     for motion in attachment.motions.T:
-        padded = sparse.csr_array(np.concatenate([motion, np.zeros(len(model.all_dofs) - len(motion) + own)])[None])
+        padded = sparse.csr_array(np.concatenate([motion, np.zeros(len(model.all_dofs) - len(motion) + n_added)])[None])
         extra = sparse.csr_array(
-            (np.ones(own), (np.arange(own), len(model.all_dofs) + np.arange(own))), shape=(own, padded.shape[1])
+            (np.ones(n_added), (np.arange(n_added), len(model.all_dofs) + np.arange(n_added))),
+            shape=(n_added, padded.shape[1]),
         )
-        rows = sparse.vstack([padded, extra]).tocsr() if own else padded
+        rows = sparse.vstack([padded, extra]).tocsr() if n_added else padded
         mass, damping, stiffness = (
             sparse.csr_array(whole + rows.T @ sparse.csr_array(part) @ rows)
             for whole, part in zip((mass, damping, stiffness), attachment.matrices, strict=True)
         )
-    return _with_dofs(model, attachment.motions[:, 0], own, (mass, damping, stiffness))
+    return _with_dofs(model, attachment.motions[:, 0], n_added, (mass, damping, stiffness))
 
 
 def _enlarge(matrix: Matrix, by: int) -> Matrix:
@@ -198,7 +199,7 @@ def _enlarge(matrix: Matrix, by: int) -> Matrix:
 def _with_dofs(
     model: StructuralModel, motion: FloatArray, count: int, matrices: tuple[Matrix, Matrix, Matrix]
 ) -> StructuralModel:
-    """Name the new DOFs after the place where they are attached."""
+    """Name the new DOFs after the location where they are attached."""
     mass, damping, stiffness = matrices
     where = model.all_dofs[int(np.argmax(np.abs(motion)))]
     geometry = model.geometry

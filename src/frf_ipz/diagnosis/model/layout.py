@@ -1,4 +1,4 @@
-"""Which motions are measured and struck, and in which directions sensors and blows may be off their places."""
+"""Which motions are measured and excited, and in which directions sensors and excited points may be misplaced."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 AXES = ("x", "y", "z")
 ROTATION = {("z", "x"): ("ry", -1.0), ("z", "y"): ("rx", 1.0), ("y", "x"): ("rz", 1.0),
             ("y", "z"): ("rx", -1.0), ("x", "y"): ("rz", -1.0), ("x", "z"): ("ry", 1.0)}  # fmt: skip
-NEIGHBOURS = 6  # that tell how a motion changes from place to place, where a model has no rotations
+NEIGHBOURS = 6  # from which the slope of a motion is read, where a model has no rotations
 FLAT = 1e-6  # of the largest extent: a structure has no extent in such a direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """Sensors and blows of a test.
+    """Sensors and excited points of a test.
 
     Parameters
     ----------
     outputs : tuple of (str, Dof)
         Channel and DOF of each sensor position; one channel may have several.
     inputs : tuple of Dof
-        Struck DOFs.
+        Excited DOFs.
     input_channels : tuple of str
         Column of the force at each of them; the same for all, but for FRFs that were estimated elsewhere.
-    output_of, input_of : (n_frfs,) int array
-        Which of them each FRF connects.
+    output_index, input_index : (n_frfs,) int array
+        Indices of the output and the input that each FRF connects.
     power : (n_frfs,) int array
         Power of s that makes a receptance the measured quantity.
     """
@@ -45,8 +45,8 @@ class Layout:
     outputs: tuple[tuple[str, Dof], ...]
     inputs: tuple[Dof, ...]
     input_channels: tuple[str, ...]
-    output_of: IntArray
-    input_of: IntArray
+    output_index: IntArray
+    input_index: IntArray
     power: IntArray
 
     @property
@@ -63,16 +63,16 @@ class Layout:
 @lru_cache(maxsize=4)  # a search asks for the same one at every step
 def _gain_signs(layout: Layout) -> FloatArray:
     number = {channel: index for index, channel in enumerate(layout.channels)}
-    signs = np.zeros((len(layout.output_of), len(number)))
-    frf = np.arange(len(layout.output_of))
-    signs[frf, np.array([number[channel] for channel, _ in layout.outputs])[layout.output_of]] = 1.0
-    signs[frf, np.array([number[channel] for channel in layout.input_channels])[layout.input_of]] = -1.0
+    signs = np.zeros((len(layout.output_index), len(number)))
+    frf = np.arange(len(layout.output_index))
+    signs[frf, np.array([number[channel] for channel, _ in layout.outputs])[layout.output_index]] = 1.0
+    signs[frf, np.array([number[channel] for channel in layout.input_channels])[layout.input_index]] = -1.0
     signs.flags.writeable = False
     return signs
 
 
 def make_layout(labels: Sequence[FrfLabel]) -> Layout:
-    """Sort what FRFs connect.
+    """List what FRFs connect.
 
     Parameters
     ----------
@@ -82,24 +82,24 @@ def make_layout(labels: Sequence[FrfLabel]) -> Layout:
     Returns
     -------
     Layout
-        Each sensor position and each struck DOF once.
+        Each sensor position and each excited DOF once.
     """
     named = [(label.output_channel or f"output {label.output_dof}", label.output_dof) for label in labels]
     outputs = tuple(dict.fromkeys(named))
-    struck = {label.input_dof: label.input_channel or f"input {label.input_dof}" for label in labels}
-    inputs = tuple(struck)
+    excited = {label.input_dof: label.input_channel or f"input {label.input_dof}" for label in labels}
+    inputs = tuple(excited)
     return Layout(
         outputs=outputs,
         inputs=inputs,
-        input_channels=tuple(struck.values()),
-        output_of=np.array([outputs.index(name) for name in named]),
-        input_of=np.array([inputs.index(label.input_dof) for label in labels]),
+        input_channels=tuple(excited.values()),
+        output_index=np.array([outputs.index(name) for name in named]),
+        input_index=np.array([inputs.index(label.input_dof) for label in labels]),
         power=np.array([label.quantity.power for label in labels]),
     )
 
 
 def make_motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
-    """Weights of all DOFs in the motion that a sensor at a DOF sees, with its sign.
+    """Weights of all DOFs in the motion that a sensor at a DOF measures, with its sign.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def measure_extents(model: StructuralModel) -> Mapping[str, float]:
     Returns
     -------
     mapping of str to float
-        m; axes along which it has no size are left out, and all of a lumped model, whose masses have no places.
+        m; axes along which it has no size are left out, and all of a lumped model, whose masses have no positions.
     """
     if model.kind == "lumped":
         return {}
@@ -138,19 +138,19 @@ def measure_extents(model: StructuralModel) -> Mapping[str, float]:
 
 
 def make_shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
-    """How the motion at a DOF changes with its place.
+    """How the motion at a DOF changes with its position.
 
     Parameters
     ----------
     model : StructuralModel
         The model.
     dof : Dof
-        Of a sensor or a blow.
+        Of a sensor or an excited point.
 
     Returns
     -------
     dict of str to (n_all,) array
-        For each axis along which it could be elsewhere, weights of all DOFs in the derivative, 1/m.
+        For each axis along which it may be misplaced, weights of all DOFs in the derivative, 1/m.
     """
     axes = [axis for axis in measure_extents(model) if axis != dof.direction]
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
@@ -189,22 +189,22 @@ def _shift_row(model: StructuralModel, dof: Dof, axis: str) -> FloatArray:
     if Dof(dof.node, rotation) in model.full_indices:
         row[model.full_indices[Dof(dof.node, rotation)]] = sign
         return row
-    return _from_neighbours(model, dof, AXES.index(axis))
+    return _slope_from_neighbours(model, dof, AXES.index(axis))
 
 
-def _from_neighbours(model: StructuralModel, dof: Dof, axis: int) -> FloatArray:
+def _slope_from_neighbours(model: StructuralModel, dof: Dof, axis: int) -> FloatArray:
     """Slope of a plane through the motion of the nearest nodes."""
     rows = [row for candidate, row in model.full_indices.items() if candidate.direction == dof.direction]
     nodes = np.array([model.all_dofs[row].node for row in rows])
     coordinates_m = model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, nodes)]
     here = coordinates_m[nodes == dof.node][0]
     distance = np.linalg.norm(coordinates_m - here, axis=1)
-    near = np.argsort(distance)[: NEIGHBOURS + 1]
-    offsets = (coordinates_m - here)[near]
-    used = np.ptp(offsets, axis=0) > FLAT * distance[near].max()
-    plane = np.hstack([np.ones((len(near), 1)), offsets[:, used]])
+    nearest = np.argsort(distance)[: NEIGHBOURS + 1]
+    offsets = (coordinates_m - here)[nearest]
+    used = np.ptp(offsets, axis=0) > FLAT * distance[nearest].max()
+    plane = np.hstack([np.ones((len(nearest), 1)), offsets[:, used]])
     row = np.zeros(len(model.all_dofs))
     if used[axis]:
         column = 1 + int(np.count_nonzero(used[:axis]))
-        row[np.array(rows)[near]] = np.linalg.pinv(plane)[column]
+        row[np.array(rows)[nearest]] = np.linalg.pinv(plane)[column]
     return row

@@ -1,4 +1,4 @@
-"""The modes of a modified structure: as its matrices have them, and with scatter within the tolerances.
+"""The modes of a modified structure: those of its matrices, and with scatter within the tolerances.
 
 Structural changes are solved for in the basis, so that damping belongs to the modes that the structure really has;
 scatter then acts on those modes.
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 RIGID = 1e-9  # of the first elastic eigenvalue: below, a mode is a rigid-body mode
 MIN_RATIO = 1e-6  # where a model states no damping at all
 UNCOUPLED = 1e-3  # of the largest damping of a mode: what a matrix couples modes by that counts for nothing
-SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes in their cords
+SUSPENSION_RATIO = 0.03  # typical damping ratio of rigid-body modes on their suspension
 MAX_MASS_PART = 0.5  # of a modal mass: scatter takes no more away
 
 
@@ -84,9 +84,9 @@ def modify_structure(basis: Basis, change: Change) -> ModifiedStructure:
     is_coupled = False
     if change.modal_ratio is None and basis.damping.any():
         viscous = vectors.T @ basis.damping @ vectors
-        own, omega = np.diag(viscous), np.sqrt(np.abs(squares))
-        stated[n_rigid:] += own[n_rigid:] / (2 * omega[n_rigid:])
-        is_coupled = bool(np.abs(modal_coupling(viscous)).max() > UNCOUPLED * own.max())
+        modal, omega = np.diag(viscous), np.sqrt(np.abs(squares))
+        stated[n_rigid:] += modal[n_rigid:] / (2 * omega[n_rigid:])
+        is_coupled = bool(np.abs(modal_coupling(viscous)).max() > UNCOUPLED * modal.max())
     stated[:n_rigid] = SUSPENSION_RATIO
     return ModifiedStructure(
         change=change, squares=squares, vectors=vectors, stated_ratio=stated, is_coupled=is_coupled
@@ -94,7 +94,7 @@ def modify_structure(basis: Basis, change: Change) -> ModifiedStructure:
 
 
 def modal_coupling(viscous: FloatArray) -> FloatArray:
-    """Take the damping of each mode by itself out of a damping matrix in modal coordinates, (q, q)."""
+    """Give the part of a damping matrix in modal coordinates, (q, q), that couples modes."""
     return viscous - np.diag(np.diag(viscous))
 
 
@@ -110,7 +110,7 @@ def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Modes:
-    """Modes of a modified structure at sensors and blows.
+    """Modes of a modified structure at sensors and excited points.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Modes:
     outputs, inputs : (n, q) array
         Shapes with scatter, with signs.
     output_shifts, input_shifts : (n, n_axes, q) array
-        How they change with places, 1/m.
+        How they change with positions, 1/m.
     vectors : (q_basis, q) array
         The modes in terms of the basis.
     viscous : (q, q) array, optional
@@ -147,14 +147,14 @@ class Modes:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionRows:
-    """Sensors and blows in the coordinates of a basis.
+    """Sensors and excited points in the coordinates of a basis.
 
     Parameters
     ----------
     outputs, inputs : (n, q) array
         With signs.
     output_shifts, input_shifts : (n, n_axes, q) array
-        Their change with places, 1/m.
+        Their change with positions, 1/m.
     """
 
     outputs: FloatArray
@@ -164,18 +164,18 @@ class MotionRows:
 
 
 def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prior: NuisancePrior) -> MotionRows:
-    """Bring sensors and blows into the coordinates of a basis.
+    """Bring sensors and excited points into the coordinates of a basis.
 
     Parameters
     ----------
     basis : Basis
         Coordinates.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
     change : Change
         Says which sensors are elsewhere.
-    nuisance_prior : Nuisance
-        Says along which axes places are uncertain.
+    nuisance_prior : NuisancePrior
+        Says along which axes positions are uncertain.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prio
 def scatter_modes(
     basis: Basis, modified: ModifiedStructure, rows: MotionRows, nuisance_values: NuisanceValues
 ) -> Modes:
-    """Add to a modified structure what cannot be known.
+    """Scatter the modes of a modified structure by nuisance parameters.
 
     Parameters
     ----------
@@ -205,9 +205,9 @@ def scatter_modes(
     modified : ModifiedStructure
         The structure.
     rows : MotionRows
-        Sensors and blows.
-    nuisance_values : Unknowns
-        What cannot be known.
+        Sensors and excited points.
+    nuisance_values : NuisanceValues
+        Nuisance parameters.
 
     Returns
     -------
@@ -215,7 +215,7 @@ def scatter_modes(
         By ascending frequency without scatter.
     """
     omega = np.sqrt(np.abs(modified.squares))
-    scattered, rotation = _scatter(modified.squares, omega, nuisance_values)
+    scattered, rotation = _scatter_squares(modified.squares, omega, nuisance_values)
     m = len(rotation)
     turned = modified.vectors.copy()
     turned[:, :m] = modified.vectors[:, :m] @ rotation
@@ -237,7 +237,9 @@ def scatter_modes(
     )
 
 
-def _scatter(squares: FloatArray, omega: FloatArray, nuisance_values: NuisanceValues) -> tuple[FloatArray, FloatArray]:
+def _scatter_squares(
+    squares: FloatArray, omega: FloatArray, nuisance_values: NuisanceValues
+) -> tuple[FloatArray, FloatArray]:
     m, rigid = len(nuisance_values.kappa), len(nuisance_values.suspension)
     if not (nuisance_values.kappa.any() or nuisance_values.mu.any() or nuisance_values.suspension.any()):
         return squares, np.eye(m)

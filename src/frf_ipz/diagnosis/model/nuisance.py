@@ -1,16 +1,17 @@
-"""What the owner of a structure cannot know about it, within the tolerances that they state.
+"""Nuisance parameters: what a nominal model may be wrong by within the stated tolerances, and its prior.
 
 Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
-the shapes, and with it of the zeros. Damping ratios of modes, places of sensors and blows, and gains of channels come
-beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over the square
-root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much faster than a
-normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a normal prior.
+the shapes, and with it of the zeros. Damping ratios of modes, positions of sensors and excited points, and gains of
+channels come beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over
+the square root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much
+faster than a normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a
+normal prior.
 
-Near a struck place FRFs hold how the structure gives way around the blow, which depends on the size of the contact and
-which no mesh tells well: the compliance of all modes beyond those with scatter is not known exactly.
+Near an excited point FRFs contain the local compliance around the contact, which depends on its size and which no mesh
+represents well: the compliance of all modes beyond those with scatter is not known exactly.
 
-Gains multiply the model's FRFs. As errors in proportion to the measured FRFs they would follow their noise, and pull
+Gains multiply the model's FRFs. As errors in proportion to the measured FRFs they would follow their noise, and bias
 every fit to smaller FRFs by the product of their variance and the number of points.
 
 [dAgostini1994] G. D'Agostini, On the use of the covariance matrix to fit correlated data, Nuclear Instruments and
@@ -39,9 +40,9 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
 
 UNIFORM_STD = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
-ACROSS = 0.5  # kappa and mu between two modes, over those of one: fields average out
+OFF_DIAGONAL = 0.5  # kappa and mu between two modes, over those of one: fields average out
 MASS_PART = 0.5  # tolerance of masses over that of stiffness
-SUSPENSION_FREQUENCY = 0.02  # frequency of a free structure in its cords, over its first elastic one
+SUSPENSION_FREQUENCY = 0.02  # frequency of a free structure on its suspension, over its first elastic one
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
 LOWERED = 1.2  # times the top of the band: modes that shear would bring there
 MAX_MODES = 16
@@ -52,12 +53,12 @@ MAX_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
 STEEPER = 1.0  # per standard deviation: how much faster
 MAX_BEYOND_EDGE = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
-UNSTATED_SPREAD = 0.5  # of the damping ratio of a mode that nobody states: in its cords, or far beyond the band
+UNSTATED_SPREAD = 0.5  # of a damping ratio that is not stated: on its suspension, or far beyond the band
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NuisanceValues:
-    """Values of all that cannot be known.
+    """Values of all nuisance parameters.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class NuisanceValues:
     suspension : (n_rigid,) array
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
-        How far sensors and blows are from their places, m.
+        Distances of sensors and excited points from their nominal positions, m.
     local : (n_frfs,) array
         Errors of the compliance that modes beyond those with scatter give to the FRFs, m/N.
     gains : (n_channels,) array
@@ -87,7 +88,7 @@ class NuisanceValues:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NuisancePrior:
-    """Parameters of what cannot be known, each in units of its standard deviation.
+    """Prior of the nuisance parameters, each in units of its standard deviation.
 
     Parameters
     ----------
@@ -100,11 +101,11 @@ class NuisancePrior:
     suspension_std : float
         Of squared frequencies of rigid-body modes, (rad/s)^2.
     axes : tuple of str
-        Along which places are uncertain.
+        Along which positions are uncertain.
     shift_std : (n_axes,) array
         m.
     n_outputs, n_inputs : int
-        Sensor positions and blows.
+        Sensor positions and excited points.
     local_std : (n_frfs,) array
         Of the compliance of modes beyond those with scatter, m/N, with the signs of the FRFs.
     n_channels : int
@@ -137,7 +138,7 @@ class NuisancePrior:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of parameters: kappa, mu, damping, cords, shifts of sensors and blows, local, gains."""
+        """Numbers of parameters: kappa, mu, damping, suspension, shifts of sensors and excited points, local, gains."""
         n_pairs = self.n_modes * (self.n_modes + 1) // 2
         shifts = len(self.axes)
         return (
@@ -168,15 +169,15 @@ class NuisancePrior:
 
     @property
     def is_bounded(self) -> BoolArray:
-        """Which parameters a tolerance bounds, (size,) array: frequencies, damping, places and gains."""
+        """Which parameters a tolerance bounds, (size,) array: frequencies, damping, positions and gains."""
         rows, columns = self.pairs
-        own = (rows == columns) & self.is_stated[rows]
+        is_diagonal = (rows == columns) & self.is_stated[rows]
         n_shifts = len(self.axes) * (self.n_outputs + self.n_inputs)
         suspension, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
         shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
-        return np.concatenate([own, own, self.is_stated, suspension, shifts, local, gains])
+        return np.concatenate([is_diagonal, is_diagonal, self.is_stated, suspension, shifts, local, gains])
 
-    def with_part(self, part: float) -> NuisancePrior:
+    def scaled_by(self, part: float) -> NuisancePrior:
         """Give the same with a part of the tolerances of stiffness, mass and frequencies.
 
         Parameters
@@ -186,20 +187,20 @@ class NuisancePrior:
 
         Returns
         -------
-        Nuisance
+        NuisancePrior
             With the same parameters.
         """
         return replace(self, kappa_std=part * self.kappa_std, mu_std=part * self.mu_std)
 
-    def in_parts(self, values: FloatArray, part: float) -> FloatArray:
-        """Give the same state in the standard deviations of `with_part`.
+    def rescale(self, values: FloatArray, part: float) -> FloatArray:
+        """Give the same state in the standard deviations of `scaled_by`.
 
         Parameters
         ----------
         values : (size,) array
             Parameters in standard deviations.
         part : float
-            As for `with_part`.
+            As for `scaled_by`.
 
         Returns
         -------
@@ -210,7 +211,7 @@ class NuisancePrior:
         return np.concatenate([values[:n_fields] / part, values[n_fields:]])
 
     def whiten(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Give the square roots of twice the prior's cost, and their slopes.
+        """Transform parameters so that the prior's cost is half their sum of squares.
 
         Parameters
         ----------
@@ -224,7 +225,7 @@ class NuisancePrior:
         whitened_nuisance : (size,) array
             As the parameters, but beyond the edge of a tolerance larger and larger.
         slopes : (size,) array
-            Of the pulls by the parameters.
+            Derivatives of the whitened parameters by the parameters.
         """
         if not is_bounded:
             return values, np.ones_like(values)
@@ -243,7 +244,7 @@ class NuisancePrior:
 
         Returns
         -------
-        Unknowns
+        NuisanceValues
             The values.
         """
         ends = list(accumulate(self.sizes))
@@ -280,13 +281,13 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     basis : Basis
         Of the nominal model.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
     options : DiagnoseOptions
         Tolerances.
 
     Returns
     -------
-    Nuisance
+    NuisancePrior
         The parameters.
     """
     frequencies = np.sqrt(basis.modes.eigenvalues)
@@ -296,7 +297,7 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     n_modes = min(n_modes, MAX_MODES, len(frequencies))
     n_rigid = min(basis.modes.n_rigid, n_modes)
     stiffness, mass = options.stiffness_tolerance * UNIFORM_STD, MASS_PART * options.stiffness_tolerance * UNIFORM_STD
-    kappa, mu = np.full((n_modes, n_modes), ACROSS * stiffness), np.full((n_modes, n_modes), ACROSS * mass)
+    kappa, mu = np.full((n_modes, n_modes), OFF_DIAGONAL * stiffness), np.full((n_modes, n_modes), OFF_DIAGONAL * mass)
     np.fill_diagonal(kappa, np.hypot(stiffness, 2 * options.frequency_tolerance * UNIFORM_STD))
     np.fill_diagonal(mu, mass)
     beyond = np.maximum(frequencies[:n_modes] / basis.highest_rad_s - 1, 0.0)
@@ -337,7 +338,7 @@ def _count_lowered_modes(basis: Basis) -> int:
 
 
 def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
-    """Relative standard deviations of damping ratios: modes beyond the band are measured by no one who states them."""
+    """Relative standard deviations of damping ratios: stated ratios are measured within the band."""
     std = np.maximum(stated, np.minimum(stated * growth, UNSTATED_SPREAD))
     std[:n_rigid] = UNSTATED_SPREAD
     return std
@@ -350,30 +351,30 @@ def _local_compliance(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
     shift = basis.modes.shift
     whole = outputs @ np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), inputs.T)
     scattered = (outputs[:, :n_modes] / (basis.modes.eigenvalues[:n_modes] + shift)) @ inputs[:, :n_modes].T
-    return np.asarray((whole - scattered)[layout.output_of, layout.input_of])
+    return np.asarray((whole - scattered)[layout.output_index, layout.input_index])
 
 
 def _corner_compliance(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
-    """Give the compliance, m/N, by which an FRF may be off where sensor and blow meet: it has a corner there."""
+    """Give the compliance, m/N, by which an FRF may be off where sensor and force meet: it has a corner there."""
     apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
     sensors = np.array([dof.node for _, dof in layout.outputs])
-    struck = np.array([dof.node for dof in layout.inputs])
-    meet = sensors[layout.output_of] == struck[layout.input_of]
-    kinks = np.array([shear_slope_at_force(basis.model, dof) for dof in layout.inputs])
-    return np.asarray(np.where(meet, apart * kinks[layout.input_of], 0.0))
+    excited = np.array([dof.node for dof in layout.inputs])
+    meet = sensors[layout.output_index] == excited[layout.input_index]
+    slopes = np.array([shear_slope_at_force(basis.model, dof) for dof in layout.inputs])
+    return np.asarray(np.where(meet, apart * slopes[layout.input_index], 0.0))
 
 
 def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple[Dof, ...]) -> FloatArray:
-    """Rows in the basis by which motions change with places.
+    """Make the rows in the basis by which motions change with positions.
 
     Parameters
     ----------
     basis : Basis
         Coordinates.
-    nuisance_prior : Nuisance
-        Says along which axes places are uncertain.
+    nuisance_prior : NuisancePrior
+        Says along which axes positions are uncertain.
     dofs : tuple of Dof
-        Of sensors or blows.
+        Of sensors or excited points.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""FRFs of a modified model, and their derivatives by what cannot be known.
+"""FRFs of a modified model, and their derivatives by nuisance parameters.
 
 Structural changes are solved for in the basis, so that damping belongs to the modes that the structure really has.
 Scatter then acts on those modes, and what has dynamics of its own (resonators, dampers) is attached last, by the
@@ -29,19 +29,19 @@ class Response:
     Parameters
     ----------
     values : (n_points, n_frfs) complex array
-        SI, in the quantities of the FRFs, as the channels show them.
+        SI, in the quantities of the FRFs, as the channels record them.
     modes : Modes
         The modes.
     output_motion, input_motion : (n_points, q, n) complex array
-        Modal motion for unit forces at sensors and blows, attachments included.
+        Modal motion for unit forces at sensors and excited points, attachments included.
     chain : (n_points, n_frfs) complex array
-        Factor from receptance to what is shown.
+        Factor from receptance to the measured quantity.
     s : (n_points,) complex array
         rad/s.
     attached_motion : (n_points, q, n) complex array
-        Modal motion for unit forces where something is attached, without it.
+        Modal motion for unit forces where something is attached, without attachments.
     attached_stiffness : (n_points, n, n) complex array
-        Forces on the structure there per motion that it would have without.
+        Forces on the structure there per motion that it would have without attachments.
     """
 
     values: ComplexArray
@@ -66,9 +66,9 @@ def respond(
     change : Change
         Its attachments, loss factor and channels.
     layout : Layout
-        Sensors and blows.
-    nuisance_values : Unknowns
-        Shifts of sensors and blows, and gains.
+        Sensors and excited points.
+    nuisance_values : NuisanceValues
+        Shifts of sensors and excited points, and gains.
     s : (n_points,) complex array
         rad/s.
     basis : Basis
@@ -79,18 +79,18 @@ def respond(
     Response
         What would be measured without noise.
     """
-    left = modes.outputs + np.einsum("na,naq->nq", nuisance_values.output_shift, modes.output_shifts)
-    right = modes.inputs + np.einsum("na,naq->nq", nuisance_values.input_shift, modes.input_shifts)
-    n_left = len(left)
+    outputs = modes.outputs + np.einsum("na,naq->nq", nuisance_values.output_shift, modes.output_shifts)
+    inputs = modes.inputs + np.einsum("na,naq->nq", nuisance_values.input_shift, modes.input_shifts)
+    n_outputs = len(outputs)
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
-    loads = np.concatenate([left, right, attached])
+    loads = np.concatenate([outputs, inputs, attached])
     motion = _solve(modes, _modulus(change, modes, s), loads, s)
-    own = motion[:, :, len(left) + len(right) :]
-    stiffness = _coupled(own, attached, change, s)
-    motion = motion - np.matmul(own, np.matmul(stiffness, np.matmul(attached, motion)))
-    output_motion, input_motion = motion[:, :, :n_left], motion[:, :, n_left : n_left + len(right)]
-    receptance = np.matmul(left, input_motion)[:, layout.output_of, layout.input_of] + nuisance_values.local
+    attached_motion = motion[:, :, n_outputs + len(inputs) :]
+    stiffness = _coupled_stiffness(attached_motion, attached, change, s)
+    motion = motion - np.matmul(attached_motion, np.matmul(stiffness, np.matmul(attached, motion)))
+    output_motion, input_motion = motion[:, :, :n_outputs], motion[:, :, n_outputs : n_outputs + len(inputs)]
+    receptance = np.matmul(outputs, input_motion)[:, layout.output_index, layout.input_index] + nuisance_values.local
     chain = (
         s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ nuisance_values.gains)
     )
@@ -101,7 +101,7 @@ def respond(
         input_motion=input_motion,
         chain=chain,
         s=s,
-        attached_motion=own,
+        attached_motion=attached_motion,
         attached_stiffness=stiffness,
     )
 
@@ -127,7 +127,9 @@ def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArr
     return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads.T, (len(s), *loads.T.shape))), np.complex128)
 
 
-def _coupled(own: ComplexArray, attached: FloatArray, change: Change, s: ComplexArray) -> ComplexArray:
+def _coupled_stiffness(
+    attached_motion: ComplexArray, attached: FloatArray, change: Change, s: ComplexArray
+) -> ComplexArray:
     """D (1 + R D)^-1 of all attachments, (n_points, n, n)."""
     n = len(attached)
     if n == 0:
@@ -139,34 +141,34 @@ def _coupled(own: ComplexArray, attached: FloatArray, change: Change, s: Complex
         ],
         axis=1,
     )
-    inner = np.eye(n) + stiffness[:, :, None] * np.matmul(attached, own)
+    inner = np.eye(n) + stiffness[:, :, None] * np.matmul(attached, attached_motion)
     return np.linalg.solve(inner, stiffness[:, :, None] * np.eye(n))
 
 
 def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:
-    factors = np.ones((len(s), len(layout.output_of)), complex)
+    factors = np.ones((len(s), len(layout.output_index)), complex)
     for channel, transfer in change.channels.items():
         gain = transfer(s)
         for index, name in enumerate(layout.input_channels):
             if name == channel:
-                factors[:, layout.input_of == index] /= gain[:, None]
+                factors[:, layout.input_index == index] /= gain[:, None]
         for index, (name, _) in enumerate(layout.outputs):
             if name == channel:
-                factors[:, layout.output_of == index] *= gain[:, None]
+                factors[:, layout.output_index == index] *= gain[:, None]
     return factors
 
 
 def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout: Layout) -> ComplexArray:
-    """Differentiate FRFs by what cannot be known.
+    """Differentiate FRFs by nuisance parameters.
 
     Parameters
     ----------
     response : Response
         At the point of linearisation.
-    nuisance_prior : Nuisance
+    nuisance_prior : NuisancePrior
         The parameters.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
 
     Returns
     -------
@@ -174,22 +176,22 @@ def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout:
         Per standard deviation of each parameter.
     """
     modes, s, m = response.modes, response.s, nuisance_prior.n_modes
-    scattered_left = response.output_motion[:, :m].swapaxes(1, 2)[:, layout.output_of]  # point, FRF, mode
-    scattered_right = response.input_motion[:, :m].swapaxes(1, 2)[:, layout.input_of]
-    left, right = scattered_left @ modes.rotation.T, scattered_right @ modes.rotation.T
+    scattered_outputs = response.output_motion[:, :m].swapaxes(1, 2)[:, layout.output_index]  # point, FRF, mode
+    scattered_inputs = response.input_motion[:, :m].swapaxes(1, 2)[:, layout.input_index]
+    outputs, inputs = scattered_outputs @ modes.rotation.T, scattered_inputs @ modes.rotation.T
     i, j = nuisance_prior.pairs
     omega = modes.omega[:m]
-    products = left[:, :, i] * right[:, :, j]
-    products += np.where(i != j, left[:, :, j] * right[:, :, i], 0.0)
+    products = outputs[:, :, i] * inputs[:, :, j]
+    products += np.where(i != j, outputs[:, :, j] * inputs[:, :, i], 0.0)
     products *= -response.chain[:, :, None]
-    own = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance_prior.damping_std
+    damping = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance_prior.damping_std
     rigid = slice(0, nuisance_prior.n_rigid)
-    changed = -response.chain[:, :, None] * scattered_left * scattered_right
+    changed = -response.chain[:, :, None] * scattered_outputs * scattered_inputs
     parts = [
         products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j]),
         products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None],
-        changed * own * s[:, None, None],
-        -response.chain[:, :, None] * left[:, :, rigid] * right[:, :, rigid] * nuisance_prior.suspension_std,
+        changed * damping * s[:, None, None],
+        -response.chain[:, :, None] * outputs[:, :, rigid] * inputs[:, :, rigid] * nuisance_prior.suspension_std,
         *(
             np.moveaxis(part, 1, 2) * response.chain[:, :, None]
             for part in _shift_jacobians(response, nuisance_prior, layout)
@@ -204,14 +206,14 @@ def _shift_jacobians(response: Response, nuisance_prior: NuisancePrior, layout: 
     modes = response.modes
     outputs = np.einsum("naq,kqi->knai", modes.output_shifts, response.input_motion)
     inputs = np.einsum("naq,kqo->knao", modes.input_shifts, response.output_motion)
-    n_frfs = len(layout.output_of)
-    found: list[ComplexArray] = []
-    for count, own, other, motion in (
-        (nuisance_prior.n_outputs, layout.output_of, layout.input_of, outputs),
-        (nuisance_prior.n_inputs, layout.input_of, layout.output_of, inputs),
+    n_frfs = len(layout.output_index)
+    jacobians: list[ComplexArray] = []
+    for count, shifted, opposite, motion in (
+        (nuisance_prior.n_outputs, layout.output_index, layout.input_index, outputs),
+        (nuisance_prior.n_inputs, layout.input_index, layout.output_index, inputs),
     ):
         part = np.zeros((len(response.s), count, len(nuisance_prior.axes), n_frfs), np.complex128)
         frf = np.arange(n_frfs)
-        part[:, own, :, frf] = motion[:, own, :, other]
-        found.append((part * nuisance_prior.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
-    return found
+        part[:, shifted, :, frf] = motion[:, shifted, :, opposite]
+        jacobians.append((part * nuisance_prior.shift_std[:, None]).reshape(len(response.s), -1, n_frfs))
+    return jacobians

@@ -1,1 +1,1 @@
-"""From measured transfer functions to the causes that explain them best, and how sure that is."""
+"""From measured transfer functions to the components that explain them best, and how sure that is."""

@@ -41,26 +41,22 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Component
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-N_DISTANT = 8  # places anywhere, not beside each other, by what a wide search says of them
-EQUAL_COST_RATIO, MAX_EQUAL = (
-    1.1,
-    4,
-)  # times the best cost there: places as good as the best, though beside it, and how many
+N_DISTANT = 8  # locations anywhere, no neighbours of each other, by the cost of a global scan
+EQUAL_COST_RATIO = 1.1  # times the best cost there: locations as good as the best, though they may be its neighbours
+MAX_EQUAL = 4  # such locations
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
-AMBIGUOUS = 8.0  # nats behind the best: what is so near is weighed again
-CANDIDATES_PER_EFFECT, MAX_CANDIDATES = 8, 24  # places of an effect that are, and of all effects
-NEIGHBOURS_WITHIN, MAX_NEIGHBOURS = (
-    4.0,
-    30,
-)  # nats behind the best of these, beside which places are looked at, and how many
-MAX_IMITATOR_ROUNDS = 2  # times that what looks like the best may lead elsewhere
-N_FITTED = 30  # places, by what a wide search says of them
+AMBIGUOUS = 8.0  # log Bayes factor behind the best: what is so near is rescored
+CANDIDATES_PER_EFFECT, MAX_CANDIDATES = 8, 24  # locations of one effect that are rescored, and of all effects
+NEIGHBOURS_WITHIN = 4.0  # log Bayes factor behind the best rescored fit: neighbours of these are rescored too
+MAX_NEIGHBOURS = 30  # that are rescored
+MAX_IMITATOR_ROUNDS = 2  # times that an imitator of the best may become the best itself
+N_FITTED = 30  # locations, by the cost of a global scan
 ITERATIONS = 20
 
 
 def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fits) -> int:
-    """Fit the most probable effect wherever a wide search finds it likely, and around where that is better.
+    """Fit the most probable effect wherever a global scan finds it likely, and around where that is better.
 
     Parameters
     ----------
@@ -69,12 +65,12 @@ def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fi
     ranking : Ranking
         Of a search, with one fit at least.
     fits : dict
-        By the key of their last cause; new ones are added.
+        By the key of their last component; new ones are added.
 
     Returns
     -------
     int
-        Places that were looked at.
+        Number of scanned locations.
     """
     best = ranking.best
     effect = best.hypothesis.components[-1].effect
@@ -90,36 +86,36 @@ def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fi
 
 
 def find_next_neighbour(
-    problem: InferenceProblem, near: Iterable[Fit], known: Container[tuple[object, ...]]
+    problem: InferenceProblem, candidates: Iterable[Fit], known: Container[tuple[object, ...]]
 ) -> tuple[Component, Fit] | None:
-    """Choose a place that is not known beside the first fit that has such.
+    """Choose an unknown neighbour of the first fit that has one.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
-    near : iterable of Fit
+    candidates : iterable of Fit
         The best first.
     known : container of keys
-        Of last causes.
+        Of last components.
 
     Returns
     -------
-    (Cause, Fit) or None
-        The cause, and the fit beside it; None where all are known.
+    (Component, Fit) or None
+        The component, and the fit that it is a neighbour of; None where all are known.
     """
-    for fit in near:
+    for fit in candidates:
         component = fit.hypothesis.components[-1]
         for location in component.effect.neighbours(problem.context, component.location):
-            other = replace(component, location=location)
-            if other.key not in known:
-                return other, fit
+            neighbour = replace(component, location=location)
+            if neighbour.key not in known:
+                return neighbour, fit
     return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Rescored:
-    """A fit with the values of the likeliest tolerances, and its evidence with all of them."""
+    """A fit with the values of the likeliest tolerances, and its evidence over all of them."""
 
     fit: Fit
     log_evidence: float
@@ -129,7 +125,7 @@ _RescoredFits: TypeAlias = dict[tuple[object, ...], _Rescored]
 
 
 def rescore_ambiguity_set(problem: InferenceProblem, ranking: Ranking) -> Ranking:
-    """Weigh again what is nearly as probable as the best, with what may be.
+    """Rescore what is nearly as probable as the best, and further candidates.
 
     Parameters
     ----------
@@ -148,149 +144,161 @@ def rescore_ambiguity_set(problem: InferenceProblem, ranking: Ranking) -> Rankin
     fits: Fits = {fit.hypothesis.components[-1].key: fit for fit in ranking.fits}
     is_found = ranking.best.log_evidence > ranking.base.log_evidence + AMBIGUOUS
     n_tried = ranking.n_tried + (add_distant_candidates(problem, ranking, fits) if is_found else 0)
-    near = _select_candidates(fits)
-    settled: _RescoredFits = {}
-    if len(near) > 1:
-        data = _find_likeliest_errors(problem, near[0])
-        stricts = {
-            part: replace(problem, nuisance_prior=problem.nuisance_prior.with_part(part), data=data) for part in PARTS
+    candidates = _select_candidates(fits)
+    rescored: _RescoredFits = {}
+    if len(candidates) > 1:
+        data = _find_likeliest_errors(problem, candidates[0])
+        strict_problems = {
+            part: replace(problem, nuisance_prior=problem.nuisance_prior.scaled_by(part), data=data) for part in PARTS
         }
-        settled = {fit.hypothesis.components[-1].key: _rescore(problem, stricts, fit) for fit in near}
+        rescored = {fit.hypothesis.components[-1].key: _rescore(problem, strict_problems, fit) for fit in candidates}
         if is_found:
-            _rescore_neighbours(problem, ranking.base, fits, settled, stricts)
-            _rescore_imitators(problem, ranking.base, fits, settled, stricts)
-    return replace(ranking, fits=_merge_by_evidence(fits, settled), n_tried=n_tried)
+            _rescore_neighbours(problem, ranking.base, fits, rescored, strict_problems)
+            _rescore_imitators(problem, ranking.base, fits, rescored, strict_problems)
+    return replace(ranking, fits=_merge_by_evidence(fits, rescored), n_tried=n_tried)
 
 
 def _select_candidates(fits: Fits) -> list[Fit]:
-    """Give what is nearly as probable as the best, some places of each effect, the best first."""
+    """Select what is nearly as probable as the best, some locations of each effect, the best first."""
     order = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     counts = Counter[str]()
-    near: list[Fit] = []
+    candidates: list[Fit] = []
     for fit in order:
         effect = fit.hypothesis.components[-1].effect.name
         counts[effect] += 1
         if fit.log_evidence > order[0].log_evidence - AMBIGUOUS and counts[effect] <= CANDIDATES_PER_EFFECT:
-            near.append(fit)
-    return near[:MAX_CANDIDATES]
+            candidates.append(fit)
+    return candidates[:MAX_CANDIDATES]
 
 
 def _rescore_neighbours(
-    problem: InferenceProblem, base: Fit, fits: Fits, settled: _RescoredFits, stricts: dict[float, InferenceProblem]
+    problem: InferenceProblem,
+    base: Fit,
+    fits: Fits,
+    rescored: _RescoredFits,
+    strict_problems: dict[float, InferenceProblem],
 ) -> None:
-    """Weigh places beside the best ones until all that are left are worse."""
-    far: set[tuple[object, ...]] = set()
+    """Rescore neighbours of the best candidates until all further ones are worse."""
+    rejected: set[tuple[object, ...]] = set()
     for _ in range(MAX_NEIGHBOURS):
-        order = sorted(settled.values(), key=lambda one: -one.log_evidence)
-        near = [one.fit for one in order if one.log_evidence > order[0].log_evidence - NEIGHBOURS_WITHIN]
-        found = find_next_neighbour(problem, near, far | settled.keys())
-        if found is None:
+        order = sorted(rescored.values(), key=lambda candidate: -candidate.log_evidence)
+        candidates = [
+            candidate.fit for candidate in order if candidate.log_evidence > order[0].log_evidence - NEIGHBOURS_WITHIN
+        ]
+        neighbour = find_next_neighbour(problem, candidates, rejected | rescored.keys())
+        if neighbour is None:
             return
-        component, beside = found
-        if not _add_candidate(problem, base, component, beside, fits, settled, stricts):
-            far.add(component.key)
+        component, template = neighbour
+        if not _add_candidate(problem, base, component, template, fits, rescored, strict_problems):
+            rejected.add(component.key)
 
 
 def _rescore_imitators(
-    problem: InferenceProblem, base: Fit, fits: Fits, settled: _RescoredFits, stricts: dict[float, InferenceProblem]
+    problem: InferenceProblem,
+    base: Fit,
+    fits: Fits,
+    rescored: _RescoredFits,
+    strict_problems: dict[float, InferenceProblem],
 ) -> None:
-    """Weigh what looks like the best where that sits now, and places beside it: theirs were found elsewhere before."""
+    """Rescore imitators of the best at its location, and their neighbours: a search found theirs elsewhere."""
     for _ in range(MAX_IMITATOR_ROUNDS):
-        best = max(settled.values(), key=lambda one: one.log_evidence)
-        others = [component for component in list_imitators(problem, best.fit) if component.key not in settled]
+        best = max(rescored.values(), key=lambda candidate: candidate.log_evidence)
+        imitators = [component for component in list_imitators(problem, best.fit) if component.key not in rescored]
         added = [
             component
-            for component in others
-            if _add_candidate(problem, base, component, best.fit, fits, settled, stricts)
+            for component in imitators
+            if _add_candidate(problem, base, component, best.fit, fits, rescored, strict_problems)
         ]
-        if all(settled[component.key].log_evidence < best.log_evidence - NEIGHBOURS_WITHIN for component in added):
+        if all(rescored[component.key].log_evidence < best.log_evidence - NEIGHBOURS_WITHIN for component in added):
             return
-        _rescore_neighbours(problem, base, fits, settled, stricts)
+        _rescore_neighbours(problem, base, fits, rescored, strict_problems)
 
 
 def _add_candidate(
     problem: InferenceProblem,
     base: Fit,
     component: Component,
-    like: Fit,
+    template: Fit,
     fits: Fits,
-    settled: _RescoredFits,
-    stricts: dict[float, InferenceProblem],
+    rescored: _RescoredFits,
+    strict_problems: dict[float, InferenceProblem],
 ) -> bool:
-    """Fit a cause from a similar one, and weigh it if it is near the best; False if it is not."""
+    """Fit a component from a similar one, and rescore it if it is near the best; False if it is not."""
     if component.key not in fits:
-        fits[component.key] = fit_from_neighbour(problem, base, component, like, find_cost_limit(fits.values()))
+        fits[component.key] = fit_from_neighbour(problem, base, component, template, find_cost_limit(fits.values()))
     fit = fits[component.key]
-    is_near = fit.log_evidence > max(one.log_evidence for one in fits.values()) - AMBIGUOUS
+    is_near = fit.log_evidence > max(candidate.log_evidence for candidate in fits.values()) - AMBIGUOUS
     if is_near:
-        settled[component.key] = _rescore(problem, stricts, fit)
+        rescored[component.key] = _rescore(problem, strict_problems, fit)
     return is_near
 
 
-def _merge_by_evidence(fits: Fits, settled: _RescoredFits) -> tuple[Fit, ...]:
-    """Sort fits by falling evidence; what was not weighed is worse than what was by as much as counts."""
-    if not settled:
+def _merge_by_evidence(fits: Fits, rescored: _RescoredFits) -> tuple[Fit, ...]:
+    """Sort fits by falling evidence; what was not rescored is put behind the ambiguity set."""
+    if not rescored:
         return tuple(sorted(fits.values(), key=lambda fit: -fit.log_evidence))
-    most = max(fit.log_evidence for fit in fits.values())
-    shift = most - max(one.log_evidence for one in settled.values())
-    weighed = [replace(one.fit, log_evidence=one.log_evidence + shift) for one in settled.values()]
-    others = [
-        replace(fit, log_evidence=min(fit.log_evidence, most - AMBIGUOUS))
+    largest = max(fit.log_evidence for fit in fits.values())
+    shift = largest - max(candidate.log_evidence for candidate in rescored.values())
+    merged = [replace(candidate.fit, log_evidence=candidate.log_evidence + shift) for candidate in rescored.values()]
+    remaining = [
+        replace(fit, log_evidence=min(fit.log_evidence, largest - AMBIGUOUS))
         for key, fit in fits.items()
-        if key not in settled
+        if key not in rescored
     ]
-    return tuple(sorted([*weighed, *others], key=lambda fit: -fit.log_evidence))
+    return tuple(sorted([*merged, *remaining], key=lambda fit: -fit.log_evidence))
 
 
 def _find_likeliest_errors(problem: InferenceProblem, best: Fit) -> Data:
-    """Give the data the errors of FRFs that are likeliest by the best explanation."""
+    """Give the data the FRF errors that are likeliest by the best explanation."""
     data, options = problem.data, problem.context.options
-    most = best.log_evidence + data.whitening.log_density
+    largest = best.log_evidence + data.whitening.log_density
     for floor in FLOORS:
-        smaller = make_data(data.measured, options, free_gains=data.free_gains, floor=floor)
-        again = fit_map(best.hypothesis, smaller, best.values, nuisance=best.nuisance, iterations=8, tolerance=0.1)
-        likely = again.log_evidence + smaller.whitening.log_density
-        if likely < most:
+        tighter = make_data(data.measured, options, free_gains=data.free_gains, floor=floor)
+        refitted = fit_map(best.hypothesis, tighter, best.values, nuisance=best.nuisance, iterations=8, tolerance=0.1)
+        log_evidence = refitted.log_evidence + tighter.whitening.log_density
+        if log_evidence < largest:
             break
-        data, most = smaller, likely
+        data, largest = tighter, log_evidence
     return data
 
 
-def _rescore(problem: InferenceProblem, stricts: dict[float, InferenceProblem], fit: Fit) -> _Rescored:
-    """Give a fit the mean evidence, and the values of the likeliest tolerances."""
+def _rescore(problem: InferenceProblem, strict_problems: dict[float, InferenceProblem], fit: Fit) -> _Rescored:
+    """Give a fit its evidence summed over tolerances, and the values of the likeliest ones."""
     best, mean, last = fit, fit.log_evidence, fit
-    for part, strict in stricts.items():
-        last = _fit_with_part(problem, strict, part, last)
+    for part, strict_problem in strict_problems.items():
+        last = _fit_with_part(problem, strict_problem, part, last)
         mean = float(np.logaddexp(mean, last.log_evidence))
-        best = max(best, last, key=lambda one: one.log_evidence)
+        best = max(best, last, key=lambda candidate: candidate.log_evidence)
     return _Rescored(fit=replace(best, log_evidence=fit.log_evidence), log_evidence=mean)
 
 
-def _fit_with_part(problem: InferenceProblem, strict: InferenceProblem, part: float, fit: Fit) -> Fit:
-    """Fit again with a part of the tolerances; everything but the evidence is given for all of them."""
+def _fit_with_part(problem: InferenceProblem, strict_problem: InferenceProblem, part: float, fit: Fit) -> Fit:
+    """Refit with a part of the tolerances; everything but the evidence is given for the full ones."""
     nuisance_prior = problem.nuisance_prior
-    hypothesis = strict.make_hypothesis(fit.hypothesis.components)
-    nuisance = nuisance_prior.in_parts(fit.nuisance, part)
-    again = fit_map(hypothesis, strict.data, fit.values, nuisance=nuisance, iterations=8, tolerance=0.1)
-    back = nuisance_prior.in_parts(again.nuisance, 1 / part)
-    whitened_nuisance, _ = nuisance_prior.whiten(back)
-    white = problem.data.misfit(fit.hypothesis.respond(again.values, back, problem.data.measured.s))
+    hypothesis = strict_problem.make_hypothesis(fit.hypothesis.components)
+    nuisance = nuisance_prior.rescale(fit.nuisance, part)
+    refitted = fit_map(hypothesis, strict_problem.data, fit.values, nuisance=nuisance, iterations=8, tolerance=0.1)
+    rescaled = nuisance_prior.rescale(refitted.nuisance, 1 / part)
+    whitened_nuisance, _ = nuisance_prior.whiten(rescaled)
+    white = problem.data.misfit(fit.hypothesis.respond(refitted.values, rescaled, problem.data.measured.s))
     return replace(
         fit,
-        values=again.values,
-        nuisance=back,
+        values=refitted.values,
+        nuisance=rescaled,
         misfit=float(white @ white),
         nuisance_chi2=float(whitened_nuisance @ whitened_nuisance),
-        log_evidence=again.log_evidence + strict.data.whitening.log_density - problem.data.whitening.log_density,
+        log_evidence=refitted.log_evidence
+        + strict_problem.data.whitening.log_density
+        - problem.data.whitening.log_density,
     )
 
 
 def fit_distant_locations(problem: InferenceProblem, ranking: Ranking) -> Ranking:
-    """Fit the most probable cause at other places, where it explains the test but needs too much of the tolerances.
+    """Fit the most probable component elsewhere, where it explains the test but needs too much of the tolerances.
 
     A short stiff spring between two nodes does nearly what a softer one between nodes farther apart does, and on the
     way from one to the other everything is worse. The frequencies of what explains the test already are right, whatever
-    the place: every likely place is fitted from there.
+    the location: every likely location is fitted from there.
 
     Parameters
     ----------
@@ -311,8 +319,8 @@ def fit_distant_locations(problem: InferenceProblem, ranking: Ranking) -> Rankin
     weights = compute_weights(problem.coarse, REFINED_ERROR)
     for start in [start for start in starts if start.component.key not in fits][:N_FITTED]:
         hypothesis = problem.make_hypothesis((*base.hypothesis.components, start.component))
-        moved, _ = refine(hypothesis, problem.coarse, weights, best.values)  # far from the axis, where all is smooth
-        for values in (np.concatenate([base.values, start.values]), moved):
+        refined, _ = refine(hypothesis, problem.coarse, weights, best.values)  # far from the axis, where all is smooth
+        for values in (np.concatenate([base.values, start.values]), refined):
             nuisance = adopt_modes(hypothesis, hypothesis.to_physical(hypothesis.clip_to_searched(values)), best)
             cost_limit = find_cost_limit(fits.values())
             keep_better(

@@ -1,4 +1,4 @@
-"""Finds the causes that explain the measurement best: wide search, refinement, exact fits, steps to neighbours."""
+"""Searches for one more component: global scan, score test, refinement, exact fits, neighbourhood search."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
 from frf_ipz.diagnosis.search.robust_refinement import Start, refine_halfway, refine_starts, select_apart
 from frf_ipz.diagnosis.search.score_test import run_score_test
 
-N_SCORED = 14  # hypotheses that are fitted after the close search
-MIN_PROMISE = 5.0  # nats that a linear step promises: with less, a hypothesis is not fitted
+N_SCORED = 14  # hypotheses that are fitted after the score test
+MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hypothesis is not fitted
 MIN_PROMISED_COST = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
 PROMISED_PART = 0.5  # of what a fit gains: what a linear step on fewer points must promise of it
-BROKEN_PROMISE, BROKEN_PART = 10.0, 0.5  # nats, and of what a linear step promises: a fit that lacks more begins anew
-SCORED_PER_EFFECT = 3  # places of an effect that are fitted after the close search
-N_ROUGH = 12  # hypotheses that are fitted with large errors
+BROKEN_PROMISE, BROKEN_PART = 10.0, 0.5  # log-likelihood, and part of a promise: a fit that lacks more begins anew
+SCORED_PER_EFFECT = 3  # locations of an effect that are fitted after the score test
+N_ROUGH = 12  # hypotheses that are fitted with inflated errors
 N_EXACT, N_EXACT_FAR_OFF = 7, 2
-COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best one's cost, and nats: such hypotheses are not fitted exactly
-N_EFFECTS_IN_VAIN = 2  # effects whose neighbours are looked at, where no further cause explains much
-VAIN_COST_RATIO = 0.6  # of the cost of what is known: a fit that leaves more does not explain it
+COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best cost, plus: beyond, hypotheses are not fitted exactly
+N_EFFECTS_IN_VAIN = 2  # effects whose neighbourhoods are searched where no further component explains much
+VAIN_COST_RATIO = 0.6  # of the cost of the base: a fit that leaves more does not explain it
 N_CONTINUED = 2  # fits that go on until they converge
-N_BESIDE_NUISANCE, N_EXACT_BESIDE_NUISANCE = 12, 3  # effects that stand out beside fitted scatter, and are fitted
-N_ROUGH_AROUND = 16  # places further around that are fitted with large errors
+N_BESIDE_NUISANCE, N_EXACT_BESIDE_NUISANCE = 12, 3  # effects that stand out beside a fitted nuisance, and are fitted
+N_ROUGH_AROUND = 16  # locations further around that are fitted with inflated errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Ranking:
-    """What a search found.
+    """The result of a search.
 
     Parameters
     ----------
     base : Fit
-        What was supposed before: the nominal model, or a cause that is known already.
+        The fit that it was built on: the nominal model, or with components that are known already.
     fits : tuple of Fit
-        Each one more cause, by falling evidence.
+        Each with one more component, by falling evidence.
     n_tried : int
-        Hypotheses that were looked at.
+        Number of hypotheses that were scanned.
     refined : tuple of Start
-        What a wide search led to, by rising cost; empty where none was made.
+        Refined starts of a global scan, by rising cost; empty where none was made.
     """
 
     base: Fit
@@ -62,28 +62,28 @@ class Ranking:
 
     @property
     def best(self) -> Fit:
-        """The best place of the most probable effect; the base where nothing was found."""
+        """The best location of the most probable effect; the base where nothing was found."""
         return group_by_effect(self.fits)[0][0] if self.fits else self.base
 
     @property
     def best_evidence(self) -> float:
-        """Evidence of the most probable effect, wherever it is, nats."""
+        """Log evidence of the most probable effect, wherever it is."""
         fits = group_by_effect(self.fits)[0] if self.fits else (self.base,)
         return float(np.logaddexp.reduce([fit.log_evidence for fit in fits]))
 
 
 def group_by_effect(fits: Iterable[Fit]) -> list[tuple[Fit, ...]]:
-    """Sort fits by effects: one is as probable as all its places together.
+    """Sort fits by effects: one is as probable as all its locations together.
 
     Parameters
     ----------
     fits : iterable of Fit
-        Each with one cause more than is known.
+        Each with one component more than the base.
 
     Returns
     -------
     list of tuple of Fit
-        The most probable effect first; of each, the most probable place first.
+        The most probable effect first; of each, the most probable location first.
     """
     groups: dict[str, list[Fit]] = {}
     for fit in sorted(fits, key=lambda fit: -fit.log_evidence):
@@ -93,24 +93,24 @@ def group_by_effect(fits: Iterable[Fit]) -> list[tuple[Fit, ...]]:
 
 
 def fit_null_model(problem: InferenceProblem) -> Fit:
-    """Fit the nominal model with what cannot be known."""
+    """Fit the nominal model with nuisance parameters."""
     return problem.fit((), np.zeros(0))
 
 
 def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
-    """Search for one more cause.
+    """Search for one more component.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
 
     Returns
     -------
     Ranking
-        All that was fitted.
+        All fits.
     """
     n_tried, refined = 0, list[Start]()
     fits: Fits = {}
@@ -129,7 +129,7 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
 
 
 def rank_fits(problem: InferenceProblem, fits: Iterable[Fit]) -> tuple[Fit, ...]:
-    """Sort fits by falling evidence; the best ones go on where they have not converged.
+    """Sort fits by falling evidence; the best ones are continued where they have not converged.
 
     Parameters
     ----------
@@ -145,15 +145,15 @@ def rank_fits(problem: InferenceProblem, fits: Iterable[Fit]) -> tuple[Fit, ...]
     """
     order = sorted(fits, key=lambda fit: -fit.log_evidence)
     cost_limit = find_cost_limit(order)
-    settled = [
+    continued = [
         fit if fit.has_converged or fit.is_far_off or fit.cost > cost_limit else problem.fit_to_convergence(fit)
         for fit in order[:N_CONTINUED]
     ]
-    return tuple(sorted([*settled, *order[N_CONTINUED:]], key=lambda fit: -fit.log_evidence))
+    return tuple(sorted([*continued, *order[N_CONTINUED:]], key=lambda fit: -fit.log_evidence))
 
 
-def search_small_component(problem: InferenceProblem, base: Fit, least: float) -> Ranking:
-    """Search for one more cause that is small: from a fit that leaves nothing to explain but what scatter hides.
+def search_small_component(problem: InferenceProblem, base: Fit, min_log_bayes_factor: float) -> Ranking:
+    """Search for one more, small component: from a fit that leaves nothing but what the nuisance hides.
 
     Parameters
     ----------
@@ -161,8 +161,8 @@ def search_small_component(problem: InferenceProblem, base: Fit, least: float) -
         Data and effects.
     base : Fit
         Nearly right.
-    least : float
-        nats: what explains less is not fitted.
+    min_log_bayes_factor : float
+        What explains less is not fitted.
 
     Returns
     -------
@@ -170,38 +170,40 @@ def search_small_component(problem: InferenceProblem, base: Fit, least: float) -
         Without fits where one linear step promises less of everything.
     """
     fits: Fits = {}
-    found = run_score_test(problem, base)
-    for start in _most_promising(found, PROMISED_PART * least):
+    scored = run_score_test(problem, base)
+    for start in _most_promising(scored, PROMISED_PART * min_log_bayes_factor):
         _fit_and_keep(problem, base, start, fits)
-    if any(fit.log_evidence > base.log_evidence + PROMISED_PART * least for fit in fits.values()):
+    if any(fit.log_evidence > base.log_evidence + PROMISED_PART * min_log_bayes_factor for fit in fits.values()):
         search_neighbourhoods(problem, base, fits, _count_searched_effects(base, fits))
-    return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=len(found))
+    return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=len(scored))
 
 
 def _add_by_score_test(problem: InferenceProblem, base: Fit, fits: Fits) -> int:
-    """Fit small effects from where the base is, if one linear step promises something."""
-    found = run_score_test(problem, base)
-    starts = _most_promising(found, MIN_PROMISE if base.is_nearly_right else MIN_PROMISED_COST * base.cost)
+    """Fit small effects from the base, if one linear step promises something."""
+    scored = run_score_test(problem, base)
+    starts = _most_promising(scored, MIN_PROMISE if base.is_nearly_right else MIN_PROMISED_COST * base.cost)
     if not starts and base.is_nearly_right:
-        starts = _most_promising(found, -np.inf)[:1]  # how little the best one explains is told
+        starts = _most_promising(scored, -np.inf)[:1]  # to report how little the best one explains
     for start in starts:
         _fit_and_keep(problem, base, start, fits)
-    return len(found)
+    return len(scored)
 
 
-def _most_promising(found: Sequence[Start], least: float) -> list[Start]:
-    """Take the best places of each effect that promise so much, nats, and are not far behind the best of all.
+def _most_promising(scored: Sequence[Start], min_log_bayes_factor: float) -> list[Start]:
+    """Select the best locations of each effect that promise so much and are not far behind the best of all.
 
-    The best place of each comes first: a linear step may promise a small part of what an effect explains.
+    The best location of each comes first: a linear step may promise a small part of what an effect explains.
     """
-    starts = sorted(select_apart(found, SCORED_PER_EFFECT), key=lambda start: start.cost)
+    starts = sorted(select_apart(scored, SCORED_PER_EFFECT), key=lambda start: start.cost)
     firsts = {start.component.effect.name: start for start in reversed(starts)}
     starts.sort(key=lambda start: start is not firsts[start.component.effect.name])
-    return [start for start in starts[:N_SCORED] if -start.cost > max(least, -starts[0].cost - MAX_BEHIND)]
+    return [
+        start for start in starts[:N_SCORED] if -start.cost > max(min_log_bayes_factor, -starts[0].cost - MAX_BEHIND)
+    ]
 
 
 def _fit_and_keep(problem: InferenceProblem, base: Fit, start: Start, fits: Fits) -> None:
-    """Fit a small effect from where the base is; anew, where that gains much less than one linear step promised."""
+    """Fit a small effect from the base; anew, where that gains much less than one linear step promised."""
     hypothesis = problem.make_hypothesis((*base.hypothesis.components, start.component))
     values, cost_limit = np.concatenate([base.values, start.values]), find_cost_limit((base, *fits.values()))
     fit = problem.fit_from_base(hypothesis, values, base, cost_limit=cost_limit)
@@ -211,12 +213,12 @@ def _fit_and_keep(problem: InferenceProblem, base: Fit, start: Start, fits: Fits
 
 
 def keep_better(fits: Fits, fit: Fit) -> None:
-    """Add a fit, unless a better one with the same last cause is known.
+    """Add a fit, unless a better one with the same last component is known.
 
     Parameters
     ----------
     fits : dict
-        By the key of their last cause.
+        By the key of their last component.
     fit : Fit
         To be added.
     """
@@ -226,59 +228,59 @@ def keep_better(fits: Fits, fit: Fit) -> None:
 
 
 def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start]) -> Fits:
-    """Fit with large errors first, and exactly what then is not far behind."""
+    """Fit with inflated errors first, and then exactly what is not far behind."""
     known = base.hypothesis.components
-    closer = refine_halfway(problem, [(known, start) for start in refined[:N_ROUGH]])
-    early = [problem.fit_roughly((*known, start.component), start.values) for known, start in closer]
-    if all(fit.is_far_off for fit in early):
+    halfway = refine_halfway(problem, [(known, start) for start in refined[:N_ROUGH]])
+    rough_fits = [problem.fit_roughly((*known, start.component), start.values) for known, start in halfway]
+    if all(fit.is_far_off for fit in rough_fits):
         for start in select_apart(refined[:N_ROUGH], 1):
             around = refine_surroundings(problem, (*known, start.component), start.values)[:N_ROUGH_AROUND]
-            early += [problem.fit_roughly(*there) for there in around]
-    early.sort(key=lambda fit: fit.cost)
+            rough_fits += [problem.fit_roughly(*moved) for moved in around]
+    rough_fits.sort(key=lambda fit: fit.cost)
     fits: Fits = {}
-    for fit in early[: count_exact_fits(early, N_EXACT)]:
-        if fit.cost < COST_RATIO * early[0].cost + COST_SLACK:
+    for fit in rough_fits[: count_exact_fits(rough_fits, N_EXACT)]:
+        if fit.cost < COST_RATIO * rough_fits[0].cost + COST_SLACK:
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
-    if not early[0].is_far_off:
-        _fit_imitators(problem, early, fits)
+    if not rough_fits[0].is_far_off:
+        _fit_imitators(problem, rough_fits, fits)
     return fits
 
 
 def _add_beside_nuisance(problem: InferenceProblem, base: Fit, fits: Fits) -> None:
-    """Fit what stands out beside the scatter that was fitted without it."""
+    """Fit what stands out beside the nuisance that was fitted without it."""
     known = base.hypothesis.components
     starts = sorted(select_apart(scan_beside_nuisance(problem, base), SCORED_PER_EFFECT), key=lambda start: start.cost)
-    early = [
+    rough_fits = [
         problem.fit_roughly((*known, start.component), np.concatenate([base.values, start.values]), base.nuisance)
         for start in starts[:N_BESIDE_NUISANCE]
     ]
-    for fit in sorted(early, key=lambda fit: fit.cost)[:N_EXACT_BESIDE_NUISANCE]:
+    for fit in sorted(rough_fits, key=lambda fit: fit.cost)[:N_EXACT_BESIDE_NUISANCE]:
         keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
 
 
-def count_exact_fits(early: Sequence[Fit], usual: int) -> int:
-    """Say how many fits with large errors are worth an exact one.
+def count_exact_fits(rough_fits: Sequence[Fit], usual: int) -> int:
+    """Count the fits with inflated errors that are worth an exact one.
 
     Parameters
     ----------
-    early : sequence of Fit
+    rough_fits : sequence of Fit
         By rising cost.
     usual : int
-        Where one of them is nearly right.
+        Number where one of them is nearly right.
 
     Returns
     -------
     int
         Few where none is.
     """
-    return N_EXACT_FAR_OFF if early and early[0].is_far_off else usual
+    return N_EXACT_FAR_OFF if rough_fits and rough_fits[0].is_far_off else usual
 
 
-def _fit_imitators(problem: InferenceProblem, early: Sequence[Fit], fits: Fits) -> None:
-    """Fit what is known to look like the best: far behind at first, it may yet be as good."""
+def _fit_imitators(problem: InferenceProblem, rough_fits: Sequence[Fit], fits: Fits) -> None:
+    """Fit imitators of the best: far behind at first, they may yet be as good."""
     best = max(fits.values(), key=lambda fit: fit.log_evidence).hypothesis.components[-1].effect
     fitted = {fit.hypothesis.components[-1].effect.name for fit in fits.values()}
-    for fit in sorted(early, key=lambda fit: fit.cost):
+    for fit in sorted(rough_fits, key=lambda fit: fit.cost):
         effect = fit.hypothesis.components[-1].effect
         if are_imitators(effect, best) and effect.name not in fitted:
             fitted.add(effect.name)
@@ -286,9 +288,9 @@ def _fit_imitators(problem: InferenceProblem, early: Sequence[Fit], fits: Fits) 
 
 
 def _count_searched_effects(base: Fit, fits: Fits) -> int:
-    """Say how many effects are worth steps: few, where much is left beside known causes and none explains it."""
-    found = list(fits.values())
+    """Count the effects worth a neighbourhood search: few, where much is left and none explains it."""
+    known = list(fits.values())
     if base.explains_nearly_all:
-        return N_EFFECTS if max(fit.log_evidence for fit in found) > base.log_evidence + GAIN else 0
-    is_vain = bool(base.hypothesis.components) and min(fit.cost for fit in found) > VAIN_COST_RATIO * base.cost
+        return N_EFFECTS if max(fit.log_evidence for fit in known) > base.log_evidence + GAIN else 0
+    is_vain = bool(base.hypothesis.components) and min(fit.cost for fit in known) > VAIN_COST_RATIO * base.cost
     return N_EFFECTS_IN_VAIN if is_vain else N_EFFECTS

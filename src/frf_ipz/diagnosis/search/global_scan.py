@@ -35,8 +35,8 @@ AMPLITUDES = np.geomspace(1e-3, 300.0, 20)  # over the stiffness of the structur
 FINER_STEPS = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
 LARGEST_FLEXIBILITY = 2500  # DOFs up to which the static flexibility of all of them is found
 SCAN_ERROR = 0.02  # of an FRF's size: what counts as a misfit far from the axis
-NUISANCE_ERROR = 0.1  # the same where scatter was fitted
-NEIGHBOURS_OF = 16  # places of each effect: where not all places are looked at, those beside the best are
+NUISANCE_ERROR = 0.1  # the same where the nuisance was fitted
+NEIGHBOURS_OF = 16  # best locations of each effect whose neighbours are scanned, where not all locations are listed
 
 
 Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
@@ -45,36 +45,36 @@ Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Receptances:
-    """FRFs to, from and at motions, on top of what is supposed already.
+    """FRFs to, from and at motions, on top of the fit to build on.
 
     Parameters
     ----------
     across : (n_points, n_frfs, n_motions) complex array
-        R_sp R_ph as the channels show it.
-    own : (n_points, n_motions) complex array
+        R_sp R_ph as the channels record it.
+    at_motions : (n_points, n_motions) complex array
         R_pp.
     """
 
     across: ComplexArray
-    own: ComplexArray
+    at_motions: ComplexArray
 
 
 def evaluate_receptances(
-    base: Response, basis: Basis, layout: Layout, motions: FloatArray, rest: FloatArray
+    base: Response, basis: Basis, layout: Layout, motions: FloatArray, missing_flexibility: FloatArray
 ) -> Receptances:
     """Evaluate FRFs of motions.
 
     Parameters
     ----------
     base : Response
-        Of what is supposed already.
+        Of the fit to build on.
     basis : Basis
         Its coordinates.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
     motions : (n_all, n_motions) array
         Weights of all DOFs.
-    rest : (n_motions,) array
+    missing_flexibility : (n_motions,) array
         Static flexibility that the basis lacks, m/N.
 
     Returns
@@ -83,15 +83,15 @@ def evaluate_receptances(
         Of the motions.
     """
     shapes = motions.T @ basis.vectors @ base.modes.vectors
-    left, right = np.matmul(shapes, base.output_motion), np.matmul(shapes, base.input_motion)
-    across = left[:, :, layout.output_of] * right[:, :, layout.input_of] * base.chain[:, None, :]
+    from_outputs, from_inputs = np.matmul(shapes, base.output_motion), np.matmul(shapes, base.input_motion)
+    across = from_outputs[:, :, layout.output_index] * from_inputs[:, :, layout.input_index] * base.chain[:, None, :]
     s, modes = base.s[:, None], base.modes
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
-    own = (1 / (s**2 + s * damping + modes.squares)) @ (shapes**2).T + rest
+    at_motions = (1 / (s**2 + s * damping + modes.squares)) @ (shapes**2).T + missing_flexibility
     if base.attached_motion.shape[2]:
-        felt = np.matmul(shapes, base.attached_motion)
-        own = own - np.einsum("kpa,kab,kpb->kp", felt, base.attached_stiffness, felt)
-    return Receptances(across=np.moveaxis(across, 1, 2), own=np.asarray(own))
+        at_attachments = np.matmul(shapes, base.attached_motion)
+        at_motions = at_motions - np.einsum("kpa,kab,kpb->kp", at_attachments, base.attached_stiffness, at_attachments)
+    return Receptances(across=np.moveaxis(across, 1, 2), at_motions=np.asarray(at_motions))
 
 
 def compute_missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
@@ -127,69 +127,69 @@ def scan_signatures(
     components: Sequence[Component], signatures: Sequence[Signature], base: Response, basis: Basis, layout: Layout,
     measured: TransferFunctions, weights: FloatArray,
 ) -> list[Start]:  # fmt: skip
-    """Find the best values of each effect at each place.
+    """Find the best values of each effect at each location.
 
     Parameters
     ----------
-    components : sequence of Cause
-        What is tried.
+    components : sequence of Component
+        Effects at their locations.
     signatures : sequence of Signature
-        The same as dynamic stiffness.
+        Of the same, as dynamic stiffness.
     base : Response
-        Of what is supposed already.
+        Of the fit to build on.
     basis : Basis
         Its coordinates.
     layout : Layout
-        Sensors and blows.
+        Sensors and excited points.
     measured : TransferFunctions
-        Transfer functions on the contour of the sketches.
+        Transfer functions on the contour of the signatures.
     weights : (n_points, n_frfs) array
         Over the squared misfit.
 
     Returns
     -------
     list of Start
-        One a cause.
+        One a component.
     """
     misfit = measured.values - base.values
     constant = np.sum(weights * np.abs(misfit) ** 2, 1)
-    found = []
+    starts = []
     for group in _group_by_motion(signatures):
         motions = np.stack([signatures[members[0]].motion for members in group], 1)
-        parts = evaluate_receptances(base, basis, layout, motions, compute_missing_flexibility(basis, motions))
-        linear = np.einsum("kf,kfp->kp", weights * misfit.conj(), parts.across)
-        square = np.einsum("kf,kfp->kp", weights, np.abs(parts.across) ** 2)
+        receptances = evaluate_receptances(base, basis, layout, motions, compute_missing_flexibility(basis, motions))
+        linear = np.einsum("kf,kfp->kp", weights * misfit.conj(), receptances.across)
+        square = np.einsum("kf,kfp->kp", weights, np.abs(receptances.across) ** 2)
         for column, members in enumerate(group):
-            terms = constant, linear[:, column], square[:, column], parts.own[:, column]
-            found += [_best_amplitude(components[member], signatures[member], terms) for member in members]
-    return found
+            terms = constant, linear[:, column], square[:, column], receptances.at_motions[:, column]
+            starts += [_best_amplitude(components[member], signatures[member], terms) for member in members]
+    return starts
 
 
 def _group_by_motion(signatures: Sequence[Signature]) -> Iterator[list[list[int]]]:
-    """Sketches on the same motion share their receptances; motions come in handy numbers."""
-    same: dict[bytes, list[int]] = {}
+    """Signatures on the same motion share their receptances; motions come in groups that fit into memory."""
+    members: dict[bytes, list[int]] = {}
     for index, signature in enumerate(signatures):
-        same.setdefault(signature.motion.tobytes(), []).append(index)
-    groups = list(same.values())
+        members.setdefault(signature.motion.tobytes(), []).append(index)
+    groups = list(members.values())
     for start in range(0, len(groups), MOTIONS_AT_ONCE):
         yield groups[start : start + MOTIONS_AT_ONCE]
 
 
 def _best_amplitude(component: Component, signature: Signature, terms: Terms) -> Start:
-    own = terms[3]
+    at_motion = terms[3]
     if signature.amplitudes is None:
-        scale = np.median(np.abs(own)) * np.median(np.abs(signature.shapes), axis=1)
+        scale = np.median(np.abs(at_motion)) * np.median(np.abs(signature.shapes), axis=1)
         amplitudes = AMPLITUDES[None, :] / scale[:, None]
     else:
         amplitudes = np.broadcast_to(signature.amplitudes, (len(signature.shapes), len(signature.amplitudes)))
     costs = _costs(signature.shapes, amplitudes, terms)
     shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
     best, cost = amplitudes[shape, size], costs[shape, size]
-    for closer in FINER_STEPS if amplitudes.shape[1] > 1 else ():
-        around = best * closer
-        costs = _costs(signature.shapes[shape, None], around[None], terms)[0]
+    for factors in FINER_STEPS if amplitudes.shape[1] > 1 else ():
+        finer = best * factors
+        costs = _costs(signature.shapes[shape, None], finer[None], terms)[0]
         nearest = int(np.argmin(costs))
-        best, cost = around[nearest], costs[nearest]
+        best, cost = finer[nearest], costs[nearest]
     values = signature.values[shape].copy()
     if len(values):
         values[signature.amplitude] *= best
@@ -198,66 +198,66 @@ def _best_amplitude(component: Component, signature: Signature, terms: Terms) ->
 
 def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
     """Robust misfits of shapes times amplitudes, (n_shapes, n_amplitudes)."""
-    constant, linear, square, own = terms
+    constant, linear, square, at_motion = terms
     stiffness = amplitudes[:, :, None] * shapes[:, None, :]
-    effective = stiffness / (1 + own * stiffness)
+    effective = stiffness / (1 + at_motion * stiffness)
     squares = constant + 2 * (effective * linear).real + np.abs(effective) ** 2 * square
     return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2))
 
 
 def scan_globally(problem: InferenceProblem, base: Fit) -> list[Start]:
-    """Look for large effects, far from the axis.
+    """Scan for large effects, far from the axis.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
 
     Returns
     -------
     list of Start
-        The best values of each cause, by rising cost.
+        The best values of each component, by rising cost.
     """
     return _scan(problem, problem.context, problem.coarse, base, np.zeros(problem.nuisance_prior.size), SCAN_ERROR)
 
 
 def scan_beside_nuisance(problem: InferenceProblem, base: Fit) -> list[Start]:
-    """Look for large effects half-way to the axis, beside the scatter that was fitted without them.
+    """Scan for large effects half-way to the axis, beside the nuisance that was fitted without them.
 
-    Scatter takes up what shifts natural frequencies; what it cannot, stands out.
+    The nuisance takes up what shifts natural frequencies; what it cannot, stands out.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
 
     Returns
     -------
     list of Start
-        The best values of each cause, by rising cost.
+        The best values of each component, by rising cost.
     """
     context = replace(problem.context, contour=problem.middle.s)
     return _scan(problem, context, problem.middle, base, base.nuisance, NUISANCE_ERROR)
 
 
 def list_components(effect: Effect, context: ModelContext) -> list[Component]:
-    """Give an effect at all its places.
+    """List an effect at all its locations.
 
     Parameters
     ----------
     effect : Effect
-        What.
+        The effect.
     context : ModelContext
-        What is tested.
+        Model, layout and tolerances.
 
     Returns
     -------
-    list of Cause
-        One a place.
+    list of Component
+        One a location.
     """
     locations = effect.locations(context)
     return [Component(effect=effect, location=location, n_locations=len(locations)) for location in locations]
@@ -274,12 +274,14 @@ def _scan(
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
     weights = compute_weights(measured, error)
     response = base.hypothesis.respond(base.values, nuisance, measured.s)
-    signature = partial(_scan_with_signatures, context, measured, base, response, weights)
-    found, direct = signature(components)
-    found.sort(key=lambda start: start.cost)
-    found += signature(_unlisted_neighbours(context, components, found))[0]
-    found += [find_best_start(problem, base, component, measured, weights, nuisance) for component in direct]
-    return sorted(found, key=lambda start: start.cost)
+    scan = partial(_scan_with_signatures, context, measured, base, response, weights)
+    starts, without_signature = scan(components)
+    starts.sort(key=lambda start: start.cost)
+    starts += scan(_unlisted_neighbours(context, components, starts))[0]
+    starts += [
+        find_best_start(problem, base, component, measured, weights, nuisance) for component in without_signature
+    ]
+    return sorted(starts, key=lambda start: start.cost)
 
 
 def _scan_with_signatures(
@@ -290,26 +292,26 @@ def _scan_with_signatures(
     weights: FloatArray,
     components: Sequence[Component],
 ) -> tuple[list[Start], list[Component]]:
-    """Find the best values of causes that can be sketched, and which ones cannot."""
+    """Find the best values of components that have a signature, and list those that have none."""
     signatures = [component.effect.signature(context, component.location) for component in components]
-    drawn = [
+    signed = [
         (component, signature)
         for component, signature in zip(components, signatures, strict=True)
         if signature is not None
     ]
-    found = scan_signatures(
-        [component for component, _ in drawn], [signature for _, signature in drawn], response, base.hypothesis.basis,
+    starts = scan_signatures(
+        [component for component, _ in signed], [signature for _, signature in signed], response, base.hypothesis.basis,
         context.layout, measured, weights,
     )  # fmt: skip
-    return found, [component for component, signature in zip(components, signatures, strict=True) if signature is None]
+    return starts, [component for component, signature in zip(components, signatures, strict=True) if signature is None]
 
 
 def _unlisted_neighbours(
     context: ModelContext, components: Sequence[Component], starts: Sequence[Start]
 ) -> list[Component]:
-    """Give the places beside the best of each effect that are none of those where it was looked for."""
-    seen = {component.key for component in components}
-    counts, found = Counter[str](), list[Component]()
+    """List the neighbours of the best locations of each effect that are not among the scanned ones."""
+    known = {component.key for component in components}
+    counts, unlisted = Counter[str](), list[Component]()
     for start in starts:
         effect = start.component.effect
         counts[effect.name] += 1
@@ -317,10 +319,10 @@ def _unlisted_neighbours(
             continue
         for location in effect.neighbours(context, start.component.location):
             component = Component(effect=effect, location=location, n_locations=start.component.n_locations)
-            if component.key not in seen:
-                seen.add(component.key)
-                found.append(component)
-    return found
+            if component.key not in known:
+                known.add(component.key)
+                unlisted.append(component)
+    return unlisted
 
 
 def find_best_start(
@@ -338,20 +340,20 @@ def find_best_start(
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
-    component : Cause
-        Effect and place.
+        The fit to build on.
+    component : Component
+        Effect and location.
     measured : TransferFunctions
         Transfer functions.
     weights : (n_points, n_frfs) array
         Over the squared misfit.
     nuisance : (n_nuisance,) array
-        What cannot be known, in standard deviations.
+        Nuisance parameters, in standard deviations.
 
     Returns
     -------
     Start
-        The best of them.
+        The best of these values.
     """
     hypothesis = problem.make_hypothesis((*base.hypothesis.components, component), exact=False)
     grid = component.effect.start_values(problem.context, component.location)

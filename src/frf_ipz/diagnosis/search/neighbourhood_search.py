@@ -1,4 +1,4 @@
-"""Steps to neighbours of a place, and to effects that look alike, as long as that makes a cause more probable."""
+"""Neighbourhood search: steps to neighbours and to imitators as long as that makes a component more probable."""
 
 from __future__ import annotations
 
@@ -20,30 +20,26 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis
 
 Fits: TypeAlias = dict[tuple[object, ...], Fit]
-"""Fits by the key of their last cause."""
+"""Fits by the key of their last component."""
 
-N_EFFECTS = 6  # effects whose neighbours are looked at
-MAX_BEHIND, MAX_BEHIND_COMPLETE = (
-    2000.0,
-    300.0,
-)  # nats behind the best, and behind one that explains all: not looked at any more
-COST_RATIO = 2.0  # times the cost of one that explains all: a fit on its way there may have reached that much
-UNFINISHED_COST_RATIO = (
-    4.0  # times the cost of the best place: a fit beside it that has not converged may yet fall below that
-)
-GAIN = 0.5  # nats: a neighbour must be better by that
+N_EFFECTS = 6  # effects whose neighbourhoods are searched
+MAX_BEHIND = 2000.0  # log Bayes factor behind the best: an effect that is further behind is not searched any more
+MAX_BEHIND_COMPLETE = 300.0  # the same behind one that explains nearly all
+COST_RATIO = 2.0  # times the cost of one that explains nearly all: a fit on its way there may have reached that much
+UNFINISHED_COST_RATIO = 4.0  # times the best cost: a neighbour's fit that has not converged may yet fall below that
+GAIN = 0.5  # log Bayes factor: a neighbour must be better by that
 MAX_STEPS = 12
-MAX_STARTS = 64  # of an effect that looks like another one
-N_GLANCED, N_FITTED_AROUND = 24, 4  # places further around
+MAX_STARTS = 64  # start values of an imitator
+N_GLANCED, N_FITTED_AROUND = 24, 4  # locations further around that are compared by one step, and fitted
 
 
 def find_cost_limit(fits: Iterable[Fit]) -> float:
-    """Say below what cost a further fit is wanted.
+    """Find the cost below which a further fit is of use.
 
     Parameters
     ----------
     fits : iterable of Fit
-        What is known already.
+        Those known already.
 
     Returns
     -------
@@ -56,18 +52,18 @@ def find_cost_limit(fits: Iterable[Fit]) -> float:
 
 
 def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_effects: int = N_EFFECTS) -> None:
-    """Step to neighbours as long as that makes an effect more probable.
+    """Search the neighbourhoods of the best effects, as long as that makes them more probable.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
     fits : dict
-        By the key of their last cause, whose place is changed; new fits are added.
+        By the key of their last component, whose location is changed; new fits are added.
     n_effects : int
-        The best ones that are stepped.
+        Number of effects, the best ones, whose neighbourhoods are searched.
     """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     if ranked and not ranked[0].is_far_off:
@@ -84,47 +80,47 @@ def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_ef
 
 
 def _add_imitators(problem: InferenceProblem, base: Fit, best: Fit, fits: Fits) -> None:
-    """Fit what looks like the best, at its place or at one end of it."""
-    for other in list_imitators(problem, best):
-        if other.key not in fits:
-            fits[other.key] = fit_from_neighbour(problem, base, other, best, find_cost_limit(fits.values()))
+    """Fit imitators of the best, at its location or at one end of it."""
+    for imitator in list_imitators(problem, best):
+        if imitator.key not in fits:
+            fits[imitator.key] = fit_from_neighbour(problem, base, imitator, best, find_cost_limit(fits.values()))
 
 
 def list_imitators(problem: InferenceProblem, fit: Fit) -> list[Component]:
-    """List what looks like the last cause of a fit, at its place or at one end of it.
+    """List imitators of the last component of a fit, at its location or at one end of it.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     fit : Fit
-        With one cause at least.
+        With one component at least.
 
     Returns
     -------
-    list of Cause
+    list of Component
         Of other effects.
     """
     component = fit.hypothesis.components[-1]
-    alike = [effect for effect in problem.effects.values() if are_imitators(effect, component.effect)]
+    effects = [effect for effect in problem.effects.values() if are_imitators(effect, component.effect)]
     return [
-        other
-        for effect in alike
-        for other in list_components(effect, problem.context)
-        if _is_within(other.location, component.location)
+        imitator
+        for effect in effects
+        for imitator in list_components(effect, problem.context)
+        if _is_within(imitator.location, component.location)
     ]
 
 
-def _is_within(one: Location, other: Location) -> bool:
-    """Say whether a place is another, or one of the two nodes that the other lies between."""
-    inner, outer = one.entries.get("nodes"), other.entries.get("nodes")
+def _is_within(location: Location, reference: Location) -> bool:
+    """Say whether a location equals another, or is one of the two nodes that the other one joins."""
+    inner, outer = location.entries.get("nodes"), reference.entries.get("nodes")
     is_end = isinstance(inner, list) and isinstance(outer, list) and set(inner) < set(outer)
-    return one.entries == other.entries or is_end
+    return location.entries == reference.entries or is_end
 
 
-def are_imitators(one: Effect, other: Effect) -> bool:
-    """Say whether one effect is known to look like another, either way round."""
-    return one.name in other.imitators or other.name in one.imitators
+def are_imitators(first: Effect, second: Effect) -> bool:
+    """Say whether one effect is known to imitate another, either way round."""
+    return first.name in second.imitators or second.name in first.imitators
 
 
 def _search_neighbourhood(problem: InferenceProblem, base: Fit, fit: Fit, fits: Fits) -> None:
@@ -145,39 +141,39 @@ def _search_neighbourhood(problem: InferenceProblem, base: Fit, fit: Fit, fits: 
 def _continue_unfinished(
     problem: InferenceProblem, base: Fit, fit: Fit, locations: Sequence[Location], fits: Fits
 ) -> None:
-    """Go on with fits beside the best place that were given up on their way: small steps may lead far down.
+    """Continue fits of neighbours that were stopped early: small steps may lead far down.
 
-    Where they do not, the best place's values and scatter may be the better start.
+    Where they do not, the values and the nuisance at the best location may be the better start.
     """
     for component in (replace(fit.hypothesis.components[-1], location=location) for location in locations):
         known = fits[component.key]
         if known.has_converged or known.cost >= UNFINISHED_COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
             continue
-        went_on = fits[component.key] = problem.fit_to_convergence(known)
-        if went_on.cost > fit.cost:
+        continued = fits[component.key] = problem.fit_to_convergence(known)
+        if continued.cost > fit.cost:
             anew = fit_from_neighbour(problem, base, component, fit, find_cost_limit(fits.values()))
-            fits[component.key] = max(went_on, anew, key=lambda one: one.log_evidence)
+            fits[component.key] = max(continued, anew, key=lambda candidate: candidate.log_evidence)
 
 
 def _best_of_locations(
     problem: InferenceProblem, base: Fit, fit: Fit, locations: Sequence[Location], fits: Fits
 ) -> Fit:
-    """Fit the last cause at other places too; the fit itself where none is better."""
+    """Fit the last component at further locations; the fit itself where none is better."""
     component = fit.hypothesis.components[-1]
-    better = fit
+    best = fit
     for location in locations:
-        other = replace(component, location=location)
-        if other.key in fits:
-            tried = fits[other.key]
+        moved = replace(component, location=location)
+        if moved.key in fits:
+            candidate = fits[moved.key]
         else:
-            tried = fits[other.key] = fit_from_neighbour(problem, base, other, fit, find_cost_limit(fits.values()))
-        if tried.log_evidence > better.log_evidence + GAIN:
-            better = tried
-    return better
+            candidate = fits[moved.key] = fit_from_neighbour(problem, base, moved, fit, find_cost_limit(fits.values()))
+        if candidate.log_evidence > best.log_evidence + GAIN:
+            best = candidate
+    return best
 
 
 def _promising_surroundings(problem: InferenceProblem, fit: Fit) -> list[Location]:
-    """Choose places further around the last cause by one step on few data: far from the axis they are all alike."""
+    """Choose locations further around by one step on few data: far from the axis they are all alike."""
     glances = []
     for components, values in refine_surroundings(problem, fit.hypothesis.components, fit.values)[:N_GLANCED]:
         hypothesis = problem.make_hypothesis(components)
@@ -190,52 +186,52 @@ def _promising_surroundings(problem: InferenceProblem, fit: Fit) -> list[Locatio
 def refine_surroundings(
     problem: InferenceProblem, components: tuple[Component, ...], values: FloatArray
 ) -> list[tuple[tuple[Component, ...], FloatArray]]:
-    """Bring values to places further around the last cause.
+    """Refine values at locations further around the last component.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
-    components : tuple of Cause
+    components : tuple of Component
         The last one is moved.
     values : (n_parameters,) array
-        Of all causes.
+        Of all components.
 
     Returns
     -------
-    list of (causes, values)
-        The best place first, as seen far from the axis.
+    list of (components, values)
+        The best location first, as seen far from the axis.
     """
     *known, component = components
     weights = compute_weights(problem.coarse, REFINED_ERROR)
-    found = []
+    refined = []
     for location in component.effect.surroundings(problem.context, component.location):
-        there = (*known, replace(component, location=location))
-        at, cost = refine(problem.make_hypothesis(there), problem.coarse, weights, values, iterations=4)
-        found.append((cost, there, at))
-    return [(there, at) for _, there, at in sorted(found, key=lambda one: one[0])]
+        moved = (*known, replace(component, location=location))
+        refined_values, cost = refine(problem.make_hypothesis(moved), problem.coarse, weights, values, iterations=4)
+        refined.append((cost, moved, refined_values))
+    return [(moved, refined_values) for _, moved, refined_values in sorted(refined, key=lambda entry: entry[0])]
 
 
 def fit_from_neighbour(problem: InferenceProblem, base: Fit, component: Component, fit: Fit, cost_limit: float) -> Fit:
-    """Fit a cause from the values and the scatter of a fit of a similar one.
+    """Fit a component from the values and the nuisance of a fit of a similar one.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
-    component : Cause
+        The fit to build on.
+    component : Component
         One more.
     fit : Fit
-        Of another last cause beside the same base.
+        Of another last component beside the same base.
     cost_limit : float
-        Cost that the fit is wanted below.
+        Cost below which the fit is of use.
 
     Returns
     -------
     Fit
-        Of all causes.
+        Of all components.
     """
     components = (*base.hypothesis.components, component)
     hypothesis = problem.make_hypothesis(components)
@@ -246,18 +242,22 @@ def fit_from_neighbour(problem: InferenceProblem, base: Fit, component: Componen
     else:
         best = find_best_start(problem, base, component, problem.coarse, weights, np.zeros(problem.nuisance_prior.size))
         start = np.concatenate([base.values, best.values])
-    few = 4 if is_same and fit.is_nearly_right else 12
-    values, _ = refine(hypothesis, problem.coarse, weights, start, iterations=few)
+    iterations = 4 if is_same and fit.is_nearly_right else 12
+    values, _ = refine(hypothesis, problem.coarse, weights, start, iterations=iterations)
     if not fit.is_nearly_right:
         return problem.fit(components, values, cost_limit=cost_limit)
     known = fit.values[: len(base.values)]
-    own = () if is_same else _thin_grid(component.effect.start_values(problem.context, component.location))
-    starts = [values, start, *(np.concatenate([known, of_cause]) for of_cause in own)]
+    imitator_values = () if is_same else _thin_grid(component.effect.start_values(problem.context, component.location))
+    starts = [values, start, *(np.concatenate([known, of_component]) for of_component in imitator_values)]
     start, nuisance = problem.nearest_start(hypothesis, starts, fit)
-    near = fit_map(
+    neighbour_fit = fit_map(
         hypothesis, problem.data, start, nuisance=nuisance, iterations=12, tolerance=0.1, cost_limit=cost_limit
     )
-    return near if is_same or near.explains_nearly_all else problem.fit(components, values, cost_limit=cost_limit)
+    return (
+        neighbour_fit
+        if is_same or neighbour_fit.explains_nearly_all
+        else problem.fit(components, values, cost_limit=cost_limit)
+    )
 
 
 def _names(hypothesis: Hypothesis) -> list[str]:

@@ -1,10 +1,10 @@
-"""Two causes at once.
+"""Searches for two components at once.
 
-Where one cause explains nearly everything, the second is searched on top of it, and then the first anew. Where it does
-not, it may be the wrong one: then several first causes get companions far from the axis, where all is smooth, and the
-best pairs are fitted. Both causes of a pair that leaves little are then placed anew beside each other. What explains
-nearly all is compared with pairs of other first causes: one with parameters of its own, a resonator or a joint, may
-have stood for both.
+Where one component explains nearly everything, the second is searched on top of it, and then the first anew. Where it
+does not, it may be the wrong one: then several first components get companions far from the axis, where all is smooth,
+and the best pairs are fitted. Both components of a pair that leaves little are then located anew beside each other.
+What explains nearly all is compared with pairs of other first components: one with parameters of its own, a resonator
+or a joint, may have stood for both.
 """
 
 from __future__ import annotations
@@ -41,52 +41,47 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.hypothesis import Component
 
-N_OTHERS, N_OTHERS_INCOMPLETE = (
-    3,
-    5,
-)  # first causes that are tried where a pair explains all, and where it lacks a little
-MAX_COST_LEFT = 0.8  # of the cost of one cause: where a second leaves more, the first is not searched anew beside it
-COMPETITIVE = 100.0  # behind the best pair: such a pair's causes are stepped to better places
-MAX_SIMPLER = 2  # other effects that are tried for one cause of a pair
-MAX_TURNS = 6  # from one cause of a pair to the other
-PROMISED = 0.5  # of the evidence that another pair needs: what it must gain to be looked at
-N_FIRSTS, FIRST_COST_RATIO = 8, 3.0  # causes that get companions, and times the best cost
+N_OTHERS = 3  # other first components that are tried where a pair explains all
+N_OTHERS_INCOMPLETE = 5  # the same where it lacks a little
+MAX_COST_LEFT = 0.8  # of the cost of one component: if a second leaves more, the first is not searched anew beside it
+COMPETITIVE = 100.0  # log Bayes factor behind the best pair: such a pair's components are located anew
+MAX_SIMPLER = 2  # other effects that are tried for one component of a pair
+MAX_TURNS = 6  # of stepping one component of a pair and then the other
+PROMISED = 0.5  # of the evidence that another pair needs: what a linear step must promise of it
+N_FIRSTS, FIRST_COST_RATIO = 8, 3.0  # components that get companions, and times the best cost
 N_COMPANIONS, LOCATIONS_PER_EFFECT = 12, 3  # of each that are refined, and of an effect
-N_STEPPED, STEPPED_COST_RATIO = (
-    8,
-    2.0,
-)  # pairs whose neighbours are looked at far from the axis, and times the best cost
+N_STEPPED, STEPPED_COST_RATIO = 8, 2.0  # pairs whose neighbours are tried far from the axis, and times the best cost
 N_HALFWAY, N_ROUGH, N_EXACT = 16, 8, 4  # that come half-way to the axis, to it, and are fitted exactly
-EXACT_COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best one's cost, and nats: such pairs are not fitted exactly
+EXACT_COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best cost, plus: beyond, pairs are not fitted exactly
 
 
 def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
-    """Search for two causes.
+    """Search for two components.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     first : Ranking
-        Of one cause.
+        Of one component.
     is_good : callable
-        Tells whether a fit leaves nothing to explain: then nothing further is tried.
+        True for a fit that leaves nothing to explain: then nothing further is tried.
 
     Returns
     -------
     Ranking
-        Its base has one cause, its fits have two.
+        Its base has one component, its fits have two.
     """
-    found: list[Ranking] = []
+    rankings: list[Ranking] = []
     if not first.best.is_far_off or not first.refined:
         beside = search_component(problem, first.best)
-        found.append(beside)
+        rankings.append(beside)
         if beside.fits and not is_good(beside.best) and beside.best.cost < MAX_COST_LEFT * first.best.cost:
-            found.append(search_component(problem, _fit_newest_alone(problem, beside.best)))
+            rankings.append(search_component(problem, _fit_newest_alone(problem, beside.best)))
     is_open = first.refined and not first.best.explains_nearly_all
-    if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in found):
-        found += _search_far_pairs(problem, first, min((ranking.best.cost for ranking in found), default=np.inf))
-    best = _most_probable(found)
+    if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in rankings):
+        rankings += _search_far_pairs(problem, first, min((ranking.best.cost for ranking in rankings), default=np.inf))
+    best = _most_probable(rankings)
     if best.fits and best.best.mean_misfit <= NEARLY_ALL:
         best = _reposition(problem, best)
         if all(component.effect.has_dynamics for component in best.best.hypothesis.components):
@@ -101,21 +96,22 @@ def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fi
     )
 
 
-def _most_probable(found: list[Ranking]) -> Ranking:
-    best = found[0]
-    for ranking in found[1:]:
+def _most_probable(rankings: list[Ranking]) -> Ranking:
+    best = rankings[0]
+    for ranking in rankings[1:]:
         if ranking.best.log_evidence > best.best.log_evidence + GAIN:
             best = ranking
     return best
 
 
 def _search_other_firsts(problem: InferenceProblem, first: Ranking, best: Fit, count: int) -> list[Ranking]:
-    """Search beside other first causes: one with parameters of its own may have stood for both."""
-    others = [fits[0] for fits in group_by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
-    found = [
-        search_small_component(problem, other, PROMISED * (best.log_evidence - other.log_evidence)) for other in others
+    """Search beside other first components: one with parameters of its own may have stood for both."""
+    firsts = [fits[0] for fits in group_by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
+    rankings = [
+        search_small_component(problem, alternative, PROMISED * (best.log_evidence - alternative.log_evidence))
+        for alternative in firsts
     ]
-    return [_reposition(problem, pairs) if _is_competitive(pairs.best, best) else pairs for pairs in found]
+    return [_reposition(problem, pairs) if _is_competitive(pairs.best, best) else pairs for pairs in rankings]
 
 
 def _is_competitive(pair: Fit, best: Fit) -> bool:
@@ -123,41 +119,41 @@ def _is_competitive(pair: Fit, best: Fit) -> bool:
 
 
 def _reposition(problem: InferenceProblem, pairs: Ranking) -> Ranking:
-    """Step both causes of the best pair to better places: the first was placed when it was alone.
+    """Step both components of the best pair to better locations: the first was located when it was alone.
 
-    Where the first one moves, others are searched beside it again.
+    Where the first one moves, second ones are searched beside it again.
     """
     best = _exchange_and_step(problem, _exchange_and_step(problem, pairs.best))
     if best.log_evidence < pairs.best.log_evidence + GAIN:
         return pairs
-    settled = _rank_neighbours(problem, best, pairs.n_tried)
-    base = settled.base
+    repositioned = _rank_neighbours(problem, best, pairs.n_tried)
+    base = repositioned.base
     if base.hypothesis.components[0].key == pairs.base.hypothesis.components[0].key or not base.is_nearly_right:
-        return settled
+        return repositioned
     return _most_probable(
-        [settled, search_small_component(problem, base, PROMISED * (best.log_evidence - base.log_evidence))]
+        [repositioned, search_small_component(problem, base, PROMISED * (best.log_evidence - base.log_evidence))]
     )
 
 
 def _try_simpler_effects(problem: InferenceProblem, pairs: Ranking) -> Ranking:
-    """Try other effects for either cause of a pair, and go on from there: one with dynamics can stand for many."""
-    found = pairs.best
-    for pair in (found, _exchange(problem, found)):
-        others = [
+    """Try other effects for either component of a pair, and continue from there: dynamics can imitate much."""
+    best = pairs.best
+    for pair in (best, _exchange(problem, best)):
+        simpler = [
             fits[0] for fits in group_by_effect(_step_last(problem, pair)) if _is_competitive_other(fits[0], pair)
         ]
-        for other in others[:MAX_SIMPLER]:
-            found = max(found, _step_in_turn(problem, other), key=lambda fit: fit.log_evidence)
-    return pairs if found is pairs.best else _rank_neighbours(problem, found, pairs.n_tried)
+        for candidate in simpler[:MAX_SIMPLER]:
+            best = max(best, _step_in_turn(problem, candidate), key=lambda fit: fit.log_evidence)
+    return pairs if best is pairs.best else _rank_neighbours(problem, best, pairs.n_tried)
 
 
 def _is_competitive_other(fit: Fit, pair: Fit) -> bool:
-    one, other = fit.hypothesis.components[-1].effect, pair.hypothesis.components[-1].effect
-    return one.name != other.name and _is_competitive(fit, pair)
+    effect, pair_effect = fit.hypothesis.components[-1].effect, pair.hypothesis.components[-1].effect
+    return effect.name != pair_effect.name and _is_competitive(fit, pair)
 
 
 def _rank_neighbours(problem: InferenceProblem, best: Fit, n_tried: int) -> Ranking:
-    """Look at all neighbours of the last cause of a pair."""
+    """Rank all neighbours of the last component of a pair."""
     base = problem.fit(best.hypothesis.components[:1], best.values[: best.hypothesis.counts[0]])
     return Ranking(base=base, fits=rank_fits(problem, _step_last(problem, best)), n_tried=n_tried)
 
@@ -167,18 +163,18 @@ def _fit_newest_alone(problem: InferenceProblem, fit: Fit) -> Fit:
     return problem.fit((fit.hypothesis.components[-1],), fit.values[len(fit.values) - count :])
 
 
-def _search_far_pairs(problem: InferenceProblem, first: Ranking, known: float) -> list[Ranking]:
-    """Search for pairs far from the axis; the best one is kept, and stepped to better places, if it beats a cost."""
+def _search_far_pairs(problem: InferenceProblem, first: Ranking, cost_to_beat: float) -> list[Ranking]:
+    """Search for pairs far from the axis; the best one is stepped to better locations if it beats a cost."""
     starts = select_apart(first.refined, 1)[:N_FIRSTS]
     pairs: list[tuple[Component, Start]] = []
     for start in starts:
         if start.cost < FIRST_COST_RATIO * starts[0].cost:
-            pairs += [(start.component, both) for both in _find_companions(problem, start)]
+            pairs += [(start.component, start_of_both) for start_of_both in _find_companions(problem, start)]
     exact: list[Fit] = []
     for fit in _fit_pairs_roughly(problem, pairs):
         exact.append(problem.fit_exactly(fit, cost_limit=find_cost_limit(exact)))
     best = max(exact, key=lambda fit: fit.log_evidence)
-    if best.cost > known:
+    if best.cost > cost_to_beat:
         return []
     if not best.is_far_off:
         best = _exchange_and_step(problem, _exchange_and_step(problem, best))
@@ -186,73 +182,75 @@ def _search_far_pairs(problem: InferenceProblem, first: Ranking, known: float) -
 
 
 def _fit_pairs_roughly(problem: InferenceProblem, pairs: list[tuple[Component, Start]]) -> list[Fit]:
-    """Fit the best pairs with large errors, each one once whichever of its causes came first."""
+    """Fit the best pairs with inflated errors, each one once whichever of its components came first."""
     pairs = _drop_duplicates(pairs)
     limit = STEPPED_COST_RATIO * pairs[0][1].cost
-    near = [_step_both(problem, *pair) if pair[1].cost < limit else pair for pair in pairs[:N_STEPPED]]
-    pairs = _drop_duplicates([*near, *pairs[N_STEPPED:]])
-    closer = refine_halfway(problem, [((component,), both) for component, both in pairs[:N_HALFWAY]])
-    early = [problem.fit_roughly((*known, both.component), both.values) for known, both in closer[:N_ROUGH]]
-    early.sort(key=lambda fit: fit.cost)
-    exact = early[: count_exact_fits(early, N_EXACT)]
-    return [fit for fit in exact if fit.cost <= EXACT_COST_RATIO * early[0].cost + COST_SLACK]
+    stepped = [_step_both(problem, *pair) if pair[1].cost < limit else pair for pair in pairs[:N_STEPPED]]
+    pairs = _drop_duplicates([*stepped, *pairs[N_STEPPED:]])
+    halfway = refine_halfway(problem, [((component,), start) for component, start in pairs[:N_HALFWAY]])
+    rough_fits = [problem.fit_roughly((*known, start.component), start.values) for known, start in halfway[:N_ROUGH]]
+    rough_fits.sort(key=lambda fit: fit.cost)
+    exact = rough_fits[: count_exact_fits(rough_fits, N_EXACT)]
+    return [fit for fit in exact if fit.cost <= EXACT_COST_RATIO * rough_fits[0].cost + COST_SLACK]
 
 
 def _drop_duplicates(pairs: list[tuple[Component, Start]]) -> list[tuple[Component, Start]]:
-    """Take each pair once, the best first."""
-    once: dict[frozenset[tuple[object, ...]], tuple[Component, Start]] = {}
+    """Keep each pair once, the best first."""
+    unique: dict[frozenset[tuple[object, ...]], tuple[Component, Start]] = {}
     for pair in sorted(pairs, key=lambda pair: pair[1].cost):
-        once.setdefault(frozenset((pair[0].key, pair[1].component.key)), pair)
-    return list(once.values())
+        unique.setdefault(frozenset((pair[0].key, pair[1].component.key)), pair)
+    return list(unique.values())
 
 
-def _step_both(problem: InferenceProblem, component: Component, both: Start) -> tuple[Component, Start]:
-    """Step one cause of a pair to better places, and then the other."""
+def _step_both(problem: InferenceProblem, component: Component, start: Start) -> tuple[Component, Start]:
+    """Step one component of a pair to better locations, and then the other."""
     for _ in range(2):
-        both = step_to_neighbours(problem, (component,), both)
+        start = step_to_neighbours(problem, (component,), start)
         count = len(problem.make_hypothesis((component,)).parameters)
-        turned = np.concatenate([both.values[count:], both.values[:count]])
-        component, both = both.component, Start(component=component, values=turned, cost=both.cost)
-    return component, both
+        exchanged = np.concatenate([start.values[count:], start.values[:count]])
+        component, start = start.component, Start(component=component, values=exchanged, cost=start.cost)
+    return component, start
 
 
 def _find_companions(problem: InferenceProblem, start: Start) -> list[Start]:
-    """Find what explains most beside a cause, far from the axis."""
+    """Find what explains most beside a component, far from the axis."""
     base = _evaluate_unfitted(problem, start.component, start.values)
-    starts = [one for one in scan_globally(problem, base) if one.component.key != start.component.key]
+    starts = [candidate for candidate in scan_globally(problem, base) if candidate.component.key != start.component.key]
     weights = compute_weights(problem.coarse, REFINED_ERROR)
-    found = []
-    for one in sorted(select_apart(starts, LOCATIONS_PER_EFFECT), key=lambda one: one.cost)[:N_COMPANIONS]:
-        hypothesis = problem.make_hypothesis((start.component, one.component))
-        values, cost = refine(hypothesis, problem.coarse, weights, np.concatenate([base.values, one.values]))
-        found.append(Start(component=one.component, values=values, cost=cost))
-    return found
+    companions = []
+    for candidate in sorted(select_apart(starts, LOCATIONS_PER_EFFECT), key=lambda candidate: candidate.cost)[
+        :N_COMPANIONS
+    ]:
+        hypothesis = problem.make_hypothesis((start.component, candidate.component))
+        values, cost = refine(hypothesis, problem.coarse, weights, np.concatenate([base.values, candidate.values]))
+        companions.append(Start(component=candidate.component, values=values, cost=cost))
+    return companions
 
 
 def _evaluate_unfitted(problem: InferenceProblem, component: Component, values: FloatArray) -> Fit:
-    """Take a cause with the values that it has beside another one."""
+    """Evaluate a component with the values that it has beside another one."""
     return fit_map(problem.make_hypothesis((component,)), problem.rough_data, values, iterations=0)
 
 
 def _exchange_and_step(problem: InferenceProblem, fit: Fit) -> Fit:
-    """Exchange the two causes and step the new last one to better places."""
-    return max(_step_last(problem, _exchange(problem, fit)), key=lambda one: one.log_evidence)
+    """Exchange the two components and step the new last one to better locations."""
+    return max(_step_last(problem, _exchange(problem, fit)), key=lambda candidate: candidate.log_evidence)
 
 
 def _step_in_turn(problem: InferenceProblem, fit: Fit) -> Fit:
-    """Step both causes in turn until neither gains."""
-    vain = 0
+    """Step both components in turn until neither gains."""
+    n_vain = 0
     for _ in range(MAX_TURNS):
         better = _exchange_and_step(problem, fit)
-        vain = vain + 1 if better.log_evidence < fit.log_evidence + GAIN else 0
+        n_vain = n_vain + 1 if better.log_evidence < fit.log_evidence + GAIN else 0
         fit = better
-        if vain == len(fit.hypothesis.components):
+        if n_vain == len(fit.hypothesis.components):
             break
     return fit
 
 
 def _exchange(problem: InferenceProblem, fit: Fit) -> Fit:
-    """Exchange the two causes."""
+    """Exchange the two components."""
     hypothesis, count = fit.hypothesis, fit.hypothesis.counts[0]
     values = np.concatenate([fit.values[count:], fit.values[:count]])
     components = hypothesis.components[::-1]
@@ -262,7 +260,7 @@ def _exchange(problem: InferenceProblem, fit: Fit) -> Fit:
 
 
 def _step_last(problem: InferenceProblem, pair: Fit) -> list[Fit]:
-    """Step the last cause of a pair to better places; the pair is among what is given."""
+    """Step the last component of a pair to better locations; the pair itself is among the fits."""
     hypothesis = pair.hypothesis
     first = _evaluate_unfitted(problem, hypothesis.components[0], pair.values[: hypothesis.counts[0]])
     fits: Fits = {hypothesis.components[-1].key: pair}

@@ -27,23 +27,23 @@ STEP = 1e-4  # of the logarithm of a parameter, for its derivative
 LONGEST_STEP = 0.5
 MAX_DAMPING = 1e4
 MIN_GAIN = 0.01  # change of the robust misfit
-REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the wide search
+REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the global scan
 LOCATIONS_PER_EFFECT = 3  # of an effect that are refined
-N_STEPPED, COST_RATIO = 8, 4.0  # hypotheses whose neighbours are looked at far from the axis, and times the best cost
-N_STEPPED_HALFWAY = 3  # the same half-way to the axis
-NEIGHBOURHOOD = 2  # nodes or elements: places so near count as one there
+N_STEPPED, COST_RATIO = 8, 4.0  # hypotheses whose neighbours are tried far from the axis, and times the best cost
+N_STEPPED_HALFWAY = 3  # hypotheses whose neighbours are tried half-way to the axis
+NEIGHBOURHOOD = 2  # nodes or elements: locations so near are not distinguished there
 MAX_STEPS = 12
-GAIN = 0.5  # nats: a neighbour must be better by that
+GAIN = 0.5  # of the robust misfit: a neighbour must be better by that
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """Where a fit may begin.
+    """Values to start a fit from.
 
     Parameters
     ----------
-    component : Cause
-        Effect and place.
+    component : Component
+        Effect and location.
     values : (n_parameters,) array
         Physical values of its parameters.
     cost : float
@@ -68,7 +68,7 @@ def compute_robust_misfit(misfit: ComplexArray, weights: FloatArray) -> float:
     Returns
     -------
     float
-        nats.
+        Minus a robust log-likelihood.
     """
     return float(np.sum(np.log1p(np.sum(weights * np.abs(misfit) ** 2, 1))))
 
@@ -86,7 +86,7 @@ def refine(
     Parameters
     ----------
     hypothesis : Hypothesis
-        Causes at their places.
+        Components at their locations.
     measured : TransferFunctions
         Transfer functions far from the axis.
     weights : (n_points, n_frfs) array
@@ -94,12 +94,12 @@ def refine(
     values : (n_parameters,) array
         Physical values to start from.
     iterations : int
-        At most that many.
+        At most so many.
 
     Returns
     -------
     values : (n_parameters,) array
-        Better ones.
+        Improved ones.
     misfit : float
         Robust misfit there.
     """
@@ -153,132 +153,134 @@ def _normal_equations(
 
 
 StartBeside: TypeAlias = tuple[tuple[Component, ...], Start]
-"""What is supposed already, and one more cause with the values of all."""
+"""Components that are fitted already, and one more with the values of all."""
 
 
 def refine_starts(problem: InferenceProblem, base: Fit, starts: Sequence[Start]) -> list[Start]:
-    """Refine the best starts of a wide search, and step to better places.
+    """Refine the best starts of a global scan, and step to better locations.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
     starts : sequence of Start
         By rising cost.
 
     Returns
     -------
     list of Start
-        With the values of all causes, by rising cost.
+        With the values of all components, by rising cost.
     """
     weights = compute_weights(problem.coarse, REFINED_ERROR)
-    found = []
+    refined = []
     for start in select_apart(starts, LOCATIONS_PER_EFFECT):
         hypothesis = problem.make_hypothesis((*base.hypothesis.components, start.component))
         values, cost = refine(hypothesis, problem.coarse, weights, np.concatenate([base.values, start.values]))
-        found.append(Start(component=start.component, values=values, cost=cost))
-    found.sort(key=lambda start: start.cost)
+        refined.append(Start(component=start.component, values=values, cost=cost))
+    refined.sort(key=lambda start: start.cost)
     stepped = [
         step_to_neighbours(problem, base.hypothesis.components, start)
-        for start in found[:N_STEPPED]
-        if start.cost < COST_RATIO * found[0].cost
+        for start in refined[:N_STEPPED]
+        if start.cost < COST_RATIO * refined[0].cost
     ]
     best: dict[tuple[object, ...], Start] = {}
-    for start in sorted([*stepped, *found[len(stepped) :]], key=lambda start: start.cost):
+    for start in sorted([*stepped, *refined[len(stepped) :]], key=lambda start: start.cost):
         best.setdefault(start.component.key, start)
     return list(best.values())
 
 
 def refine_halfway(problem: InferenceProblem, starts: Sequence[StartBeside]) -> list[StartBeside]:
-    """Bring starts half the way to the axis: their values, and the places of the best.
+    """Bring starts half the way to the axis: their values, and the locations of the best.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
-    starts : sequence of (tuple of Cause, Start)
-        Each with what is supposed besides.
+    starts : sequence of (tuple of Component, Start)
+        Each with the other components.
 
     Returns
     -------
-    list of (tuple of Cause, Start)
+    list of (tuple of Component, Start)
         By rising cost half-way.
     """
     weights = compute_weights(problem.middle, REFINED_ERROR)
-    closer = []
+    halfway = []
     for known, start in starts:
         values, cost = refine(problem.make_hypothesis((*known, start.component)), problem.middle, weights, start.values)
-        closer.append((known, Start(component=start.component, values=values, cost=cost)))
-    closer.sort(key=lambda one: one[1].cost)
-    best = [(known, _step(problem, known, start, problem.middle)) for known, start in closer[:N_STEPPED_HALFWAY]]
-    return sorted([*best, *closer[N_STEPPED_HALFWAY:]], key=lambda one: one[1].cost)
+        halfway.append((known, Start(component=start.component, values=values, cost=cost)))
+    halfway.sort(key=lambda entry: entry[1].cost)
+    best = [(known, _step(problem, known, start, problem.middle)) for known, start in halfway[:N_STEPPED_HALFWAY]]
+    return sorted([*best, *halfway[N_STEPPED_HALFWAY:]], key=lambda entry: entry[1].cost)
 
 
 def step_to_neighbours(problem: InferenceProblem, known: tuple[Component, ...], start: Start) -> Start:
-    """Step to neighbours far from the axis, where every step down leads on: near it, only the right place has a way.
+    """Step to neighbours far from the axis, where every step down leads on: near it, only the right location has a way.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
-    known : tuple of Cause
-        What is supposed besides, at the same places.
+    known : tuple of Component
+        The other components, at the same locations.
     start : Start
-        With the values of all.
+        With the values of all components.
 
     Returns
     -------
     Start
-        The same cause at a better place.
+        The same component at a better location.
     """
     return _step(problem, known, start, problem.coarse)
 
 
 def _step(problem: InferenceProblem, known: tuple[Component, ...], start: Start, measured: TransferFunctions) -> Start:
     weights = compute_weights(measured, REFINED_ERROR)
-    seen = {start.component.key}
+    tried = {start.component.key}
     for _ in range(MAX_STEPS):
-        better = start
+        best = start
         for location in start.component.effect.neighbours(problem.context, start.component.location):
             component = Component(
                 effect=start.component.effect, location=location, n_locations=start.component.n_locations
             )
             hypothesis = problem.make_hypothesis((*known, component))
-            if component.key in seen or len(hypothesis.parameters) != len(start.values):
+            if component.key in tried or len(hypothesis.parameters) != len(start.values):
                 continue
-            seen.add(component.key)
+            tried.add(component.key)
             values, cost = refine(hypothesis, measured, weights, start.values, iterations=3)
-            if cost < better.cost - GAIN:
-                better = Start(component=component, values=values, cost=cost)
-        if better is start:
+            if cost < best.cost - GAIN:
+                best = Start(component=component, values=values, cost=cost)
+        if best is start:
             break
-        start = better
+        start = best
     return start
 
 
-def select_apart(starts: Iterable[Start], each: int) -> list[Start]:
-    """Take the best places of each effect that are not beside each other.
+def select_apart(starts: Iterable[Start], per_effect: int) -> list[Start]:
+    """Select the best locations of each effect that are no neighbours of each other.
 
     Parameters
     ----------
     starts : iterable of Start
         By rising cost.
-    each : int
-        How many of each effect.
+    per_effect : int
+        Number of starts of each effect.
 
     Returns
     -------
     list of Start
-        Those taken, by effect.
+        The selected ones, by effect.
     """
-    taken: dict[str, list[Start]] = {}
+    selected: dict[str, list[Start]] = {}
     for start in starts:
-        mine = taken.setdefault(start.component.effect.name, [])
-        if len(mine) < each and not any(_are_neighbours(start.component, other.component) for other in mine):
-            mine.append(start)
-    return [start for mine in taken.values() for start in mine]
+        of_effect = selected.setdefault(start.component.effect.name, [])
+        if len(of_effect) < per_effect and not any(
+            _are_neighbours(start.component, selected_start.component) for selected_start in of_effect
+        ):
+            of_effect.append(start)
+    return [start for of_effect in selected.values() for start in of_effect]
 
 
 def _are_neighbours(first: Component, second: Component) -> bool:
@@ -286,5 +288,5 @@ def _are_neighbours(first: Component, second: Component) -> bool:
         return False
     pairs = list(zip(first.location.key, second.location.key, strict=True))
     numbers = [abs(a - b) for a, b in pairs if isinstance(a, int) and isinstance(b, int)]
-    others_agree = all(a == b for a, b in pairs if not (isinstance(a, int) and isinstance(b, int)))
-    return others_agree and bool(numbers) and max(numbers) <= NEIGHBOURHOOD
+    rest_agrees = all(a == b for a, b in pairs if not (isinstance(a, int) and isinstance(b, int)))
+    return rest_agrees and bool(numbers) and max(numbers) <= NEIGHBOURHOOD

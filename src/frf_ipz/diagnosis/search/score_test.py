@@ -1,7 +1,7 @@
-"""Search for small effects on top of a fit that is nearly right: what each promises beyond what scatter can explain.
+"""Score test of small effects on a fit that is nearly right: what each promises beyond what the nuisance explains.
 
 A small effect changes the FRFs in proportion to its size, so that one projection gives the best size and the evidence
-of each, at every place. The signatures of effects that are one dynamic stiffness on one motion are weighed together.
+of each, at every location. The signatures of effects that are one dynamic stiffness on one motion are scored together.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.model.response import Response
 
-BATCH_SIZE = 600  # signatures that are weighed together
+BATCH_SIZE = 600  # signatures that are scored together
 SMALL_STEP = 1e-5  # of a neutral value, or of a range: so near, everything is linear
-MAX_SCALING = 3.0  # times the size that a sketch was drawn for, where its sizes are fixed
-VANISHING_RATIO = 1.5  # times: of the double the FRFs change by more, if an effect vanishes with its parameter
+MAX_SCALING = 3.0  # times the size that a signature stands for, where its sizes are fixed
+VANISHING_RATIO = 1.5  # times: the FRFs change by more at the doubled parameter, if an effect vanishes with it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ScoreTest:
-    """Weighs misfits by what scatter cannot explain.
+    """Scores changes of the FRFs on top of a fit, projected on what the nuisance cannot explain.
 
     Parameters
     ----------
     problem : InferenceProblem
-        The data.
+        Model and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
     data : Data
-        What misfits are of.
+        What is scored against.
     misfit : (n_data,) array
-        Whitened misfit of the base, as it would be without scatter.
+        Whitened misfit of the base, as it would be without its nuisance.
     columns : (n_data, n_nuisance) array
-        Whitened derivatives of the FRFs by the pulls of what cannot be known.
+        Whitened derivatives of the FRFs by the whitened nuisance parameters.
     factor : (n_nuisance, n_nuisance) array
         Lower Cholesky factor of their curvature with its prior.
     whitened_nuisance : (n_nuisance,) array
@@ -65,17 +65,17 @@ class ScoreTest:
     response: Response
 
     def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
-        """Change of the FRFs by some values, scatter as in the base."""
+        """Change of the FRFs by some values, with the nuisance of the base."""
         searched = hypothesis.clip_to_searched(np.concatenate([self.base.values, values]))
         response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, self.data.measured.s)
         return np.asarray(response.values - self.response.values)
 
-    def at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
-        """Half the fall of the sum of squares at some values, nats."""
+    def gain_at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
+        """Gain in log-likelihood at some values: half the fall of the sum of squares."""
         misfit = self._misfit(hypothesis, hypothesis.clip_to_searched(np.concatenate([self.base.values, values])))
         return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
 
-    def weigh(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    def score_changes(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """Find the best sizes of changes, and the gain of each.
 
         Parameters
@@ -86,24 +86,26 @@ class ScoreTest:
         Returns
         -------
         sizes, gains : (n,) array
-            Sizes may be negative; gains in nats.
+            Sizes may be negative; gains in log-likelihood.
         """
         white = self.data.slopes(self.response, changes)
-        seen = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
-        known = linalg.solve_triangular(self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False)
-        squares = np.maximum(np.sum(white**2, 0) - np.sum(seen**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
-        across = self.misfit @ white - known @ seen
-        return across / squares, 0.5 * across**2 / squares
+        explained = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
+        misfit_explained = linalg.solve_triangular(
+            self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False
+        )
+        squares = np.maximum(np.sum(white**2, 0) - np.sum(explained**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
+        products = self.misfit @ white - misfit_explained @ explained
+        return products / squares, 0.5 * products**2 / squares
 
     def _misfit(self, hypothesis: Hypothesis, searched: FloatArray) -> FloatArray:
-        """Whitened misfit, as it would be without scatter."""
+        """Whitened misfit, as it would be without the nuisance."""
         data = self.data
         response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, data.measured.s)
         return data.misfit(response) + self.columns @ self.whitened_nuisance
 
-    def _square(self, one: FloatArray, other: FloatArray) -> float:
-        seen = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (one, other)]
-        return float(one @ other - seen[0] @ seen[1])
+    def _square(self, first: FloatArray, second: FloatArray) -> float:
+        explained = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (first, second)]
+        return float(first @ second - explained[0] @ explained[1])
 
 
 def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:
@@ -112,16 +114,16 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
     Parameters
     ----------
     problem : InferenceProblem
-        What is tested.
+        Model and effects.
     base : Fit
-        What is supposed already.
+        The fit to build on.
     data : Data
-        What misfits are of.
+        What is scored against.
 
     Returns
     -------
     ScoreTest
-        For any further cause.
+        For any further component.
     """
     response = base.hypothesis.respond(base.values, base.nuisance, data.measured.s)
     jacobian = nuisance_jacobian(response, problem.nuisance_prior, problem.context.layout)
@@ -140,70 +142,70 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
 
 
 def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
-    """Look for small effects.
+    """Score all effects at all locations as small ones.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and effects.
     base : Fit
-        What is supposed already, nearly right.
+        The fit to build on, nearly right.
 
     Returns
     -------
     list of Start
-        The best values of each cause, the most promising first; the cost is minus the gain in nats.
+        The best values of each component, the most promising first; the cost is minus the gain in log-likelihood.
     """
-    score = prepare_score_test(problem, base, problem.sparse_data)
+    test = prepare_score_test(problem, base, problem.sparse_data)
     context = replace(problem.context, contour=problem.sparse_data.measured.s)
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
     signatures = [component.effect.signature(context, component.location) for component in components]
-    drawn = [
+    signed = [
         (component, signature)
         for component, signature in zip(components, signatures, strict=True)
         if signature is not None
     ]
     response = base.hypothesis.respond(base.values, base.nuisance, context.contour)
-    found = _score_signatures(score, response, drawn)
-    found += [
-        _score_directly(score, component)
+    starts = _score_signatures(test, response, signed)
+    starts += [
+        _score_directly(test, component)
         for component, signature in zip(components, signatures, strict=True)
         if signature is None
     ]
-    return sorted(found, key=lambda start: start.cost)
+    return sorted(starts, key=lambda start: start.cost)
 
 
-def _score_signatures(score: ScoreTest, response: Response, drawn: list[tuple[Component, Signature]]) -> list[Start]:
-    """Weigh all shapes of all sketches; keep the best of each."""
+def _score_signatures(test: ScoreTest, response: Response, signed: list[tuple[Component, Signature]]) -> list[Start]:
+    """Score all shapes of all signatures; keep the best of each."""
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
-    for first in range(0, len(drawn), MOTIONS_AT_ONCE):
-        some = drawn[first : first + MOTIONS_AT_ONCE]
-        motions = np.stack([signature.motion for _, signature in some], 1)
-        hypothesis = score.base.hypothesis
+    for first in range(0, len(signed), MOTIONS_AT_ONCE):
+        group = signed[first : first + MOTIONS_AT_ONCE]
+        motions = np.stack([signature.motion for _, signature in group], 1)
+        hypothesis = test.base.hypothesis
         layout = hypothesis.context.layout
-        across = evaluate_receptances(response, hypothesis.basis, layout, motions, np.zeros(len(some))).across
-        for column, (_, signature) in enumerate(some):
+        across = evaluate_receptances(response, hypothesis.basis, layout, motions, np.zeros(len(group))).across
+        for column, (_, signature) in enumerate(group):
             for shape, curve in enumerate(signature.shapes):
                 batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))
                 if len(batch) == BATCH_SIZE:
-                    _score_batch(score, drawn, batch, best)
+                    _score_batch(test, signed, batch, best)
                     batch = []
     if batch:
-        _score_batch(score, drawn, batch, best)
+        _score_batch(test, signed, batch, best)
     return list(best.values())
 
 
 def _score_batch(
-    score: ScoreTest,
-    drawn: list[tuple[Component, Signature]],
+    test: ScoreTest,
+    signed: list[tuple[Component, Signature]],
     batch: list[tuple[int, int, ComplexArray]],
     best: dict[int, Start],
 ) -> None:
-    sizes, gains = score.weigh(np.stack([change for _, _, change in batch], 2))
+    sizes, gains = test.score_changes(np.stack([change for _, _, change in batch], 2))
     for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):
         if size > 0 and (index not in best or -gain < best[index].cost):
-            component, signature = drawn[index]
+            component, signature = signed[index]
             values = signature.values[shape].copy()
             if signature.amplitudes is not None and len(signature.amplitudes) == 1:
                 values = 1 + (values - 1) * min(size, MAX_SCALING)
@@ -212,24 +214,24 @@ def _score_batch(
             best[index] = Start(component=component, values=values, cost=-gain)
 
 
-def _score_directly(score: ScoreTest, component: Component) -> Start:
-    """Take the first parameter away from where the effect vanishes, by as much as explains most."""
-    hypothesis = score.problem.make_hypothesis((*score.base.hypothesis.components, component), exact=False)
+def _score_directly(test: ScoreTest, component: Component) -> Start:
+    """Move the first parameter away from where the effect vanishes, by as much as explains most."""
+    hypothesis = test.problem.make_hypothesis((*test.base.hypothesis.components, component), exact=False)
     if not hypothesis.counts[-1]:
-        return Start(component=component, values=np.zeros(0), cost=-score.at(hypothesis, np.zeros(0)))
-    first, *others = hypothesis.parameters[len(score.base.values) :]
-    rest = [float(np.sqrt(parameter.low * parameter.high)) for parameter in others]
+        return Start(component=component, values=np.zeros(0), cost=-test.gain_at(hypothesis, np.zeros(0)))
+    first, *further = hypothesis.parameters[len(test.base.values) :]
+    further_values = [float(np.sqrt(parameter.low * parameter.high)) for parameter in further]
     neutral, values = _smallest_values(first)
     is_between = first.low < first.neutral < first.high
-    changed = score.change(hypothesis, np.array([values, *rest]))
+    changed = test.change(hypothesis, np.array([values, *further_values]))
     if is_between:
-        changed = changed - score.change(hypothesis, np.array([neutral, *rest]))
+        changed = changed - test.change(hypothesis, np.array([neutral, *further_values]))
     elif not _vanishes_with_parameter(
-        changed, score.change(hypothesis, np.array([_double_effect(first, values), *rest]))
+        changed, test.change(hypothesis, np.array([_double_effect(first, values), *further_values]))
     ):
-        middle = np.array([float(np.sqrt(first.low * first.high)), *rest])
-        return Start(component=component, values=middle, cost=-score.at(hypothesis, middle))
-    sizes, gains = score.weigh(changed[:, :, None])
+        middle = np.array([float(np.sqrt(first.low * first.high)), *further_values])
+        return Start(component=component, values=middle, cost=-test.gain_at(hypothesis, middle))
+    sizes, gains = test.score_changes(changed[:, :, None])
     size, gain = float(sizes[0]), float(gains[0])
     if is_between:
         step = size * (values - neutral)
@@ -241,13 +243,15 @@ def _score_directly(score: ScoreTest, component: Component) -> Start:
     else:
         value = values * size if first.neutral == 0 else values / size
     return Start(
-        component=component, values=np.array([float(np.clip(value, first.low, first.high)), *rest]), cost=-gain
+        component=component,
+        values=np.array([float(np.clip(value, first.low, first.high)), *further_values]),
+        cost=-gain,
     )
 
 
-def _vanishes_with_parameter(change: ComplexArray, of_twice: ComplexArray) -> bool:
-    """Whether an effect vanishes with its parameter; a sensor that is turned round does not."""
-    return bool(np.linalg.norm(of_twice) > VANISHING_RATIO * np.linalg.norm(change))
+def _vanishes_with_parameter(change: ComplexArray, doubled_change: ComplexArray) -> bool:
+    """Whether an effect vanishes with its parameter; a sensor of the wrong sign does not."""
+    return bool(np.linalg.norm(doubled_change) > VANISHING_RATIO * np.linalg.norm(change))
 
 
 def _double_effect(parameter: Parameter, value: float) -> float:

@@ -1,4 +1,4 @@
-"""One cause, a few, or none: searches until what is left is no more than noise and tolerances, and decides."""
+"""The decision: searches for components until no more than noise and tolerances remain, and gives the verdict."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
 
-STRAINED_SCORE = 0.75  # score of a cause that explains, but may stand for two others: 3 of 89 single ones had more
+STRAINED_SCORE = 0.75  # score of a component that explains, but may stand for two others: 3 of 89 single ones had more
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Decision:
-    """What the search came to.
+    """The verdict of a search, and the fits that it rests on.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ class Decision:
     null, final : Fit
         Of the nominal model with what its tolerances allow, and with what was found.
     ranking : Ranking
-        Of one cause.
+        Of one component.
     further_rankings : tuple of Ranking
-        Of each further cause beside its base, where several were found.
+        Of each further component beside its base, where several were found.
     goodness, null_goodness : Goodness
         Of what was found, and of the nominal model.
     unnamed_force : Fit, optional
-        Of a force of another kind that explains more than what was found.
+        Of a force outside the catalogue that explains more than what was found.
     """
 
     verdict: str
@@ -68,7 +68,7 @@ def decide(problem: InferenceProblem, progress: Progress) -> Decision:
     problem : InferenceProblem
         Data, model and effects.
     progress : Progress
-        Told how far it is.
+        Receives the progress.
 
     Returns
     -------
@@ -78,16 +78,16 @@ def decide(problem: InferenceProblem, progress: Progress) -> Decision:
     progress(0.2, "fitting the nominal model")
     null = fit_null_model(problem)
     null_goodness = assess_goodness(problem, null)
-    progress(0.3, "searching for one cause")
+    progress(0.3, "searching for one effect")
     ranking = search_component(problem, null)
-    needed = _required_log_bayes_factor(problem, null_goodness, ranking.best)
-    if not null_goodness.is_good or log_bayes_factor(ranking.best, null) >= needed:
+    required = _required_log_bayes_factor(problem, null_goodness, ranking.best)
+    if not null_goodness.is_good or log_bayes_factor(ranking.best, null) >= required:
         ranking = rescore_ambiguity_set(problem, ranking)
     if ranking.best.explains_nearly_all and not assess_goodness(problem, ranking.best).is_good:
         ranking = rescore_ambiguity_set(problem, fit_distant_locations(problem, ranking))
     best = ranking.best
     goodness = assess_goodness(problem, best)
-    one = Decision(
+    first = Decision(
         verdict=EXPLAINED,
         null=null,
         final=best,
@@ -96,92 +96,93 @@ def decide(problem: InferenceProblem, progress: Progress) -> Decision:
         goodness=goodness,
         null_goodness=null_goodness,
     )
-    if null_goodness.is_good and (log_bayes_factor(best, null) < needed or not is_significant(best, -1)):
-        return replace(one, verdict=CONSISTENT, final=null, goodness=null_goodness)
-    progress(0.6, "searching for a second cause")
+    if null_goodness.is_good and (log_bayes_factor(best, null) < required or not is_significant(best, -1)):
+        return replace(first, verdict=CONSISTENT, final=null, goodness=null_goodness)
+    progress(0.6, "searching for a second effect")
     if goodness.is_good:
-        return _accept_first(problem, one)
+        return _accept_first(problem, first)
     second = _search_pair(problem, ranking)
-    two = _accept_further(problem, one, second)
-    if two is None:
-        return replace(one, verdict=UNEXPLAINED, final=best if log_bayes_factor(best, null) > needed else null)
-    alone = _drop_needless(problem, one, two.final)
-    if alone is not None:
-        return alone
+    pair_decision = _accept_further(problem, first, second)
+    if pair_decision is None:
+        return replace(first, verdict=UNEXPLAINED, final=best if log_bayes_factor(best, null) > required else null)
+    single = _drop_needless(problem, first, pair_decision.final)
+    if single is not None:
+        return single
     if (
-        two.verdict == EXPLAINED
-        or not two.final.is_nearly_right
+        pair_decision.verdict == EXPLAINED
+        or not pair_decision.final.is_nearly_right
         or log_bayes_factor(second.best, second.base) < STRONG_LOG_BAYES_FACTOR
     ):
-        return two
-    progress(0.8, "searching for a third cause")
-    three = _accept_further(problem, two, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR))
-    return three if three is not None and three.verdict == EXPLAINED else two
+        return pair_decision
+    progress(0.8, "searching for a third effect")
+    third = _accept_further(
+        problem, pair_decision, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR)
+    )
+    return third if third is not None and third.verdict == EXPLAINED else pair_decision
 
 
 def _required_log_bayes_factor(problem: InferenceProblem, null_goodness: Goodness, best: Fit) -> float:
-    """Evidence that a first cause must have: where it leaves less of a piece, errors there are not underrated."""
-    left = assess_goodness(problem, best).error_underestimation
-    return null_goodness.required_log_bayes_factor * min(1.0, left / null_goodness.error_underestimation)
+    """Log Bayes factor that a first component needs; less where it explains the worst subband of the nominal model."""
+    underestimation = assess_goodness(problem, best).error_underestimation
+    return null_goodness.required_log_bayes_factor * min(1.0, underestimation / null_goodness.error_underestimation)
 
 
-def _accept_first(problem: InferenceProblem, one: Decision) -> Decision:
-    """Take a cause that leaves nothing to explain, if it explains anything, and what explains much beside it."""
-    least = min(
-        FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor
-    )  # the nominal model does not explain: what is likelier does
-    if not one.null_goodness.is_good and log_bayes_factor(one.final, one.null) < least:
-        return replace(one, verdict=UNEXPLAINED, final=one.null, goodness=one.null_goodness)
+def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
+    """Accept a component that leaves nothing to explain, if it explains anything, and what explains much beside it."""
+    # the nominal model does not explain: what is likelier does
+    required = min(FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor)
+    if not first.null_goodness.is_good and log_bayes_factor(first.final, first.null) < required:
+        return replace(first, verdict=UNEXPLAINED, final=first.null, goodness=first.null_goodness)
     second = rescore_ambiguity_set(
-        problem, search_small_component(problem, one.final, LIMITS[problem.kind].beside_log_bayes_factor)
+        problem, search_small_component(problem, first.final, LIMITS[problem.kind].beside_log_bayes_factor)
     )
-    two = _accept_further(problem, one, second)
-    if two is None and one.goodness.score > STRAINED_SCORE:
-        two = _accept_further(problem, one, _search_pair(problem, one.ranking))
-    return two or one
+    pair_decision = _accept_further(problem, first, second)
+    if pair_decision is None and first.goodness.score > STRAINED_SCORE:
+        pair_decision = _accept_further(problem, first, _search_pair(problem, first.ranking))
+    return pair_decision or first
 
 
 def _search_pair(problem: InferenceProblem, ranking: Ranking) -> Ranking:
-    """Search for two causes of which neither need be the best one alone."""
+    """Search for two components of which neither need be the best one alone."""
     return rescore_ambiguity_set(
         problem, search_pair(problem, ranking, lambda fit: assess_goodness(problem, fit).is_good)
     )
 
 
-def _drop_needless(problem: InferenceProblem, one: Decision, both: Fit) -> Decision | None:
-    """Leave out a cause beside which the other one explains as much: it only helped to find it."""
+def _drop_needless(problem: InferenceProblem, first: Decision, pair_fit: Fit) -> Decision | None:
+    """Drop a component beside which the other one explains as much: it only helped to find it."""
     for number in range(2):
-        alone = fit_without_component(problem, both, number)
-        goodness = assess_goodness(problem, alone)
-        if goodness.is_good and log_bayes_factor(both, alone) <= LIMITS[problem.kind].beside_log_bayes_factor:
-            fits = tuple(sorted((alone, *one.ranking.fits), key=lambda fit: -fit.log_evidence))
-            return replace(one, final=alone, ranking=replace(one.ranking, fits=fits), goodness=goodness)
+        single = fit_without_component(problem, pair_fit, number)
+        goodness = assess_goodness(problem, single)
+        if goodness.is_good and log_bayes_factor(pair_fit, single) <= LIMITS[problem.kind].beside_log_bayes_factor:
+            fits = tuple(sorted((single, *first.ranking.fits), key=lambda fit: -fit.log_evidence))
+            return replace(first, final=single, ranking=replace(first.ranking, fits=fits), goodness=goodness)
     return None
 
 
-def _accept_further(problem: InferenceProblem, found: Decision, ranking: Ranking) -> Decision | None:
-    """Take a further cause, if it explains much."""
+def _accept_further(problem: InferenceProblem, decision: Decision, ranking: Ranking) -> Decision | None:
+    """Accept a further component, if it explains much."""
     if not ranking.fits:
         return None
     goodness, limits = assess_goodness(problem, ranking.best), LIMITS[problem.kind]
-    gain = ranking.best_evidence - max(found.final.log_evidence, found.null.log_evidence)
-    needed = limits.second_log_bayes_factor if goodness.is_good else PARTIAL_LOG_BAYES_FACTOR
-    if found.goodness.is_good:
-        needed = found.goodness.error_underestimation * limits.beside_log_bayes_factor
-    if gain <= needed or goodness.score >= max(found.goodness.score, 1.0):
+    gain = ranking.best_evidence - max(decision.final.log_evidence, decision.null.log_evidence)
+    required = limits.second_log_bayes_factor if goodness.is_good else PARTIAL_LOG_BAYES_FACTOR
+    if decision.goodness.is_good:
+        required = decision.goodness.error_underestimation * limits.beside_log_bayes_factor
+    if gain <= required or goodness.score >= max(decision.goodness.score, 1.0):
         return None
     verdict = EXPLAINED if goodness.is_good else UNEXPLAINED
     return replace(
-        found,
+        decision,
         verdict=verdict,
         final=ranking.best,
-        further_rankings=(*found.further_rankings, ranking),
+        further_rankings=(*decision.further_rankings, ranking),
         goodness=goodness,
     )
 
 
 def decide_without_search(problem: InferenceProblem) -> Decision:
-    """Fit the nominal model and search for nothing.
+    """Decide by a fit of the nominal model alone.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def decide_without_search(problem: InferenceProblem) -> Decision:
     Returns
     -------
     Decision
-        Without a cause: consistent, or unexplained.
+        Without a component: consistent, or unexplained.
     """
     null = fit_null_model(problem)
     goodness = assess_goodness(problem, null)
@@ -208,42 +209,44 @@ def decide_without_search(problem: InferenceProblem) -> Decision:
     )
 
 
-def drop_last_component(problem: InferenceProblem, found: Decision) -> Decision:
-    """Leave out the last cause.
+def drop_last_component(problem: InferenceProblem, decision: Decision) -> Decision:
+    """Drop the last component.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and model.
-    found : Decision
-        With one cause or more.
+    decision : Decision
+        With one component or more.
 
     Returns
     -------
     Decision
-        Unexplained, with one cause less.
+        Unexplained, with one component less.
     """
-    left = found.further_rankings[:-1]
-    fit = left[-1].best if left else found.ranking.best if found.further_rankings else found.null
-    return replace(found, verdict=UNEXPLAINED, final=fit, further_rankings=left, goodness=assess_goodness(problem, fit))
+    rankings = decision.further_rankings[:-1]
+    fit = rankings[-1].best if rankings else decision.ranking.best if decision.further_rankings else decision.null
+    return replace(
+        decision, verdict=UNEXPLAINED, final=fit, further_rankings=rankings, goodness=assess_goodness(problem, fit)
+    )
 
 
 def fit_without_component(problem: InferenceProblem, fit: Fit, number: int) -> Fit:
-    """Fit all causes of a fit but one: what that one explains beside the others.
+    """Fit all components of a fit but one: what that one explains beside the others.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and model.
     fit : Fit
-        With several causes.
+        With several components.
     number : int
-        Which one is left out.
+        Index of the one that is left out.
 
     Returns
     -------
     Fit
-        With one cause less.
+        With one component less.
     """
     counts = fit.hypothesis.counts
     start = sum(counts[:number])
@@ -255,9 +258,9 @@ def fit_without_component(problem: InferenceProblem, fit: Fit, number: int) -> F
     if log_bayes_factor(fit, from_there) <= PARTIAL_LOG_BAYES_FACTOR:
         return from_there
     anew = problem.fit(components, values)
-    return max(from_there, anew, key=lambda one: one.log_evidence)
+    return max(from_there, anew, key=lambda candidate: candidate.log_evidence)
 
 
 def log_bayes_factor(fit: Fit, base: Fit) -> float:
-    """Give the evidence of a fit over that of another, nats."""
+    """Give the log Bayes factor of a fit over another one."""
     return fit.log_evidence - base.log_evidence

@@ -1,4 +1,4 @@
-"""Findings from fits: which effects are how probable, at which places, with which numbers."""
+"""Findings from fits: effects with their probability, locations and parameters."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
 
 NORMAL_95 = 1.96
-LISTED_PROBABILITY = 0.95  # probability that the listed places hold
+LISTED_PROBABILITY = 0.95  # probability that the listed locations hold
 MAX_LOCATIONS = 12
 INSIGNIFICANT_RATIO = 2.0  # times a tolerance: a user's tolerances are half widths, not standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RankedEffect:
-    """An effect, with all its places weighed together.
+    """An effect with all its locations together.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class RankedEffect:
     probability : float
         Of the effect, among all effects.
     shares : tuple of float
-        Probability of each place, if it is this effect.
+        Probability of each location, if it is this effect.
     """
 
     fits: tuple[Fit, ...]
@@ -42,7 +42,7 @@ class RankedEffect:
 
     @property
     def best(self) -> Fit:
-        """The fit at the most probable place."""
+        """The fit at the most probable location."""
         return self.fits[0]
 
     @property
@@ -57,9 +57,9 @@ def rank_effects(fits: Sequence[Fit], scale: float) -> list[RankedEffect]:
     Parameters
     ----------
     fits : sequence of Fit
-        Each with one cause more than is known.
+        Each with one component more than their base.
     scale : float
-        What differences of evidence are divided by: more than 1 where the best fit leaves more than noise.
+        Divisor of differences of log evidence: more than 1 where the best fit leaves more than noise.
 
     Returns
     -------
@@ -69,23 +69,23 @@ def rank_effects(fits: Sequence[Fit], scale: float) -> list[RankedEffect]:
     if not fits:
         return []
     top = max(fit.log_evidence for fit in fits)
-    found = []
+    groups = []
     for group in group_by_effect(fits):
         weights = np.exp(np.maximum((np.array([fit.log_evidence for fit in group]) - top) / scale, -700.0))
-        found.append((group, float(weights.sum()), tuple((weights / weights.sum()).tolist())))
-    total = sum(weight for _, weight, _ in found)
-    return [RankedEffect(fits=group, probability=weight / total, shares=shares) for group, weight, shares in found]
+        groups.append((group, float(weights.sum()), tuple((weights / weights.sum()).tolist())))
+    total = sum(weight for _, weight, _ in groups)
+    return [RankedEffect(fits=group, probability=weight / total, shares=shares) for group, weight, shares in groups]
 
 
-def make_finding(weighed: RankedEffect, gain: float, scale: float) -> Finding:
-    """Describe the newest cause of a fit.
+def make_finding(ranked_effect: RankedEffect, gain: float, scale: float) -> Finding:
+    """Describe the newest component of a fit.
 
     Parameters
     ----------
-    weighed : RankedEffect
+    ranked_effect : RankedEffect
         The effect.
     gain : float
-        Its evidence over that without it, nats.
+        Its log Bayes factor over the fit without it.
     scale : float
         As for `rank_effects`: intervals grow with its root.
 
@@ -95,28 +95,28 @@ def make_finding(weighed: RankedEffect, gain: float, scale: float) -> Finding:
         To report.
     """
     return describe_component(
-        weighed.best,
+        ranked_effect.best,
         -1,
-        weighed.probability,
+        ranked_effect.probability,
         gain,
         scale,
-        location_set=_location_set(weighed),
-        across=_variance_across_locations(weighed),
+        location_set=_location_set(ranked_effect),
+        across=_variance_across_locations(ranked_effect),
     )
 
 
-def _variance_across_locations(weighed: RankedEffect) -> FloatArray:
-    """Variance, as searched, of the newest cause's parameters from place to place: the place is not certain either."""
-    count = weighed.best.hypothesis.counts[-1]
-    own = [
+def _variance_across_locations(ranked_effect: RankedEffect) -> FloatArray:
+    """Variance of the newest component's parameters, in search coordinates, over its possible locations."""
+    count = ranked_effect.best.hypothesis.counts[-1]
+    values_at = [
         (share, fit.hypothesis.clip_to_searched(fit.values)[len(fit.values) - count :])
-        for fit, share in zip(weighed.fits, weighed.shares, strict=True)
+        for fit, share in zip(ranked_effect.fits, ranked_effect.shares, strict=True)
         if fit.hypothesis.counts[-1] == count and count
     ]
-    if not own:
+    if not values_at:
         return np.zeros(count)
-    off = np.array([values - own[0][1] for _, values in own])
-    return np.asarray(np.array([share for share, _ in own]) @ off**2)
+    deviations = np.array([values - values_at[0][1] for _, values in values_at])
+    return np.asarray(np.array([share for share, _ in values_at]) @ deviations**2)
 
 
 def describe_component(
@@ -129,24 +129,24 @@ def describe_component(
     location_set: tuple[dict[str, object], ...],
     across: FloatArray | float = 0.0,
 ) -> Finding:
-    """Describe one cause of a fit.
+    """Describe one component of a fit.
 
     Parameters
     ----------
     fit : Fit
-        With one or more causes.
+        With one or more components.
     which : int
-        Index of the cause.
+        Index of the component.
     probability : float
         Of the effect.
     gain : float
-        Its evidence over that without it, nats.
+        Its log Bayes factor over the fit without it.
     scale : float
         Intervals grow with its root.
     location_set : tuple of dict
-        Where else it could be, the most probable first.
+        Its possible locations, the most probable first.
     across : (n_parameters,) array or float
-        Variance of its parameters, as searched, from place to place.
+        Variance of its parameters over its possible locations, in search coordinates.
 
     Returns
     -------
@@ -173,17 +173,17 @@ def describe_component(
     )
 
 
-def _location_set(weighed: RankedEffect) -> tuple[dict[str, object], ...]:
-    found: list[dict[str, object]] = []
+def _location_set(ranked_effect: RankedEffect) -> tuple[dict[str, object], ...]:
+    locations: list[dict[str, object]] = []
     total = 0.0
-    for fit, share in zip(weighed.fits[:MAX_LOCATIONS], weighed.shares, strict=False):
+    for fit, share in zip(ranked_effect.fits[:MAX_LOCATIONS], ranked_effect.shares, strict=False):
         location = dict(fit.hypothesis.components[-1].location.entries)
-        if location not in found:
-            found.append(location)
+        if location not in locations:
+            locations.append(location)
         total += share
         if total >= LISTED_PROBABILITY:
             break
-    return tuple(found)
+    return tuple(locations)
 
 
 def _estimate_parameters(fit: Fit, which: int, scale: float, across: FloatArray | float) -> dict[str, Estimate]:
@@ -192,8 +192,8 @@ def _estimate_parameters(fit: Fit, which: int, scale: float, across: FloatArray 
     variance = np.maximum(scale, 1.0) * np.maximum(np.diag(fit.covariance), 0.0)
     variance[start : start + hypothesis.counts[which]] += across
     spread = np.sqrt(variance)
-    spread = np.minimum(spread, hypothesis.high - hypothesis.low)  # where data say nothing, the range still does
-    found = {}
+    spread = np.minimum(spread, hypothesis.high - hypothesis.low)  # no wider than the range, where data say nothing
+    estimates = {}
     for index in range(start, start + hypothesis.counts[which]):
         parameter, value = hypothesis.parameters[index], float(fit.values[index])
         std = float(spread[index])
@@ -206,18 +206,18 @@ def _estimate_parameters(fit: Fit, which: int, scale: float, across: FloatArray 
         low, high = sorted(
             component.effect.report_value(component.location, parameter.name, float(end)) for end in ends
         )
-        shown = component.effect.report_value(component.location, parameter.name, value)
-        found[parameter.name] = Estimate(value=shown, std=std, low=low, high=high)
-    return found
+        reported = component.effect.report_value(component.location, parameter.name, value)
+        estimates[parameter.name] = Estimate(value=reported, std=std, low=low, high=high)
+    return estimates
 
 
 def is_significant(fit: Fit, which: int) -> bool:
-    """Tell whether a cause is larger than a user's tolerances.
+    """Tell whether a component is larger than a user's tolerances.
 
     Parameters
     ----------
     fit : Fit
-        With the cause.
+        With the component.
     which : int
         Its index.
 
@@ -229,8 +229,8 @@ def is_significant(fit: Fit, which: int) -> bool:
     hypothesis = fit.hypothesis
     which %= len(hypothesis.components)
     start = sum(hypothesis.counts[:which])
-    own = range(start, start + hypothesis.counts[which])
-    stated = [index for index in own if hypothesis.parameters[index].tolerance > 0]
+    indices = range(start, start + hypothesis.counts[which])
+    stated = [index for index in indices if hypothesis.parameters[index].tolerance > 0]
     if not stated:
         return True
     return any(

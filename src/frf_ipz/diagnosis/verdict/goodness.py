@@ -17,16 +17,12 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-FIRST_LOG_BAYES_FACTOR = 30.0  # evidence over the nominal model's: what a finding needs
-PARTIAL_LOG_BAYES_FACTOR = (
-    50.0  # evidence of a second finding over the first one's alone, where the two do not explain all
-)
-STRONG_LOG_BAYES_FACTOR = 200.0  # evidence of a second finding: with less, a third one is not looked for
-NUISANCE_CHI2_FLOOR = 45.0  # sum of squares of what cannot be known, where the data determine little of it
+FIRST_LOG_BAYES_FACTOR = 30.0  # of a finding over the nominal model
+PARTIAL_LOG_BAYES_FACTOR = 50.0  # of a second finding over the first one alone, where the two do not explain all
+STRONG_LOG_BAYES_FACTOR = 200.0  # of a second finding: with less, a third one is not searched for
+NUISANCE_CHI2_FLOOR = 45.0  # where the data determine few nuisance parameters
 NUISANCE_CHI2_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
-MAX_SINGLE_DEVIATION = (
-    3.2  # standard deviations of one damping ratio or gain: 172 tests with nothing missing reached 2.6
-)
+MAX_SINGLE_DEVIATION = 3.2  # standard deviations of a damping ratio or gain: 172 tests with nothing missing reached 2.6
 N_SUBBANDS = 6  # of the band, by points
 
 
@@ -39,11 +35,11 @@ class Limits:
     misfit : float
         Sum of squares over the number of values.
     subband : float
-        The same of an FRF over a piece of the band.
+        The same of an FRF over a subband.
     first_log_bayes_factor : float
-        Evidence over the nominal model's that a first finding needs.
+        Of a first finding over the nominal model.
     second_log_bayes_factor : float
-        Evidence over the first one's alone that a second finding needs with which nothing is left to explain.
+        Of a second finding over the first one alone, where the two leave nothing to explain.
     beside_log_bayes_factor : float
         The same where the first one leaves nothing to explain either.
     frequency_deviation : float
@@ -59,13 +55,13 @@ class Limits:
     frequency_deviation: float = 2.5
 
 
-# By what was looked at: the coarser its noise is known, the wider. With nothing missing, 50 tests with a hammer
-# reached 0.8, 1.8 and 19 nats, and pulls 43 (seeds 30101 to 30120, 40001 to 40047), one of 63 later ones 3.04 in a
-# piece (from 152000000); 41 with a shaker from rest 1.1, 1.7 and 4 nats, and 60 more with their true causes 1.2 and 3.6
-# (from 81000000 and 91000000), one of 8 later ones 4.5 in a piece (from 152000000); 11 with shakers that run already,
-# six of them with their true causes, 0.7, 1.5 and 3 nats (from 121000000, 131000000 and 141000000). Beside one true
-# cause a second one gained no more than 1 nat in 40 tests with a hammer. Where one leaves something to explain that a
-# second one explains, odds of 20 to 1 are enough.
+# By what was measured: the coarser its noise is known, the wider. Each triple is misfit, subband and log Bayes factor.
+# With nothing missing, 50 tests with a hammer reached 0.8, 1.8 and 19, and a nuisance chi2 of 43 (seeds 30101 to 30120,
+# 40001 to 40047), one of 63 later ones 3.04 in a subband (from 152000000); 41 with a shaker from rest 1.1, 1.7 and 4,
+# and 60 more with their true components 1.2 and 3.6 (from 81000000 and 91000000), one of 8 later ones 4.5 in a subband
+# (from 152000000); 11 with shakers that run already, six of them with their true components, 0.7, 1.5 and 3 (from
+# 121000000, 131000000 and 141000000). Beside one true component a second one gained no more than 1 in 40 tests with a
+# hammer. Where one leaves something to explain that a second one explains, odds of 20 to 1 are enough.
 LIMITS = {
     "hammer": Limits(misfit=1.1, subband=3.6, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
     "random": Limits(misfit=1.3, subband=5.0, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
@@ -83,17 +79,17 @@ class Goodness:
     misfit : float
         Mean square of the whitened misfit.
     nuisance_chi2 : float
-        Sum of squares of what cannot be known, in standard deviations.
+        Sum of squares of the nuisance parameters, in standard deviations.
     worst_subband : float
-        Largest mean square of an FRF over a piece of the band.
+        Largest mean square of an FRF over a subband.
     largest_deviation : float
-        Largest deviation of one damping ratio or gain, in standard deviations: that others have none makes up for none.
+        Largest deviation of a damping ratio or gain, in standard deviations: small others do not make up for it.
     frequency_deviation : float
         Largest deviation of one natural frequency, in standard deviations.
     limits : Limits
-        What they may be.
+        Their limits.
     nuisance_chi2_limit : float
-        What the pull may be.
+        Limit of the nuisance chi2.
     """
 
     misfit: float
@@ -131,12 +127,12 @@ class Goodness:
 
     @property
     def error_underestimation(self) -> float:
-        """How much the errors of a good model are underrated somewhere: a cause beside it must explain as much more."""
+        """Factor by which errors of a good model are underestimated somewhere: what is beside it needs so much more."""
         return max(1.0, self.worst_subband) if self.is_good else 1.0
 
     @property
     def required_log_bayes_factor(self) -> float:
-        """Evidence that a first cause must have where this is the nominal model."""
+        """Log Bayes factor that a first component needs where this is the nominal model."""
         return self.error_underestimation * self.limits.first_log_bayes_factor
 
     @property

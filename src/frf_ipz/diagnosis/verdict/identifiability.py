@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 N_LOCATIONS = 2  # of each effect, spread over the structure
 N_HALVINGS = 5  # halvings of the range
 MAX_CANDIDATES = 60
-DISTINCT = 0.02  # relative difference of FRFs that a measurement shows beyond doubt
+DISTINCT = 0.02  # relative difference of FRFs that a measurement shows clearly
 
 
 def find_detectable_sizes(
@@ -38,51 +38,51 @@ def find_detectable_sizes(
     null : Fit
         Of the nominal model.
     required_log_bayes_factor : float
-        Evidence that a finding needs.
+        Log Bayes factor that a finding needs.
 
     Returns
     -------
     dict of str to dict
-        For each effect, the value of its first parameter at the place where it shows best; effects that have no
+        For each effect, the value of its first parameter at the location where it shows best; effects that have no
         parameter, or do not apply, are left out.
     """
     measure = _make_evidence(problem, null)
-    found = {}
+    smallest = {}
     for effect in problem.effects.values():
         sizes = [
-            _smallest(problem, effect, location, measure, required_log_bayes_factor)
+            _find_smallest_size(problem, effect, location, measure, required_log_bayes_factor)
             for location in _spread_locations(problem, effect)
         ]
         known = [size for size in sizes if size is not None]
         if known:
             best = min(known, key=lambda size: size[2])
-            found[effect.name] = {best[0]: best[1]}
-    return found
+            smallest[effect.name] = {best[0]: best[1]}
+    return smallest
 
 
 def _spread_locations(problem: InferenceProblem, effect: Effect) -> list[Component]:
     locations = list(effect.locations(problem.context))
-    chosen = locations[:: -(-len(locations) // N_LOCATIONS)] if locations else []
-    return [Component(effect=effect, location=location, n_locations=len(locations)) for location in chosen]
+    selected = locations[:: -(-len(locations) // N_LOCATIONS)] if locations else []
+    return [Component(effect=effect, location=location, n_locations=len(locations)) for location in selected]
 
 
 def _make_evidence(problem: InferenceProblem, null: Fit) -> Callable[[Hypothesis, FloatArray], float]:
-    """Half the squared norm of a change that no scatter explains."""
-    data, nothing = problem.data, np.zeros(problem.nuisance_prior.size)
-    nominal = null.hypothesis.respond(null.values, nothing, data.measured.s)
+    """Half the squared norm of a change that the nuisance cannot explain."""
+    data, no_nuisance = problem.data, np.zeros(problem.nuisance_prior.size)
+    nominal = null.hypothesis.respond(null.values, no_nuisance, data.measured.s)
     columns = data.slopes(nominal, nuisance_jacobian(nominal, problem.nuisance_prior, problem.context.layout))
     factor = cholesky_with_prior(columns.T)
 
     def evidence(hypothesis: Hypothesis, values: FloatArray) -> float:
-        changed = hypothesis.respond(values, nothing, data.measured.s)
+        changed = hypothesis.respond(values, no_nuisance, data.measured.s)
         white = data.slopes(nominal, (changed.values - nominal.values)[:, :, None])[:, 0]
-        seen = linalg.solve_triangular(factor, columns.T @ white, lower=True)
-        return 0.5 * float(white @ white - seen @ seen)
+        explained = linalg.solve_triangular(factor, columns.T @ white, lower=True)
+        return 0.5 * float(white @ white - explained @ explained)
 
     return evidence
 
 
-def _smallest(
+def _find_smallest_size(
     problem: InferenceProblem,
     effect: Effect,
     component: Component,
@@ -95,17 +95,17 @@ def _smallest(
         return None
     hypothesis = problem.make_hypothesis((component,))
     first = parameters[0]
-    others = [float(np.sqrt(p.low * p.high)) if p.is_log else 0.5 * (p.low + p.high) for p in parameters[1:]]
-    near, far = 0.0, 1.0
-    if measure(hypothesis, np.array([_value_at(first, far), *others])) < required_log_bayes_factor:
+    further = [float(np.sqrt(p.low * p.high)) if p.is_log else 0.5 * (p.low + p.high) for p in parameters[1:]]
+    low, high = 0.0, 1.0
+    if measure(hypothesis, np.array([_value_at(first, high), *further])) < required_log_bayes_factor:
         return None
     for _ in range(N_HALVINGS):
-        middle = 0.5 * (near + far)
-        if measure(hypothesis, np.array([_value_at(first, middle), *others])) < required_log_bayes_factor:
-            near = middle
+        middle = 0.5 * (low + high)
+        if measure(hypothesis, np.array([_value_at(first, middle), *further])) < required_log_bayes_factor:
+            low = middle
         else:
-            far = middle
-    return first.name, effect.report_value(component.location, first.name, _value_at(first, far)), far
+            high = middle
+    return first.name, effect.report_value(component.location, first.name, _value_at(first, high)), high
 
 
 def _value_at(parameter: Parameter, part: float) -> float:
@@ -120,12 +120,12 @@ def _value_at(parameter: Parameter, part: float) -> float:
 
 
 def find_best_sensor(problem: InferenceProblem, first: Fit, second: Fit) -> str:
-    """Find the place at which two explanations predict the most different FRFs.
+    """Find the sensor position at which two explanations predict the most different FRFs.
 
     Parameters
     ----------
     problem : InferenceProblem
-        With the test as it is.
+        Of the present test.
     first, second : Fit
         The explanations.
 
@@ -136,21 +136,21 @@ def find_best_sensor(problem: InferenceProblem, first: Fit, second: Fit) -> str:
     """
     context = problem.context
     dofs = context.moving_dofs[:: -(-len(context.moving_dofs) // MAX_CANDIDATES)]
-    motions = np.stack([context.unit(dof) for dof in dofs], 1)
+    motions = np.stack([context.unit_motion(dof) for dof in dofs], 1)
     s = context.contour
-    one, other = (_receptances(fit, motions, s) for fit in (first, second))
-    size = np.sqrt(np.mean(np.abs(one) ** 2, axis=0))
-    apart = np.sqrt(np.mean(np.abs(one - other) ** 2, axis=0)) / np.maximum(size, 1e-3 * size.max())
-    sensor, struck = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    where, record = context.where(dofs[int(sensor)].node), context.layout.inputs[int(struck)]
-    if apart[sensor, struck] < DISTINCT:
+    first_frfs, second_frfs = (_receptances(fit, motions, s) for fit in (first, second))
+    size = np.sqrt(np.mean(np.abs(first_frfs) ** 2, axis=0))
+    difference = np.sqrt(np.mean(np.abs(first_frfs - second_frfs) ** 2, axis=0)) / np.maximum(size, 1e-3 * size.max())
+    sensor, excited = np.unravel_index(int(np.argmax(difference)), difference.shape)
+    position, excited_dof = context.describe_node(dofs[int(sensor)].node), context.layout.inputs[int(excited)]
+    if difference[sensor, excited] < DISTINCT:
         return (
-            "No further sensor in the directions of this test tells them apart; that takes a wider band, or another "
+            "No further sensor in the directions of this test distinguishes them; that takes a wider band, or another "
             "kind of test."
         )
     return (
-        f"A sensor at {where} with the blow at {record} tells them apart: there they predict FRFs that differ by "
-        f"{100 * float(apart[sensor, struck]):.2g} %."
+        f"A sensor at {position} with the excitation at {excited_dof} distinguishes them: there they predict FRFs that "
+        f"differ by {100 * float(difference[sensor, excited]):.2g} %."
     )
 
 

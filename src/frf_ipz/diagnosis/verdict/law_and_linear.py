@@ -1,7 +1,7 @@
-"""A nonlinear law beside a linear cause: the one is taken out of the recordings, and the other is searched for.
+"""A nonlinear law and a linear effect together: the one is taken out of the recordings, and the other is searched for.
 
-The linear cause goes first where no law explains by itself; the law, where it explains but strains the nominal model,
-or where the linear cause first led to nothing and the law follows the recordings all the same.
+The linear effect goes first where no law explains by itself; the law, where it explains but strains the nominal model,
+or where the linear effect first led to nothing and the law follows the recordings all the same.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.verdict.decision import Decision
     from frf_ipz.structure import StructuralModel
 
-MAX_COST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear cause
-STRAINED = 10.0  # mean square of what the nominal model may be wrong by, over its tolerance; laws alone leave up to 6
-MAX_MISFIT = 1.3  # misfit over noise of a law that follows the recordings, however the model had to bend for that
+MAX_COST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear effect
+STRAINED = 10.0  # nuisance chi2 of a law, per parameter: those of laws alone are up to 6
+MAX_MISFIT = 1.3  # misfit over noise of a law that follows the recordings, whatever the nuisance chi2
 MAX_GROWTH = 100.0  # times the largest response: no structure moves so much more without a law
-RELIEF = 0.5  # times the strain: what a linear cause beside a law must come down to
+RELIEF = 0.5  # times the nuisance chi2: what it must come down to beside a linear effect
 
 
 def search_beside_linear(
@@ -44,16 +44,16 @@ def search_beside_linear(
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
 ) -> tuple[LawSearch, Finding] | None:
-    """Search for a law beside the linear cause that explains most.
+    """Search for a law beside the linear effect that explains most.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data, model and linear effects.
     linear : Decision
-        What a linear search came to; where none was made, it is made here.
+        Decision of the linear search; where none was made, it is made here.
     alone : LawSearch
-        What the search for a law with the nominal model came to.
+        Result of the search for a law with the nominal model.
     model : StructuralModel
         The nominal model.
     observations : Observations
@@ -64,8 +64,8 @@ def search_beside_linear(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear cause, where two of three hold: the cause explains most of the misfit, the law the rest,
-        and beside the cause the law no longer strains the nominal model. None where less holds.
+        The law and the linear effect, where two of three hold: the effect explains most of the misfit, the law the
+        rest, and beside the effect the law no longer strains the nominal model. None where less holds.
     """
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search_component(problem, null)
@@ -94,12 +94,12 @@ def search_beside_law(
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
 ) -> tuple[LawSearch, Finding] | None:
-    """Search for a linear cause beside a law that strains the nominal model, whether it explains by itself or not.
+    """Search for a linear effect beside a law that strains the nominal model, whether it explains by itself or not.
 
     Parameters
     ----------
     pose_with_observations : callable
-        Brings the nominal model and what was measured together.
+        Poses the problem of the nominal model and what was measured.
     laws : LawSearch
         The law that was found with the nominal model.
     model : StructuralModel
@@ -112,14 +112,14 @@ def search_beside_law(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear cause, which both explain; None where the law did not strain the model, where it did not
-        even follow the recordings, where no cause relieves the model, or where the law explains first moments only,
-        with the cause as without it.
+        The law and the linear effect, which both explain; None where the law did not strain the model, where it did
+        not even follow the recordings, where no effect relieves the model, or where the law explains first moments
+        only, with the effect as without it.
     """
-    without = _remove_law(observations, laws)
-    if without is None:
+    remaining = _remove_law(observations, laws)
+    if remaining is None:
         return None
-    explains, problem = laws.verdict == EXPLAINED, pose_with_observations(without)
+    explains, problem = laws.verdict == EXPLAINED, pose_with_observations(remaining)
     null = fit_null_model(problem)
     ranking = search_component(problem, null)
     best = ranking.best
@@ -133,17 +133,21 @@ def search_beside_law(
     if any(best.hypothesis.implausibilities(best.values)) or (follows_traces and not explains):
         return None
     change = best.hypothesis.change(best.values)
-    again = search_laws(with_change(model, change), undo_chain_effects(observations, change))
-    if again.verdict != EXPLAINED or not _relieves(again, laws) or not (explains or again.nuisance_chi2 < STRAINED):
+    laws_beside = search_laws(with_change(model, change), undo_chain_effects(observations, change))
+    if (
+        laws_beside.verdict != EXPLAINED
+        or not _relieves(laws_beside, laws)
+        or not (explains or laws_beside.nuisance_chi2 < STRAINED)
+    ):
         return None
-    if laws.is_early and again.is_early:  # what the law misses later is no better explained
+    if laws.is_early and laws_beside.is_early:  # what the law misses later is no better explained
         return None
     scale = max(1.0, best.mean_misfit)
-    return again, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
+    return laws_beside, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
 
 
 def _remove_law(observations: Observations, laws: LawSearch) -> Observations | None:
-    """Take a law out that strained the model; None where it did not, or where what it leaves is no linear system."""
+    """Take a law out that strained the model; None where it did not, or where the rest is no linear system."""
     if (
         laws.nuisance_chi2 < STRAINED
         or laws.fit is None
@@ -154,15 +158,15 @@ def _remove_law(observations: Observations, laws: LawSearch) -> Observations | N
     if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > MAX_MISFIT):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
-        without = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)
+        linear = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)
     sizes = [
-        [np.abs(record.responses).max(initial=0.0) for record in both]
-        for both in zip(without.records, observations.records, strict=True)
+        [np.abs(record.responses).max(initial=0.0) for record in pair]
+        for pair in zip(linear.records, observations.records, strict=True)
     ]
-    runs_away = not all(left <= MAX_GROWTH * measured for left, measured in sizes)
-    return None if runs_away else without
+    runs_away = not all(remaining <= MAX_GROWTH * measured for remaining, measured in sizes)
+    return None if runs_away else linear
 
 
 def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
-    """Say whether a law strains the nominal model, and much less so beside a linear cause."""
+    """Say whether a law strains the nominal model, and much less so beside a linear effect."""
     return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= RELIEF * alone.nuisance_chi2

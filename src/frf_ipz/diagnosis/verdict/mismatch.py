@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-BANDS = 6  # pieces of the band, on a logarithmic scale
+N_SUBBANDS = 6  # subbands, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations
-NAMED = 3  # FRFs and bands in the text
+N_NAMED = 3  # FRFs and bands in the text
 ERROR = 0.01  # of an FRF's size: what counts as a misfit
-FEWEST_FRFS = 2
-MIN_EXPLAINED = 0.1  # of the misfit: a node that explains less tells nothing
+MIN_FRFS = 2
+MIN_EXPLAINED = 0.1  # of the misfit: a node that explains less is no location
 
 
 def describe_mismatch(problem: InferenceProblem, null: Fit, curves: Curves) -> tuple[FloatArray, str, pd.DataFrame]:
@@ -51,34 +51,34 @@ def describe_mismatch(problem: InferenceProblem, null: Fit, curves: Curves) -> t
     table : DataFrame
         Each FRF and band, as in `Diagnosis.mismatch`.
     """
-    nothing = np.zeros(problem.nuisance_prior.size)
-    nominal = null.hypothesis.respond(null.values, nothing, curves.s)
+    no_nuisance = np.zeros(problem.nuisance_prior.size)
+    nominal = null.hypothesis.respond(null.values, no_nuisance, curves.s)
     allowed = np.sum(np.abs(nuisance_jacobian(nominal, problem.nuisance_prior, problem.context.layout)) ** 2, 2)
     spread = np.sqrt(curves.expected**2 + allowed)
     before = np.abs(curves.measured - curves.nominal) / spread
     after = np.abs(curves.measured - curves.explained) / curves.expected
     frequency = curves.s.imag / (2 * np.pi)
-    table = _table(frequency, before, after, [str(label) for label in curves.labels])
+    table = _tabulate(frequency, before, after, [str(label) for label in curves.labels])
     worst = before.max(1) > DISAGREES
-    return frequency[worst], _in_words(table, frequency[worst]), table
+    return frequency[worst], _describe_table(table, frequency[worst]), table
 
 
-def _table(frequency: FloatArray, before: FloatArray, after: FloatArray, names: list[str]) -> pd.DataFrame:
-    edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-12), BANDS + 1)
+def _tabulate(frequency: FloatArray, before: FloatArray, after: FloatArray, names: list[str]) -> pd.DataFrame:
+    edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-12), N_SUBBANDS + 1)
     rows = []
     for name, first, last in zip(names, before.T, after.T, strict=True):
         for low, high in pairwise(edges):
             inside = (frequency >= low) & (frequency < high)
             if inside.any():
-                rms = [float(np.sqrt(np.mean(one[inside] ** 2))) for one in (first, last)]
+                rms = [float(np.sqrt(np.mean(ratio[inside] ** 2))) for ratio in (first, last)]
                 rows.append({"frf": name, "low_hz": low, "high_hz": high, "before": rms[0], "after": rms[1]})
     return pd.DataFrame(rows)
 
 
-def _in_words(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
+def _describe_table(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
     if not len(frequency_hz):
         return "The model agrees with every FRF of the band within noise and tolerances."
-    ranked = table.sort_values("before", ascending=False).head(NAMED)
+    ranked = table.sort_values("before", ascending=False).head(N_NAMED)
     parts = [
         f"{row.frf} from {row.low_hz:.4g} to {row.high_hz:.4g} Hz ({row.before:.3g} times)"
         for row in ranked.itertuples()
@@ -92,7 +92,7 @@ def _in_words(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
 
 
 def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[int]]:
-    """Trace the misfit of the nominal model to a node.
+    """Localise the misfit of the nominal model at a node.
 
     Parameters
     ----------
@@ -104,30 +104,32 @@ def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[in
     Returns
     -------
     dict
-        ``{"nodes": [node]}``; empty where one FRF is all there is, or no node explains much of the misfit.
+        ``{"nodes": [node]}``; empty for a single FRF, or where no node explains much of the misfit.
     """
-    if len(problem.data.measured.labels) < FEWEST_FRFS:
+    if len(problem.data.measured.labels) < MIN_FRFS:
         return {}
     dofs = problem.context.moving_dofs
-    before, left = _misfits(problem, null, np.stack([problem.context.unit(dof) for dof in dofs], 1))
-    best = int(np.argmin(left))
-    return {"nodes": [dofs[best].node]} if left[best] < (1 - MIN_EXPLAINED) * before else {}
+    before, remaining = _compute_misfits(problem, null, np.stack([problem.context.unit_motion(dof) for dof in dofs], 1))
+    best = int(np.argmin(remaining))
+    return {"nodes": [dofs[best].node]} if remaining[best] < (1 - MIN_EXPLAINED) * before else {}
 
 
-def _misfits(problem: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
-    """Robust misfit without and with a free dynamic stiffness on each of some motions."""
-    is_near = null.is_nearly_right
-    data = problem.sparse_data.measured if is_near else problem.coarse
-    nuisance = null.nuisance if is_near else np.zeros(problem.nuisance_prior.size)
+def _compute_misfits(problem: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
+    """Compute the robust misfit without and with a free dynamic stiffness on each of some motions."""
+    is_on_fit = null.is_nearly_right
+    data = problem.sparse_data.measured if is_on_fit else problem.coarse
+    nuisance = null.nuisance if is_on_fit else np.zeros(problem.nuisance_prior.size)
     response = null.hypothesis.respond(null.values, nuisance, data.s)
-    gains = problem.sparse_data.gains(response) if is_near else 1.0
+    gains = problem.sparse_data.gains(response) if is_on_fit else 1.0
     weights = compute_weights(data, ERROR)
     misfit = data.values - gains * response.values
-    none = np.zeros(motions.shape[1])
-    across = evaluate_receptances(response, null.hypothesis.basis, problem.context.layout, motions, none).across
-    seen = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
+    no_missing_flexibility = np.zeros(motions.shape[1])
+    across = evaluate_receptances(
+        response, null.hypothesis.basis, problem.context.layout, motions, no_missing_flexibility
+    ).across
+    products = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
     size = np.einsum("kf,kfp->kp", weights, np.abs(across) ** 2)
     before = np.sum(weights * np.abs(misfit) ** 2, axis=1)
-    taken = np.abs(seen) ** 2 / np.maximum(size, np.finfo(float).tiny)
-    left = np.log1p(np.maximum(before[:, None] - taken, 0.0)).sum(0)
-    return float(np.log1p(before).sum()), np.asarray(left)
+    explained = np.abs(products) ** 2 / np.maximum(size, np.finfo(float).tiny)
+    remaining = np.log1p(np.maximum(before[:, None] - explained, 0.0)).sum(0)
+    return float(np.log1p(before).sum()), np.asarray(remaining)

@@ -31,43 +31,43 @@ if TYPE_CHECKING:
 
 DAMPING_EFFECTS = ("damping_level", "structural_damping")
 FREE_TOLERANCE = 20.0  # relative tolerance of damping ratios: more than a factor of ten
-MAIN_PART = 0.5  # of all pulls
+MAIN_PART = 0.5  # of the whole nuisance chi2
 SAME_LOCATION = 0.05  # of the largest extent of a structure
 TWO_DYNAMIC = (
-    "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one place: they "
-    "rather are one thing of another kind"
+    "two effects with dynamics of their own explain the measurement together, of one kind or at nearly one location: "
+    "they rather are one thing of another kind"
 )
 
 
-def is_damping_only(problem: InferenceProblem, found: Decision) -> bool:
-    """Tell whether damping ratios are what the tolerances do not allow.
+def is_damping_only(problem: InferenceProblem, decision: Decision) -> bool:
+    """Tell whether damping ratios alone exceed the tolerances.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and model.
-    found : Decision
+    decision : Decision
         Unexplained.
 
     Returns
     -------
     bool
-        Then damping is worth to be left free.
+        True where a search with free damping is worthwhile.
     """
-    if found.verdict != UNEXPLAINED:
+    if decision.verdict != UNEXPLAINED:
         return False
-    suspects = (found.final,) if found.final.explains_nearly_all else (found.final, found.null)
-    return any(_is_of_damping(problem, fit) for fit in suspects)
+    fits = (decision.final,) if decision.final.explains_nearly_all else (decision.final, decision.null)
+    return any(_is_damping_dominant(problem, fit) for fit in fits)
 
 
-def _is_of_damping(problem: InferenceProblem, fit: Fit) -> bool:
+def _is_damping_dominant(problem: InferenceProblem, fit: Fit) -> bool:
     whitened_nuisance, _ = problem.nuisance_prior.whiten(fit.nuisance)
-    own = float(np.sum(whitened_nuisance[problem.nuisance_prior.damping_indices] ** 2))
-    return own > max(assess_goodness(problem, fit).nuisance_chi2_limit, MAIN_PART * fit.nuisance_chi2)
+    damping_chi2 = float(np.sum(whitened_nuisance[problem.nuisance_prior.damping_indices] ** 2))
+    return damping_chi2 > max(assess_goodness(problem, fit).nuisance_chi2_limit, MAIN_PART * fit.nuisance_chi2)
 
 
 def free_damping(options: DiagnoseOptions) -> DiagnoseOptions:
-    """Leave the damping of modes free.
+    """Free the damping ratios of modes.
 
     Parameters
     ----------
@@ -77,26 +77,26 @@ def free_damping(options: DiagnoseOptions) -> DiagnoseOptions:
     Returns
     -------
     DiagnoseOptions
-        The others.
+        With the other tolerances.
     """
     return replace(options, damping_tolerance=max(FREE_TOLERANCE, options.damping_tolerance))
 
 
 def drop_damping_effects(problem: InferenceProblem) -> InferenceProblem:
-    """Leave out what damping ratios that may be anything stand for.
+    """Drop the effects that free damping ratios stand for.
 
     Parameters
     ----------
     problem : InferenceProblem
-        With damping left free.
+        With free damping ratios.
 
     Returns
     -------
     InferenceProblem
         Without the effects of modal damping.
     """
-    kept = {name: effect for name, effect in problem.effects.items() if name not in DAMPING_EFFECTS}
-    return replace(problem, effects=kept)
+    effects = {name: effect for name, effect in problem.effects.items() if name not in DAMPING_EFFECTS}
+    return replace(problem, effects=effects)
 
 
 def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
@@ -105,9 +105,9 @@ def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
     Parameters
     ----------
     fit : Fit
-        With damping left free.
+        With free damping ratios.
     options : DiagnoseOptions
-        The tolerances as stated.
+        The stated tolerances.
 
     Returns
     -------
@@ -117,48 +117,48 @@ def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
     nuisance_prior, modes = fit.hypothesis.nuisance_prior, fit.hypothesis.modes(fit.values, fit.nuisance)
     changes = fit.nuisance[nuisance_prior.damping_indices] * nuisance_prior.damping_std
     beyond = np.flatnonzero((np.abs(changes) > options.damping_tolerance) & nuisance_prior.is_stated)
-    said = [
+    ratios = [
         f"{100 * stated * (1 + change):.2g} % instead of {100 * stated:.2g} % at {omega / (2 * np.pi):.4g} Hz"
         for stated, change, omega in zip(
             modes.stated_ratio[beyond], np.maximum(changes[beyond], -1), modes.omega[beyond], strict=True
         )
     ]
-    return f"damping ratios are not those of the model ({', '.join(said)})"
+    return f"damping ratios are not those of the model ({', '.join(ratios)})"
 
 
 def describe_implausibility(fit: Fit) -> str:
-    """Say why causes are rather one that the catalogue lacks.
+    """Say why components rather are something that the catalogue lacks.
 
     Parameters
     ----------
     fit : Fit
-        Of any number of causes.
+        Of any number of components.
 
     Returns
     -------
     str
-        In words that follow "Something is missing that nothing in the catalogue explains: "; empty where two causes
-        imitate neither something at their place nor something that is spread, and all have numbers of their kind.
+        In words that follow "Something is missing that nothing in the catalogue explains: "; empty where two components
+        imitate neither something at their location nor something that is spread, and all have numbers of their kind.
     """
     hypothesis = fit.hypothesis
     dynamic = [component for component in hypothesis.components if component.effect.has_dynamics]
     if any(
-        one.effect.name == other.effect.name or _at_one_place(hypothesis.context, one, other)
-        for one, other in combinations(dynamic, 2)
+        first.effect.name == second.effect.name or _are_at_one_location(hypothesis.context, first, second)
+        for first, second in combinations(dynamic, 2)
     ):
         return TWO_DYNAMIC
-    return next((doubt for doubt in hypothesis.implausibilities(fit.values) if doubt), "")
+    return next((reason for reason in hypothesis.implausibilities(fit.values) if reason), "")
 
 
-def _at_one_place(context: ModelContext, first: Component, second: Component) -> bool:
+def _are_at_one_location(context: ModelContext, first: Component, second: Component) -> bool:
     nodes = [_nodes_of(component) for component in (first, second)]
     if nodes[0] & nodes[1]:
         return True
     spans = measure_extents(context.model)
     if not spans:
         return False
-    apart = [_distance(context, a, b) for a in nodes[0] for b in nodes[1]]
-    return min(apart, default=np.inf) <= SAME_LOCATION * max(spans.values())
+    distances = [_distance(context, a, b) for a in nodes[0] for b in nodes[1]]
+    return min(distances, default=np.inf) <= SAME_LOCATION * max(spans.values())
 
 
 def _nodes_of(component: Component) -> set[int]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.options import DiagnoseOptions
 
-MOST_NOISE = 0.3  # of an FRF: where noise is more, a norm would be one of noise
+MAX_NOISE = 0.3  # of an FRF: where noise is more, a norm would be that of the noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,25 +54,25 @@ def prove(problem: InferenceProblem, held_out: Data, null: Fit, final: Fit) -> P
     Proof
         Figures and curves.
     """
-    nothing = np.zeros(problem.nuisance_prior.size)
-    cases = ((null, nothing), (null, null.nuisance), (final, final.nuisance))
+    no_nuisance = np.zeros(problem.nuisance_prior.size)
+    cases = ((null, no_nuisance), (null, null.nuisance), (final, final.nuisance))
     figures = [_misfit(fit, nuisance, problem.data, held_out) for fit, nuisance in cases]
-    shown = [_model_frfs(fit, nuisance, problem.data) for fit, nuisance in cases]
+    nominal, updated, explained = (_model_frfs(fit, nuisance, problem.data) for fit, nuisance in cases)
     measured = problem.data.measured
     curves = Curves(
         s=measured.s,
         labels=measured.labels,
         measured=measured.values,
-        nominal=shown[0],
-        updated=shown[1],
-        explained=shown[2],
+        nominal=nominal,
+        updated=updated,
+        explained=explained,
         expected=compute_error_std(problem.data, problem.context.options),
     )
     return Proof(before=figures[0], updated=figures[1], after=figures[2], curves=curves)
 
 
 def compute_error_std(data: Data, options: DiagnoseOptions) -> FloatArray:
-    """Give the standard deviation of noise and of what no parameter of a model stands for.
+    """Compute the standard deviation of noise and of model errors that no parameter stands for.
 
     Parameters
     ----------
@@ -103,10 +103,10 @@ def _misfit(fit: Fit, nuisance: FloatArray, training: Data, held_out: Data) -> M
     for data in (training, held_out):
         response = fit.hypothesis.respond(fit.values, nuisance, data.measured.s)
         white = data.misfit(response)
-        seen = _is_above_noise(data)
-        measured = np.where(seen, data.measured.values, 0.0)
-        wrong = measured - np.where(seen, data.gains(response) * response.values, 0.0)
-        figures.append((_relative_norm(wrong, measured), float(np.sqrt(white @ white / len(white)))))
+        mask = _is_above_noise(data)
+        measured = np.where(mask, data.measured.values, 0.0)
+        deviation = measured - np.where(mask, data.gains(response) * response.values, 0.0)
+        figures.append((_relative_norm(deviation, measured), float(np.sqrt(white @ white / len(white)))))
     return Misfit(
         training=figures[0][0],
         held_out=figures[1][0],
@@ -118,13 +118,13 @@ def _misfit(fit: Fit, nuisance: FloatArray, training: Data, held_out: Data) -> M
 def _is_above_noise(data: Data) -> BoolArray:
     """Where the FRFs are more than noise; everywhere, if they are nowhere."""
     noise = np.array([np.diag(covariance).real for covariance in data.measured.covariance]).T
-    seen = noise < (MOST_NOISE * data.measured.size) ** 2
-    return np.asarray(seen | ~seen.any(0))
+    mask = noise < (MAX_NOISE * data.measured.size) ** 2
+    return np.asarray(mask | ~mask.any(0))
 
 
-def _relative_norm(wrong: ComplexArray, measured: ComplexArray) -> float:
-    """Norm over norm; each FRF that shows anything counts by its own size, for sensors have several units."""
+def _relative_norm(deviation: ComplexArray, measured: ComplexArray) -> float:
+    """Norm over norm; each FRF that is not zero counts by its own size, for sensors have several units."""
     scale = np.sqrt(np.mean(np.abs(measured) ** 2, 0))
-    shown = scale > 0
-    wrong, measured = (part[:, shown] / scale[shown] for part in (wrong, measured))
-    return float(np.linalg.norm(wrong) / np.linalg.norm(measured))
+    is_measured = scale > 0
+    deviation, measured = (part[:, is_measured] / scale[is_measured] for part in (deviation, measured))
+    return float(np.linalg.norm(deviation) / np.linalg.norm(measured))

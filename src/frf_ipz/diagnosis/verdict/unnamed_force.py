@@ -35,17 +35,17 @@ if TYPE_CHECKING:
 
 ORDERS = 0.05, 1.95
 LOSSES = 1e-3, 30.0  # in the middle of the band; with more it is a damper
-N_ROUGH = 5  # places with large errors
-MAX_BEHIND = 300.0  # nats, with large errors: such a force is not fitted exactly
+N_ROUGH = 5  # locations that are fitted with inflated errors
+MAX_BEHIND = 300.0  # of the cost with inflated errors: beyond, a force is not fitted exactly
 
 
 class LocalForce(ViscoelasticJoint):
-    """Against the motion of any place of a joint, k g(s / s_0), s_0 in the middle of the band."""
+    """Against the motion of any location of a joint, k g(s / s_0), s_0 in the middle of the band."""
 
-    tried: ClassVar[tuple[float, ...]]
-    """Values of the second parameter that a wide search starts from."""
+    start_seconds: ClassVar[tuple[float, ...]]
+    """Values of the second parameter that a global scan starts from."""
     rivals_several: ClassVar[bool] = False
-    """Any two causes may imitate it, not only those with dynamics of their own."""
+    """Any two components may imitate it, not only those with dynamics of their own."""
 
     @abstractmethod
     def second_parameter(self) -> Parameter:
@@ -56,37 +56,37 @@ class LocalForce(ViscoelasticJoint):
         """Give g, (n_points,) complex array, at s over that in the middle of the band."""
 
     @abstractmethod
-    def words(self, where: str, second: float) -> str:
+    def describe(self, where: str, second: float) -> str:
         """Say what explains the measurement better than the catalogue."""
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness in the middle of the band, and the second one."""
-        own = context.stiffness_against(motion_at(context, location))
-        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own), self.second_parameter())
+        scale = context.stiffness_against(motion_at(context, location))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * scale, high=STIFFEST * scale), self.second_parameter())
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness; no matrices have it."""
         motion, middle = motion_at(context, location)[:, None], _middle(context)
-        none = np.zeros((1, 1))
+        zero = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:
             stiffness, second = values
             attachment = Attachment(
                 motions=motion,
                 stiffness=lambda s: stiffness * self.per_stiffness(s / middle, float(second)),
-                matrices=(none, none, none),
+                matrices=(zero, zero, zero),
             )
             return Change(attachments=(attachment,))
 
         return change
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
-        """Draw some values of the second parameter."""
+        """Take some values of the second parameter."""
         unit = context.contour / _middle(context)
         return Signature(
             motion=motion_at(context, location),
-            shapes=np.array([self.per_stiffness(unit, second) for second in self.tried]),
-            values=np.stack([np.ones(len(self.tried)), self.tried], 1),
+            shapes=np.array([self.per_stiffness(unit, second) for second in self.start_seconds]),
+            values=np.stack([np.ones(len(self.start_seconds)), self.start_seconds], 1),
         )
 
 
@@ -96,8 +96,8 @@ def describe_location(context: ModelContext, location: Location) -> str:
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    location : Place
+        Model, layout and tolerances.
+    location : Location
         Of a joint.
 
     Returns
@@ -107,7 +107,7 @@ def describe_location(context: ModelContext, location: Location) -> str:
     """
     nodes = location.entries.get("nodes")
     if isinstance(nodes, list):
-        return context.where(int(nodes[0]))
+        return context.describe_node(int(nodes[0]))
     return f"spring {location.key[1]}"
 
 
@@ -116,14 +116,14 @@ def _middle(context: ModelContext) -> float:
 
 
 class PowerLaw(LocalForce):
-    """k (s / s_0)^order between a place and the ground: a force that rises with some power of frequency.
+    """k (s / s_0)^order between a location and the ground: a force that rises with some power of frequency.
 
     Springs, dampers and masses are the powers 0, 1 and 2; materials that relax over many time constants lie between
     [Bagley1983]. What imitates such a force in the catalogue explains less than the power law itself.
     """
 
     name = "power_law"
-    tried = (0.25, 0.5, 0.75, 1.5)
+    start_seconds = (0.25, 0.5, 0.75, 1.5)
 
     def second_parameter(self) -> Parameter:
         """Order."""
@@ -133,7 +133,7 @@ class PowerLaw(LocalForce):
         """Take a power."""
         return np.asarray(s**second)
 
-    def words(self, where: str, second: float) -> str:
+    def describe(self, where: str, second: float) -> str:
         """Say which power."""
         return (
             f"a force at {where} that grows with the power {second:.2g} of frequency explains the measurement "
@@ -142,14 +142,14 @@ class PowerLaw(LocalForce):
 
 
 class NegativeSpring(LocalForce):
-    """k (-1 + loss s / s_0) between a place and the ground: it pushes on in the direction of the motion, with losses.
+    """k (-1 + loss s / s_0) between a location and the ground: a negative stiffness with losses.
 
     Magnets, buckled springs, control that is late: a late force -k exp(-s tau) is -k + k tau s as long as the delay tau
     is short, takes stiffness away and damps.
     """
 
     name = "negative_spring"
-    tried = (0.01, 0.1, 1.0, 5.0)
+    start_seconds = (0.01, 0.1, 1.0, 5.0)
     rivals_several = True
 
     def second_parameter(self) -> Parameter:
@@ -160,7 +160,7 @@ class NegativeSpring(LocalForce):
         """Sum a negative spring and a damper."""
         return np.asarray(second * s - 1)
 
-    def words(self, where: str, second: float) -> str:
+    def describe(self, where: str, second: float) -> str:
         """Say how lossy."""
         return (
             f"a force at {where} that takes stiffness away, with a loss factor of {second:.2g} in the middle of the "
@@ -171,46 +171,53 @@ class NegativeSpring(LocalForce):
 KINDS: tuple[LocalForce, ...] = (PowerLaw(), NegativeSpring())
 
 
-def find_unnamed_force(problem: InferenceProblem, found: Decision) -> Fit | None:
-    """Look for one force that explains more than what was found, or as much as several causes.
+def find_unnamed_force(problem: InferenceProblem, decision: Decision) -> Fit | None:
+    """Search for one force that explains more than what was found, or as much as several components.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and model.
-    found : Decision
-        With one cause or more.
+    decision : Decision
+        With one component or more.
 
     Returns
     -------
     Fit or None
-        Of a force; None where what was found explains as much, or is one cause that has no dynamics of its own.
+        Of a force; None where what was found explains as much, or is one component that has no dynamics of its own.
     """
-    components = found.final.hypothesis.components
+    components = decision.final.hypothesis.components
     are_dynamic = bool(components) and all(component.effect.has_dynamics for component in components)
     kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(components) > 1)]
     if not kinds:
         return None
-    cost_limit = problem.fit_roughly(components, found.final.values).cost + MAX_BEHIND
-    fits = [fit for kind in kinds if (fit := _best_of(problem, found.null, kind, cost_limit)) is not None]
-    needed = found.final.log_evidence + (LIMITS[problem.kind].beside_log_bayes_factor if len(components) == 1 else 0.0)
-    return max((fit for fit in fits if fit.log_evidence > needed), key=lambda fit: fit.log_evidence, default=None)
+    cost_limit = problem.fit_roughly(components, decision.final.values).cost + MAX_BEHIND
+    fits = [fit for kind in kinds if (fit := _fit_best_location(problem, decision.null, kind, cost_limit)) is not None]
+    required_log_evidence = decision.final.log_evidence + (
+        LIMITS[problem.kind].beside_log_bayes_factor if len(components) == 1 else 0.0
+    )
+    return max(
+        (fit for fit in fits if fit.log_evidence > required_log_evidence),
+        key=lambda fit: fit.log_evidence,
+        default=None,
+    )
 
 
-def _best_of(problem: InferenceProblem, null: Fit, kind: LocalForce, cost_limit: float) -> Fit | None:
-    """Fit a kind of force at its best place; none where its cost with large errors is above a bar."""
-    only = replace(problem, effects={kind.name: kind})
-    refined = refine_starts(only, null, scan_globally(only, null))
-    early = [
-        only.fit_roughly((*known, start.component), start.values) for known, start in _refine_halfway(only, refined)
+def _fit_best_location(problem: InferenceProblem, null: Fit, kind: LocalForce, cost_limit: float) -> Fit | None:
+    """Fit a kind of force at its best location; None where its cost with inflated errors exceeds a limit."""
+    force_problem = replace(problem, effects={kind.name: kind})
+    refined = refine_starts(force_problem, null, scan_globally(force_problem, null))
+    rough_fits = [
+        force_problem.fit_roughly((*known, start.component), start.values)
+        for known, start in _refine_halfway(force_problem, refined)
     ]
-    best = min(early, key=lambda fit: fit.cost)
+    best = min(rough_fits, key=lambda fit: fit.cost)
     if best.cost > cost_limit:
         return None
-    exact = only.fit_exactly(best)
+    exact = force_problem.fit_exactly(best)
     fits = {exact.hypothesis.components[-1].key: exact}
-    search_neighbourhoods(only, null, fits)
-    return rank_fits(only, fits.values())[0]
+    search_neighbourhoods(force_problem, null, fits)
+    return rank_fits(force_problem, fits.values())[0]
 
 
 def describe_unnamed_force(fit: Fit) -> str:
@@ -228,7 +235,7 @@ def describe_unnamed_force(fit: Fit) -> str:
     """
     (component,) = fit.hypothesis.components
     kind = cast("LocalForce", component.effect)
-    return kind.words(describe_location(fit.hypothesis.context, component.location), float(fit.values[-1]))
+    return kind.describe(describe_location(fit.hypothesis.context, component.location), float(fit.values[-1]))
 
 
 def _refine_halfway(problem: InferenceProblem, refined: Sequence[Start]) -> list[StartBeside]:

@@ -131,9 +131,9 @@ def test_one_parameter_that_is_determined_is_enough(gap_variance, expected):
 def test_a_linear_cause_that_leaves_nothing_gives_way_to_a_proven_law_only(
     monkeypatch, verdict, nonlinear_evidence, expected
 ):
-    monkeypatch.setattr(whole, "_with_law", lambda *_: "law")
+    monkeypatch.setattr(whole, "_add_law", lambda *_: "law")
     laws = SimpleNamespace(verdict=verdict, nonlinear_evidence=nonlinear_evidence)
-    assert whole._unless_a_law("spring", laws) == expected
+    assert whole._prefer_proven_law("spring", laws) == expected
 
 
 def test_nothing_is_found_in_a_linear_chain(chain, strike):

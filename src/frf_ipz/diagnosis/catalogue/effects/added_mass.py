@@ -34,7 +34,7 @@ class AddedMass(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves."""
-        return _once_a_node(list_node_locations(context))
+        return _one_per_node(list_node_locations(context))
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Mass."""
@@ -54,7 +54,7 @@ class AddedMass(Effect):
         dof = next(d for d in context.moving_dofs if (d.node, d.direction) == (node, direction))
         amplitudes = np.geomspace(3e-4, 1.0, 14) * context.mass_kg
         return Signature(
-            motion=context.unit(dof),
+            motion=context.unit_motion(dof),
             shapes=context.contour[None] ** 2,
             values=np.ones((1, 1)),
             amplitudes=amplitudes,
@@ -69,11 +69,11 @@ class AddedMass(Effect):
         mass = values["mass_kg"]
         return (
             f"A mass of {1e3 * mass.value:.3g} g (+- {1e3 * mass.std:.2g} g) sits at "
-            f"{context.where(int(str(location.key[0])))} that the model lacks."
+            f"{context.describe_node(int(str(location.key[0])))} that the model lacks."
         )
 
 
-def _once_a_node(locations: Sequence[Location]) -> list[Location]:
-    """Keep one place a node: a mass acts in all directions."""
+def _one_per_node(locations: Sequence[Location]) -> list[Location]:
+    """Keep one location a node: a mass acts in all directions."""
     first = {location.key[0]: location for location in reversed(locations)}
     return [first[node] for node in sorted(first, key=lambda node: int(str(node)))]

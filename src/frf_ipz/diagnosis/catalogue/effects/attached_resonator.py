@@ -1,4 +1,4 @@
-"""Something that hangs on the structure and swings by itself: a cable, a loose part, an absorber."""
+"""A resonator that hangs on the structure: a cable, a loose part, an absorber."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
 LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, a damper or a mass
 RATIOS = 1e-3, 0.5
-USUAL_RATIO, WITHIN = 0.05, 1.7  # the most of what swings by itself, and the factor by which it may be more
+USUAL_RATIO, WITHIN = 0.05, 1.7  # the largest of real resonators, and the factor by which it may be more
 FREQUENCY_STEP = 1.06
 TRIED_RATIOS = (0.01, 0.06)
-MOST_RATIO = 0.2  # with more, what fits is a resonator in name only
+MAX_RATIO = 0.2  # with more, what fits is a resonator in name only
 
 
 class AttachedResonator(Effect):
@@ -61,11 +61,11 @@ class AttachedResonator(Effect):
         def change(values: np.ndarray) -> Change:
             mass, frequency_hz, ratio = values
             omega = 2 * np.pi * frequency_hz
-            own, across = np.diag([0.0, mass]), np.array([[1.0, -1.0], [-1.0, 1.0]])
+            inertia, across = np.diag([0.0, mass]), np.array([[1.0, -1.0], [-1.0, 1.0]])
             attachment = Attachment(
                 motions=motion,
                 stiffness=lambda s: mass * dynamic_mass(s, frequency_hz, ratio),
-                matrices=(own, 2 * ratio * omega * mass * across, omega**2 * mass * across),
+                matrices=(inertia, 2 * ratio * omega * mass * across, omega**2 * mass * across),
             )
             return Change(attachments=(attachment,))
 
@@ -88,28 +88,27 @@ class AttachedResonator(Effect):
         return list_neighbouring_nodes(context, location)
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
-        """Expect what swings by itself to be little damped: with much damping it is a damper with a mass behind it."""
+        """Expect a resonator to be little damped: with much damping it is a damper with a mass behind it."""
         del context, location
         beyond = max(float(np.log(values[2] / USUAL_RATIO)), 0.0)
         return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
 
     def implausibility(self, values: FloatArray) -> str:
-        """Doubt one that hardly swings: it can bend to what many other losses do."""
+        """Doubt one of large damping: it can imitate many other losses."""
         _, frequency_hz, ratio = values
-        if ratio <= MOST_RATIO:
+        if ratio <= MAX_RATIO:
             return ""
         return (
             f"what looks like a resonator of {frequency_hz:.4g} Hz has a damping ratio of {100 * ratio:.2g} %, far "
-            "more than what swings by itself: it rather is another way to lose energy"
+            "more than a resonator has: it rather stands for another loss of energy"
         )
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
-        """Say what swings where."""
+        """Say what is attached where."""
         return (
-            f"Something of {1e3 * values['mass_kg'].value:.3g} g hangs at "
-            f"{context.where(int(str(location.key[0])))} and swings by itself at "
-            f"{values['frequency_hz'].value:.4g} Hz with a damping ratio of "
-            f"{100 * values['damping_ratio'].value:.2g} %."
+            f"A resonator of {1e3 * values['mass_kg'].value:.3g} g is attached at "
+            f"{context.describe_node(int(str(location.key[0])))} that the model lacks: its natural frequency is "
+            f"{values['frequency_hz'].value:.4g} Hz, its damping ratio {100 * values['damping_ratio'].value:.2g} %."
         )
 
 
@@ -121,7 +120,7 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
     s : (n_points,) complex array
         rad/s.
     frequency_hz, ratio : float
-        Of the resonator, with its foot held.
+        Of the resonator on a fixed base.
 
     Returns
     -------
@@ -134,4 +133,4 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
 
 
 def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))
+    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))

@@ -1,4 +1,4 @@
-"""A held end of a beam that gives way."""
+"""A compliant support: an end of a beam that the model holds rigidly."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 ROTATION, TRANSLATION = "rotational_stiffness_Nm_rad", "translational_stiffness_N_m"
-HELD = {"clamped": ("ry", "z"), "pinned": ("z",), "sliding": ("ry",), "free": ()}
+SUPPORTED = {"clamped": ("ry", "z"), "pinned": ("z",), "sliding": ("ry",), "free": ()}
 BOUNDS = {"ry": (0.05, 3e4), "z": (0.5, 1e7)}  # over EI/L and EI/L^3
 NAMES = {"ry": ROTATION, "z": TRANSLATION}
 ONE_ALONE, OF_TWO = 14, 7  # values to start from along each stiffness
 
 
 class BoundaryCompliance(Effect):
-    """The held motion of an end is held by a spring instead."""
+    """The motion that the support of an end blocks is held by a spring instead."""
 
     name = "boundary_compliance"
     imitators = ("local_stiffness", "added_mass", "axial_load")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
-        """Each held end of a beam: its rotation, its translation, or both."""
+        """Each supported end of a beam: its rotation, its translation, or both."""
         source = context.model.source
         if not isinstance(source, BeamFile):
             return []
-        found = []
+        locations = []
         for end, node in (("left", 1), ("right", source.beam.elements + 1)):
-            held = HELD[getattr(source.beam, end)]
-            ways = [held] if len(held) < 2 else [(held[0],), (held[1],), held]
-            found += [Location(key=(end, way), entries={"end": end, "nodes": [node]}) for way in ways if way]
-        return found
+            supported = SUPPORTED[getattr(source.beam, end)]
+            ways = [supported] if len(supported) < 2 else [(supported[0],), (supported[1],), supported]
+            locations += [Location(key=(end, way), entries={"end": end, "nodes": [node]}) for way in ways if way]
+        return locations
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness of each spring."""
@@ -55,7 +55,7 @@ class BoundaryCompliance(Effect):
         )
 
     def build(self, context: ModelContext, location: Location) -> Builder:
-        """Release the held DOFs and put springs there."""
+        """Release the fixed DOFs and put springs there."""
         model = context.model
         node = model.source.beam.elements + 1 if location.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
         released = tuple(model.full_index(Dof(node, way)) for way in _ways(location))
@@ -73,13 +73,15 @@ class BoundaryCompliance(Effect):
         return grid(parameters, ONE_ALONE if len(parameters) == 1 else OF_TWO)
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Give the other ways in which that end may give way."""
+        """Give the other motions in which that support may be compliant."""
         return [
-            other for other in self.locations(context) if other.key[0] == location.key[0] and other.key != location.key
+            alternative
+            for alternative in self.locations(context)
+            if alternative.key[0] == location.key[0] and alternative.key != location.key
         ]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
-        """Say which end gives way, and how much."""
+        """Say which support is compliant, and how much."""
         del context
         texts = {ROTATION: "{:.4g} N m/rad in rotation", TRANSLATION: "{:.4g} N/m in translation"}
         springs = " and ".join(texts[name].format(value.value) for name, value in values.items())

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
-MOST_IN_A_ROW, MOST_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
+MAX_IN_A_ROW, MAX_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
 FURTHEST = 3  # nodes in a row around each end
-NEXT_TO = 2  # nodes in a row that count as one place: what joins them is the structure itself
+NEXT_TO = 2  # nodes in a row that count as one location: what joins them is the structure itself
 
 
 class CouplingSpring(Effect):
@@ -41,8 +41,8 @@ class CouplingSpring(Effect):
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness."""
-        own = context.stiffness_against(_motion(context, location))
-        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
+        scale = context.stiffness_against(_motion(context, location))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * scale, high=STIFFEST * scale),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the matrix."""
@@ -52,12 +52,12 @@ class CouplingSpring(Effect):
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
-        """Share what a pair is worth among those that stand behind it where not all are listed."""
+        """Share the prior of a listed pair among the pairs that it stands for where not all are listed."""
         del location, values
         return -2 * float(np.log(_stride(context)))
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
-        """Draw a constant."""
+        """Give a constant stiffness."""
         return Signature(
             motion=_motion(context, location),
             shapes=np.ones((1, len(context.contour)), complex),
@@ -65,27 +65,29 @@ class CouplingSpring(Effect):
         )
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """One of the ends at a node beside; in a row also both, for what one end loses the other makes up."""
+        """One end at a node beside; in a row also both ends, for they make up for each other."""
         first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
-        pairs = [(near, second) for near in context.nodes_near(first, direction)]
-        pairs += [(first, near) for near in context.nodes_near(second, direction)]
+        pairs = [(neighbour, second) for neighbour in context.neighbouring_nodes(first, direction)]
+        pairs += [(first, neighbour) for neighbour in context.neighbouring_nodes(second, direction)]
         if context.model.kind in ("beam", "lumped"):
             nodes = {dof.node for dof in context.moving_dofs if dof.direction == direction}
-            both = [(first + step, second + other) for step, other in product((-1, 1), repeat=2)]
-            pairs += [pair for pair in both if nodes.issuperset(pair)]
-        found = _make_locations(context, location, pairs)
-        return [*found, *([floating(location)] if context.basis.modes.n_rigid and not is_floating(location) else [])]
+            shifted = [(first + a, second + b) for a, b in product((-1, 1), repeat=2)]
+            pairs += [pair for pair in shifted if nodes.issuperset(pair)]
+        beside = _make_locations(context, location, pairs)
+        return [*beside, *([floating(location)] if context.basis.modes.n_rigid and not is_floating(location) else [])]
 
     def surroundings(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Both ends at any nodes near: along a line of such pairs, each is nearly as good as the next."""
         first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
-        near, far = ([node, *context.nodes_near(node, direction, FURTHEST)] for node in (first, second))
-        return _make_locations(context, location, [pair for pair in product(near, far) if pair != (first, second)])
+        firsts, seconds = ([node, *context.neighbouring_nodes(node, direction, FURTHEST)] for node in (first, second))
+        return _make_locations(
+            context, location, [pair for pair in product(firsts, seconds) if pair != (first, second)]
+        )
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and between what."""
         stiffness = values["stiffness_N_m"]
-        first, second = (context.where(int(str(node))) for node in location.key[:2])
+        first, second = (context.describe_node(int(str(node))) for node in location.key[:2])
         return (
             f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
             "the model lacks it."
@@ -93,9 +95,9 @@ class CouplingSpring(Effect):
 
 
 def _stride(context: ModelContext) -> int:
-    """One of how many nodes is listed."""
-    most = MOST_IN_A_ROW if context.model.kind == "beam" else MOST_NODES
-    return -(-len(context.moving_dofs) // most)
+    """Step from one listed node to the next."""
+    max_nodes = MAX_IN_A_ROW if context.model.kind == "beam" else MAX_NODES
+    return -(-len(context.moving_dofs) // max_nodes)
 
 
 def _make_location(first: int, second: int, direction: str) -> Location:
@@ -103,10 +105,10 @@ def _make_location(first: int, second: int, direction: str) -> Location:
     return Location(key=(low, high, direction), entries={"nodes": [low, high]})
 
 
-def _make_locations(context: ModelContext, like: Location, pairs: Sequence[tuple[int, int]]) -> list[Location]:
-    """Make places of pairs of nodes, hanging or not as another."""
-    found = [_make_location(a, b, str(like.key[2])) for a, b in pairs if a != b and _is_new(context, a, b)]
-    return [floating(other) for other in found] if is_floating(like) else found
+def _make_locations(context: ModelContext, template: Location, pairs: Sequence[tuple[int, int]]) -> list[Location]:
+    """Make locations of pairs of nodes, floating where the template is."""
+    locations = [_make_location(a, b, str(template.key[2])) for a, b in pairs if a != b and _is_new(context, a, b)]
+    return [floating(location) for location in locations] if is_floating(template) else locations
 
 
 def _is_new(context: ModelContext, first: int, second: int) -> bool:
@@ -119,4 +121,4 @@ def _is_new(context: ModelContext, first: int, second: int) -> bool:
 def _motion(context: ModelContext, location: Location) -> np.ndarray:
     first, second, direction = location.key[:3]
     ends = {dof.node: dof for dof in context.moving_dofs if dof.direction == direction}
-    return context.unit(ends[int(str(second))]) - context.unit(ends[int(str(first))])
+    return context.unit_motion(ends[int(str(second))]) - context.unit_motion(ends[int(str(first))])

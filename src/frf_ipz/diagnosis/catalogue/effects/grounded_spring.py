@@ -36,13 +36,13 @@ class GroundedSpring(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves; not where a lumped model has such a spring already, which is then stiffer."""
         springs = [part for part in context.model.parts if part.kind == "spring"]
-        taken = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        return [location for location in list_node_locations(context) if location.key[0] not in taken]
+        grounded = {node for part in springs if 0 in part.nodes for node in part.nodes}
+        return [location for location in list_node_locations(context) if location.key[0] not in grounded]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness."""
-        own = context.stiffness_against(_motion(context, location))
-        return (Parameter(name="stiffness_N_m", low=SOFTEST * own, high=STIFFEST * own),)
+        scale = context.stiffness_against(_motion(context, location))
+        return (Parameter(name="stiffness_N_m", low=SOFTEST * scale, high=STIFFEST * scale),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the diagonal."""
@@ -51,7 +51,7 @@ class GroundedSpring(Effect):
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
-        """Draw a constant."""
+        """Give a constant stiffness."""
         return Signature(
             motion=_motion(context, location),
             shapes=np.ones((1, len(context.contour)), complex),
@@ -59,11 +59,13 @@ class GroundedSpring(Effect):
         )
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Nodes beside; what a free structure touches may also hang as softly as the structure does."""
+        """Nodes beside; what a free structure touches may also float with it."""
         if is_floating(location):
             return [
-                floating(other)
-                for other in list_neighbouring_nodes(context, Location(key=location.key[:2], entries=location.entries))
+                floating(neighbour)
+                for neighbour in list_neighbouring_nodes(
+                    context, Location(key=location.key[:2], entries=location.entries)
+                )
             ]
         return [
             *list_neighbouring_nodes(context, location),
@@ -73,7 +75,7 @@ class GroundedSpring(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and where."""
         stiffness = values["stiffness_N_m"]
-        where = context.where(int(str(location.key[0])))
+        where = context.describe_node(int(str(location.key[0])))
         return (
             f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) holds {where} "
             f"to {'something that hangs as softly as the structure' if is_floating(location) else 'the ground'}; "
@@ -82,28 +84,28 @@ class GroundedSpring(Effect):
 
 
 def floating(location: Location) -> Location:
-    """Make a place one at which what is added hangs as softly as the structure.
+    """Make a location one at which what is added floats with the structure, as softly suspended as it is.
 
     Parameters
     ----------
-    location : Place
-        A place on a free structure.
+    location : Location
+        A location on a free structure.
 
     Returns
     -------
-    Place
-        The same, hanging.
+    Location
+        The same, floating.
     """
     return Location(key=(*location.key, FLOATING), entries=location.entries)
 
 
 def is_floating(location: Location) -> bool:
-    """Tell whether what is added at a place hangs as softly as the structure.
+    """Tell whether what is added at a location floats with the structure.
 
     Parameters
     ----------
-    location : Place
-        The place.
+    location : Location
+        The location.
 
     Returns
     -------
@@ -114,4 +116,4 @@ def is_floating(location: Location) -> bool:
 
 
 def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[:2]))
+    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[:2]))

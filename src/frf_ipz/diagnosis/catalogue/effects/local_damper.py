@@ -68,9 +68,9 @@ class LocalDamper(Effect):
         damping = values["damping_Ns_m"]
         return (
             f"A damper of {damping.value:.4g} N s/m (+- {damping.std:.2g}) acts between "
-            f"{context.where(int(str(location.key[0])))} and the ground."
+            f"{context.describe_node(int(str(location.key[0])))} and the ground."
         )
 
 
 def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))
+    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))

@@ -20,28 +20,28 @@ if TYPE_CHECKING:
 
 BOUNDS = 0.02, 20.0
 TRIED = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.97, 1.03, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
-LENGTHS = (1, 2, 4, 8, 16)  # of stretches of elements that are searched; others are found from them
+LENGTHS = (1, 2, 4, 8, 16)  # of segments of elements that are searched; others are found from them
 USUAL_LENGTH, WITHIN = 0.04, 2.0  # of the whole: a crack takes away stiffness over about three heights; to a factor
 LEAST_CHANGE = 0.03  # of stiffness: below, all changes are as likely
-LONGEST = 4  # of the whole, as a divisor: longer stretches are not local
+LONGEST = 4  # of the whole, as a divisor: longer segments are not local
 KEYS = {"element": "elements", "spring": "springs", "group": "groups"}
 
 
 class LocalStiffness(Effect):
-    """Stretches of elements, springs or groups; masses stay."""
+    """Segments of elements, springs or groups; masses stay."""
 
     name = "local_stiffness"
     imitators = ("boundary_compliance", "added_mass", "coupling_spring")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
-        """Stretches of some lengths; every spring; every group."""
+        """Segments of some lengths; every spring; every group."""
         parts = [part for part in context.model.parts if part.kind in KEYS and _has_stiffness(part)]
         elements = [part for part in parts if part.kind == "element"]
-        found = [Location(key=(part.kind, part.name), entries={KEYS[part.kind]: [part.name]}) for part in parts]
+        locations = [Location(key=(part.kind, part.name), entries={KEYS[part.kind]: [part.name]}) for part in parts]
         if not elements:
-            return found
+            return locations
         return [
-            _stretch(first, first + length - 1)
+            _segment(first, first + length - 1)
             for length in LENGTHS
             if length <= max(len(elements) // LONGEST, 1)
             for first in range(1, len(elements) - length + 2, max(length // 4, 1))
@@ -64,7 +64,7 @@ class LocalStiffness(Effect):
         return TRIED[:, None]
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
-        """Bend a stretch with constant curvature, draw out a spring; a group has no such single motion."""
+        """Bend a segment with constant curvature, extend a spring; a group has no such single motion."""
         kind = location.key[0]
         if kind == "group":
             return None
@@ -74,20 +74,20 @@ class LocalStiffness(Effect):
         return Signature(motion=motion, shapes=shapes, values=TRIED[:, None], amplitudes=np.ones(1))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Stretches that begin or end an element earlier or later; all other springs or groups are searched anyway."""
+        """Segments that begin or end an element earlier or later; all other springs or groups are searched anyway."""
         if location.key[0] != "element":
             return []
         first, last = int(str(location.key[1])), int(str(location.key[2]))
         total = sum(part.kind == "element" for part in context.model.parts)
-        wide = max((last - first + 1) // 3, 2)
-        moves = {(a, b) for step in (1, wide) for a in (-step, 0, step) for b in (-step, 0, step)} - {(0, 0)}
-        tried = [(first + a, last + b) for a, b in sorted(moves)]
-        return [_stretch(a, b) for a, b in tried if 1 <= a <= b <= total and b - a < max(total // LONGEST, 1)]
+        stride = max((last - first + 1) // 3, 2)
+        moves = {(a, b) for step in (1, stride) for a in (-step, 0, step) for b in (-step, 0, step)} - {(0, 0)}
+        candidates = [(first + a, last + b) for a, b in sorted(moves)]
+        return [_segment(a, b) for a, b in candidates if 1 <= a <= b <= total and b - a < max(total // LONGEST, 1)]
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Expect some length, and the size of the change in flexibility to be known by its logarithm only.
 
-        A short stretch that changes much and a longer one that changes little look alike. Without this the short one
+        A short segment that changes much and a longer one that changes little look alike. Without this the short one
         is preferred, whose change has the larger uncertainty.
         """
         by_size = -float(np.log(max(abs(values[0] - 1), LEAST_CHANGE)))
@@ -102,8 +102,8 @@ class LocalStiffness(Effect):
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
         return (
-            f"{_called(context, location)} {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} than "
-            "in the model."
+            f"{_name_part(context, location)} {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} "
+            "than in the model."
         )
 
 
@@ -111,7 +111,7 @@ def _has_stiffness(part: Part) -> bool:
     return bool(part.stiffness.size if isinstance(part.stiffness, np.ndarray) else part.stiffness.nnz)
 
 
-def _stretch(first: int, last: int) -> Location:
+def _segment(first: int, last: int) -> Location:
     return Location(key=("element", first, last), entries={"elements": [first, last]})
 
 
@@ -121,7 +121,7 @@ def _names(location: Location) -> list[str]:
     return [str(number) for number in range(int(str(location.key[1])), int(str(location.key[2])) + 1)]
 
 
-def _called(context: ModelContext, location: Location) -> str:
+def _name_part(context: ModelContext, location: Location) -> str:
     if location.key[0] != "element":
         return f"The {location.key[0]} '{location.key[1]}' is"
     first, last = int(str(location.key[1])), int(str(location.key[2]))
@@ -131,7 +131,7 @@ def _called(context: ModelContext, location: Location) -> str:
 
 
 def _curvature(context: ModelContext, location: Location) -> tuple[FloatArray, float]:
-    """Rotation of a stretch's right end against its left one, and the bending stiffness against that."""
+    """Rotation of a segment's right end against its left one, and the bending stiffness against that."""
     first, last = int(str(location.key[1])), int(str(location.key[2]))
     model = context.model
     motion = np.zeros(len(model.all_dofs))

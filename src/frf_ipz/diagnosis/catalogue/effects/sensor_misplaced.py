@@ -23,11 +23,11 @@ class SensorMisplaced(Effect):
         """Every other node for every channel that stays at one node."""
         channels = [channel for channel, _ in context.layout.outputs]
         return [
-            _make_location(channel, other.node)
+            _make_location(channel, candidate.node)
             for channel, dof in context.layout.outputs
             if channels.count(channel) == 1
-            for other in context.moving_dofs
-            if other.direction == dof.direction and other.node != dof.node
+            for candidate in context.moving_dofs
+            if candidate.direction == dof.direction and candidate.node != dof.node
         ]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
@@ -50,7 +50,9 @@ class SensorMisplaced(Effect):
         channel, node = str(location.key[0]), int(str(location.key[1]))
         dof = next(dof for name, dof in context.layout.outputs if name == channel)
         return [
-            _make_location(channel, other) for other in context.nodes_near(node, dof.direction) if other != dof.node
+            _make_location(channel, neighbour)
+            for neighbour in context.neighbouring_nodes(node, dof.direction)
+            if neighbour != dof.node
         ]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
@@ -58,7 +60,7 @@ class SensorMisplaced(Effect):
         del values
         channel, node = str(location.key[0]), int(str(location.key[1]))
         dof = next(dof for name, dof in context.layout.outputs if name == channel)
-        return f"The sensor of '{channel}' sits at {context.where(node)}, not at node {dof.node}."
+        return f"The sensor of '{channel}' sits at {context.describe_node(node)}, not at node {dof.node}."
 
 
 def _make_location(channel: str, node: int) -> Location:

@@ -1,6 +1,6 @@
 """Loss within the material: a loss factor of the whole stiffness.
 
-K (1 + i eta) is what the loss factor means, but answers before it is asked, which no structure does: a constant loss
+K (1 + i eta) is what the loss factor means, but it is not causal: a constant loss
 factor makes the stiffness rise with frequency (Kjartansson 1979), from the model's in the middle of the band, or for
 each mode from the model's at its own frequency. Many simulations put eta / 2 to the damping ratio of each mode instead:
 the same at resonances. All four are tried.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BOUNDS = 1e-5, 1.0
 CAUSAL, KEEPING_MODES, OF_MODES = "causal", "causal, mode by mode", "of modes"
-LESS_LIKELY = -3.0  # nats: less than what tells explanations apart, more than what priors of two numbers differ by
+LESS_LIKELY = -3.0  # log prior: less than distinguishes explanations, more than priors of two numbers differ by
 TRIED = np.geomspace(2e-4, 0.5, 16)
 
 
@@ -67,6 +67,6 @@ class StructuralDamping(Effect):
         del context, location
         loss = values["loss_factor"]
         return (
-            f"The material loses energy by itself: a loss factor of {loss.value:.3g} (+- {loss.std:.2g}) of the whole "
-            "stiffness, besides the model's damping."
+            f"The material has a loss factor of {loss.value:.3g} (+- {loss.std:.2g}), of all stiffness and besides "
+            "the model's damping."
         )

@@ -1,4 +1,4 @@
-"""A joint that relaxes: stiff when it is moved fast, soft when it is moved slowly, and lossy between."""
+"""A viscoelastic joint: stiff at high frequencies, soft at low ones, and lossy between."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SOFTEST, STIFFEST = 1e-5, 1e2  # of the structure's own stiffness there
 SLOWEST, FASTEST = 0.15, 6.0  # relaxation rate over the edges of the band: beyond, it is a spring or a damper
 N_TIMES = 9
-LIGHT = 30.0  # frequency of the point between spring and damper over the band's upper edge: its mass is felt by nobody
+LIGHT = 30.0  # frequency of the point between spring and damper over the band's upper edge: its mass has no effect
 
 
 class ViscoelasticJoint(Effect):
@@ -40,22 +40,22 @@ class ViscoelasticJoint(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves, every spring, the rotation of every pinned end."""
-        found = [
+        at_nodes = [
             Location(key=("node", *location.key), entries=location.entries) for location in list_node_locations(context)
         ]
         springs = [part for part in context.model.parts if part.kind == "spring"]
         to_ground = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        found = [location for location in found if location.key[1] not in to_ground]
-        found += [Location(key=("spring", part.name), entries={"springs": [part.name]}) for part in springs]
-        return found + _ends(context)
+        at_nodes = [location for location in at_nodes if location.key[1] not in to_ground]
+        at_springs = [Location(key=("spring", part.name), entries={"springs": [part.name]}) for part in springs]
+        return at_nodes + at_springs + _ends(context)
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
-        own = context.stiffness_against(motion_at(context, location))
+        scale = context.stiffness_against(motion_at(context, location))
         low, high = (2 * np.pi * edge for edge in context.band_hz)
         name = "rotational_stiffness_Nm_rad" if location.key[0] == "end" else "stiffness_N_m"
         return (
-            Parameter(name=name, low=SOFTEST * own, high=STIFFEST * own),
+            Parameter(name=name, low=SOFTEST * scale, high=STIFFEST * scale),
             Parameter(name="relaxation_time_s", low=1 / (FASTEST * high), high=1 / (SLOWEST * low)),
         )
 
@@ -81,7 +81,7 @@ class ViscoelasticJoint(Effect):
         return change
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
-        """Draw some relaxation times."""
+        """Take some relaxation times."""
         low, high = (2 * np.pi * edge for edge in context.band_hz)
         times = np.geomspace(1 / (2 * high), 1 / (0.5 * low), N_TIMES)
         return Signature(
@@ -111,15 +111,15 @@ class ViscoelasticJoint(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, how fast, where."""
         where = {
-            "node": lambda: f"between {context.where(int(str(location.key[1])))} and the ground",
+            "node": lambda: f"between {context.describe_node(int(str(location.key[1])))} and the ground",
             "spring": lambda: f"across the spring '{location.key[1]}'",
             "end": lambda: f"at the {location.key[1]} end, against its rotation,",
         }[str(location.key[0])]()
         name, stiffness = next(iter(values.items()))
         unit = "N m/rad" if name.startswith("rot") else "N/m"
         return (
-            f"A joint {where} relaxes: {stiffness.value:.4g} {unit} when moved fast, nothing when moved slowly, with a "
-            f"relaxation time of {1e3 * values['relaxation_time_s'].value:.3g} ms."
+            f"A viscoelastic joint acts {where} that the model lacks: its stiffness is {stiffness.value:.4g} {unit} at "
+            f"high frequencies and 0 at low ones, its relaxation time {1e3 * values['relaxation_time_s'].value:.3g} ms."
         )
 
 
@@ -154,25 +154,25 @@ def _ends(context: ModelContext) -> list[Location]:
 
 
 def motion_at(context: ModelContext, location: Location) -> FloatArray:
-    """Weights of all DOFs in what a joint sees.
+    """Weights of all DOFs in the motion of a joint.
 
     Parameters
     ----------
     context : ModelContext
-        What is tested.
-    location : Place
+        Model, layout and tolerances.
+    location : Location
         A node, a spring, or a pinned end.
 
     Returns
     -------
     (n_all,) array
-        The motion of a node, the stretch of a spring, the rotation of an end.
+        The motion of a node, the extension of a spring, the rotation of an end.
     """
     kind = location.key[0]
     if kind == "node":
-        return context.unit(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[1:]))
+        return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[1:]))
     if kind == "end":
-        return context.unit(Dof(int(str(location.key[2])), "ry"))
+        return context.unit_motion(Dof(int(str(location.key[2])), "ry"))
     part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
     motion = np.zeros(len(context.model.all_dofs))
     motion[part.indices] = (-1.0, 1.0)
