@@ -1,4 +1,4 @@
-"""A chain of four masses, struck and measured, integrated by SciPy's adaptive Runge-Kutta method."""
+"""A chain of four masses, struck by a hammer and measured, integrated by SciPy's adaptive Runge-Kutta method."""
 
 from dataclasses import replace
 from functools import cache

@@ -43,10 +43,10 @@ def with_mass(nominal):
 
 
 def test_nothing_missing_is_consistent(nominal):
-    found = diagnose(nominal, observed(measured(nominal)), FEW)
-    assert found.verdict == "consistent"
-    assert found.findings == ()
-    assert found.before.held_out < SEEN
+    diagnosis = diagnose(nominal, observed(measured(nominal)), FEW)
+    assert diagnosis.verdict == "consistent"
+    assert diagnosis.findings == ()
+    assert diagnosis.before.held_out < SEEN
 
 
 def test_a_mass_is_found_at_its_node_with_its_size(with_mass):
@@ -88,19 +88,19 @@ def test_the_corrected_model_has_the_mass(nominal, with_mass):
     unmeasured = (FrfLabel(Dof(4, "z"), Dof(6, "z"), FrfQuantity.ACCELERANCE),)
     s = 2j * np.pi * np.linspace(10.0, 700.0, 300)
     truth = model_frfs(with_point_masses(nominal, {12: MASS_KG}), unmeasured, s)
-    wrong = [np.linalg.norm(model_frfs(one, unmeasured, s) - truth) for one in (corrected, nominal)]
+    wrong = [np.linalg.norm(model_frfs(model, unmeasured, s) - truth) for model in (corrected, nominal)]
     assert wrong[0] < 0.05 * wrong[1]
 
 
 def test_what_no_effect_explains_is_unexplained(nominal):
     changed = with_springs(with_point_masses(nominal, {5: 0.03, 14: 0.04}), {Dof(9, "z"): 3e4})
-    found = diagnose(
+    diagnosis = diagnose(
         nominal, observed(measured(changed)), DiagnoseOptions(effects=("damping_level", "global_stiffness"))
     )
-    assert found.verdict == "unexplained"
-    assert found.mismatch_hz.size
-    assert "Something is missing" in found.statement
-    assert found.after.held_out <= found.before.held_out
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.mismatch_hz.size
+    assert "Something is missing" in diagnosis.statement
+    assert diagnosis.after.held_out <= diagnosis.before.held_out
 
 
 @pytest.mark.parametrize("updating_helps", [True, False])
@@ -112,34 +112,36 @@ def test_a_part_that_makes_worse_what_was_not_fitted_is_left_out(nominal, monkey
 
     monkeypatch.setattr("frf_ipz.diagnosis.diagnose.prove", with_worse_parts)
     changed = with_springs(nominal, {Dof(9, "z"): 3e5})
-    found = diagnose(nominal, observed(measured(changed)), DiagnoseOptions(effects=("sensor_misplaced", "time_delay")))
-    assert found.verdict == "unexplained"
-    assert found.findings == ()
-    assert found.alternatives
-    assert found.after == (found.updated if updating_helps else found.before)
+    diagnosis = diagnose(
+        nominal, observed(measured(changed)), DiagnoseOptions(effects=("sensor_misplaced", "time_delay"))
+    )
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.findings == ()
+    assert diagnosis.alternatives
+    assert diagnosis.after == (diagnosis.updated if updating_helps else diagnosis.before)
 
 
-def test_excluded_stretches_are_not_looked_at(nominal):
+def test_excluded_parts_of_the_band_are_not_analysed(nominal):
     def hum(frequency_hz):
         return 1 + 3.0 * (np.abs(frequency_hz - 100.0) < 2.0)[:, None]
 
-    seen = observed(measured(nominal, factors=hum))
-    assert diagnose(nominal, seen, FEW).verdict != "consistent"
-    found = diagnose(nominal, replace(seen, exclude_hz=((97.0, 103.0),)), FEW)
-    assert found.verdict == "consistent"
-    assert not ((found.mismatch_hz > 97.0) & (found.mismatch_hz < 103.0)).any()
+    observations = observed(measured(nominal, factors=hum))
+    assert diagnose(nominal, observations, FEW).verdict != "consistent"
+    diagnosis = diagnose(nominal, replace(observations, exclude_hz=((97.0, 103.0),)), FEW)
+    assert diagnosis.verdict == "consistent"
+    assert not ((diagnosis.mismatch_hz > 97.0) & (diagnosis.mismatch_hz < 103.0)).any()
     with pytest.raises(InputError, match="exclude_hz"):
-        diagnose(nominal, replace(seen, exclude_hz=((1.0, 1000.0),)), FEW)
+        diagnose(nominal, replace(observations, exclude_hz=((1.0, 1000.0),)), FEW)
 
 
 def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):
     frfs = measured(nominal, factors=lambda f: np.array([1.0, -1.2]) + 0 * f[:, None])
-    found = diagnose(nominal, observed(frfs), FEW)
-    (finding,) = found.findings
+    diagnosis = diagnose(nominal, observed(frfs), FEW)
+    (finding,) = diagnosis.findings
     assert (finding.effect, dict(finding.location)) == ("sensor_gain", {"channels": ["acc_2"]})
     assert finding.parameters["gain_ratio"].value == pytest.approx(-1.2, rel=SEEN)
-    assert apply_to_model(nominal, found) is nominal
-    right = apply_to_frfs(frfs, found)
+    assert apply_to_model(nominal, diagnosis) is nominal
+    right = apply_to_frfs(frfs, diagnosis)
     assert np.allclose(right.values[:, 0], frfs.values[:, 0], rtol=0, atol=0)
     assert np.allclose(right.values[:, 1] * -1.2, frfs.values[:, 1], rtol=SEEN, atol=0)
     assert np.allclose(right.variance[:, 1] * 1.44, frfs.variance[:, 1], rtol=2 * SEEN, atol=0)
@@ -175,7 +177,7 @@ def test_noise_is_not_taken_for_a_gain(nominal):
     assert fit.log_evidence < problem.fit((), np.zeros(0)).log_evidence
 
 
-def test_an_effect_that_is_not_known_is_refused(nominal):
+def test_an_unknown_effect_is_refused(nominal):
     with pytest.raises(InputError, match="added_mass"):
         diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=("aded_mass",)))
 
@@ -197,9 +199,9 @@ def test_a_users_own_effect_is_found(nominal, tmp_path):
     (tmp_path / "mine.py").write_text(OWN, encoding="utf-8")
     frfs = measured(with_springs(nominal, {Dof(14, "z"): 2e4}), labels())
     options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:Cord",))
-    found = diagnose(nominal, observed(frfs), options, folder=tmp_path)
-    assert (found.verdict, found.findings[0].effect) == ("explained", "cord")
-    assert found.findings[0].parameters["pull_N_m"].value == pytest.approx(2e4, rel=SEEN)
+    diagnosis = diagnose(nominal, observed(frfs), options, folder=tmp_path)
+    assert (diagnosis.verdict, diagnosis.findings[0].effect) == ("explained", "cord")
+    assert diagnosis.findings[0].parameters["pull_N_m"].value == pytest.approx(2e4, rel=SEEN)
 
 
 OWN = """

@@ -30,9 +30,9 @@ NEAR = 0.02  # relative: noise, and modes above the band that the reduction has 
 def case(tmp_path_factory):
     nominal = beam(tmp_path_factory.mktemp("beam"))
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
-    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass", "grounded_spring")))
-    (finding,) = found.findings
-    wrong = replace(found, findings=(replace(finding, values=tuple(OFF * value for value in finding.values)),))
+    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass", "grounded_spring")))
+    (finding,) = diagnosis.findings
+    wrong = replace(diagnosis, findings=(replace(finding, values=tuple(OFF * value for value in finding.values)),))
     fit = fit_modes(frfs, FitOptions(band_hz=(10.0, 700.0)))
     model = apply_to_model(nominal, wrong)
     ends = [tuple(dict.fromkeys(ends)) for ends in zip(*((x.input_dof, x.output_dof) for x in labels()), strict=True)]
@@ -69,9 +69,9 @@ def test_nothing_in_the_structure_is_refused(case):
         diagnosed_basis(nominal, replace(wrong, findings=()), reduced)
 
 
-@pytest.mark.parametrize("left", ["clamped", "free"])
-def test_modal_damping_is_that_of_the_reduction(tmp_path, left):
-    model = replace(beam(tmp_path, left=left), modal_damping=np.array([0.01, 0.02, 0.03, 0.005]))
+@pytest.mark.parametrize("left_end", ["clamped", "free"])
+def test_modal_damping_is_that_of_the_reduction(tmp_path, left_end):
+    model = replace(beam(tmp_path, left=left_end), modal_damping=np.array([0.01, 0.02, 0.03, 0.005]))
     ends = {"actuators": (Dof(5, "z"),), "sensors": (Dof(12, "z"),), "points": ()}
     reduced = reduce_model(model, ReduceOptions(), band_hz=(10.0, 700.0), **ends)
     size = np.abs(reduced.damping).max()

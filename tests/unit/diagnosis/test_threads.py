@@ -13,10 +13,10 @@ def threads():
 
 
 def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
-    seen = []
+    used = []
 
     def look(_):
-        seen.extend(threads())
+        used.extend(threads())
         raise KeyboardInterrupt
 
     monkeypatch.setattr(stage, "split_data", look)
@@ -26,4 +26,4 @@ def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             stage.diagnose(None, nothing, DiagnoseOptions())
         assert threads() == before
-    assert set(seen) == {1}
+    assert set(used) == {1}

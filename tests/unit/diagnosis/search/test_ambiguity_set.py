@@ -1,4 +1,4 @@
-"""Places that explain a test as well as the best one that a search came to."""
+"""Locations that explain a test as well as the best one of a search."""
 
 from dataclasses import replace
 
@@ -16,8 +16,8 @@ from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.changes import with_point_masses, with_springs
 
 NODES, TRUE, MIRRORED, ADDED_KG = 25, 6, 20, 2e-3
-LITTLE_KG = 5e-5  # of which the place is hardly seen
-MIDDLE = labels(outputs=("13:+z",), inputs=("13:+z",))  # a sensor and blows that do not tell left from right
+LITTLE_KG = 5e-5  # whose location is hardly observable
+MIDDLE = labels(outputs=("13:+z",), inputs=("13:+z",))  # a sensor and impacts that do not distinguish left from right
 ASTRAY = 9
 SPRING_N_M = 5e3
 
@@ -30,12 +30,12 @@ def nominal(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def symmetric(nominal):
-    """Looked at in its middle."""
+    """Measured in its middle."""
     return problem_of(nominal, measured(with_point_masses(nominal, {TRUE: ADDED_KG}), MIDDLE), ("added_mass",))
 
 
 def only(problem, *nodes, added_kg=ADDED_KG):
-    """A ranking of a search that came to some nodes only."""
+    """The ranking of a search that found some nodes only."""
     effect, null = problem.effects["added_mass"], fit_null_model(problem)
     locations = {location.entries["nodes"][0]: location for location in effect.locations(problem.context)}
     components = [Component(effect=effect, location=locations[node], n_locations=len(locations)) for node in nodes]
@@ -55,37 +55,37 @@ def by_key(ranking):
     return {fit.hypothesis.components[-1].key: fit for fit in ranking.fits}
 
 
-def test_what_explains_as_well_on_the_far_side_is_found(symmetric):
+def test_a_mirrored_location_that_explains_as_well_is_added(symmetric):
     ranking = only(symmetric, TRUE)
     fits = by_key(ranking)
     add_distant_candidates(symmetric, ranking, fits)
-    found = evidence(fits.values())
-    assert found[MIRRORED] == pytest.approx(found[TRUE], abs=0.1)
+    log_evidence = evidence(fits.values())
+    assert log_evidence[MIRRORED] == pytest.approx(log_evidence[TRUE], abs=0.1)
 
 
 @pytest.mark.parametrize(("true", "mirrored"), [(12, 14), (14, 12)])
-def test_what_explains_as_well_nearly_beside_it_is_found(nominal, true, mirrored):
-    """Two nodes off, where of two places only the better one is looked at."""
+def test_a_nearby_location_that_explains_as_well_is_added(nominal, true, mirrored):
+    """Two nodes off, where of two locations only the better one is tried."""
     problem = problem_of(nominal, measured(with_point_masses(nominal, {true: ADDED_KG}), MIDDLE), ("added_mass",))
     fits = by_key(only(problem, true))
     add_distant_candidates(problem, only(problem, true), fits)
-    found = evidence(fits.values())
-    assert found[mirrored] == pytest.approx(found[true], abs=0.1)
+    log_evidence = evidence(fits.values())
+    assert log_evidence[mirrored] == pytest.approx(log_evidence[true], abs=0.1)
 
 
-def test_places_around_what_is_better_far_off_are_fitted_too(nominal):
-    """Of a search that went astray, seen from where left and right are told apart."""
+def test_neighbours_of_a_better_distant_location_are_fitted_too(nominal):
+    """Of a search that went astray, measured where left and right differ."""
     true = with_point_masses(nominal, {TRUE: ADDED_KG})
     problem = problem_of(nominal, measured(true, labels(outputs=("8:+z",), inputs=("10:+z",))), ("added_mass",))
     ranking = only(problem, MIRRORED)
     fits = by_key(ranking)
     add_distant_candidates(problem, ranking, fits)
-    found = evidence(fits.values())
-    assert max(found, key=found.get) == TRUE
-    assert {TRUE - 1, TRUE + 1} <= found.keys()
+    log_evidence = evidence(fits.values())
+    assert max(log_evidence, key=log_evidence.get) == TRUE
+    assert {TRUE - 1, TRUE + 1} <= log_evidence.keys()
 
 
-def test_the_next_place_is_beside_the_best_that_has_one(symmetric):
+def test_the_next_neighbour_is_that_of_the_best_fit_that_has_one(symmetric):
     best, second = only(symmetric, TRUE, MIRRORED).fits
     effect = symmetric.effects["added_mass"]
     locations = effect.neighbours(symmetric.context, best.hypothesis.components[-1].location)
@@ -100,7 +100,7 @@ def test_the_next_place_is_beside_the_best_that_has_one(symmetric):
 
 @pytest.fixture
 def valley(nominal, monkeypatch):
-    """So little mass that all places near the true one explain alike."""
+    """So little mass that all locations near the true one explain alike."""
     monkeypatch.setattr(ties, "add_distant_candidates", lambda *_: 0)
     true = with_point_masses(nominal, {TRUE: LITTLE_KG})
     return problem_of(nominal, measured(true, labels(outputs=("8:+z",), inputs=("10:+z",))), ("added_mass",))
@@ -111,13 +111,13 @@ def as_if_found(ranking):
     return replace(ranking, base=replace(ranking.base, log_evidence=ranking.base.log_evidence - 1e3))
 
 
-def test_ties_are_settled_along_a_valley_as_far_as_it_is_level(valley):
-    """Of a search that came to one end of it."""
-    found = rescore_ambiguity_set(valley, as_if_found(only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)))
-    assert evidence(found.fits)[TRUE] > found.best.log_evidence - 1
+def test_the_ambiguity_set_extends_along_a_flat_valley(valley):
+    """Of a search that found one end of it."""
+    ranking = rescore_ambiguity_set(valley, as_if_found(only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)))
+    assert evidence(ranking.fits)[TRUE] > ranking.best.log_evidence - 1
 
 
-def test_no_more_places_are_weighed_than_can_be_waited_for(valley, monkeypatch):
+def test_the_number_of_rescored_neighbours_is_limited(valley, monkeypatch):
     monkeypatch.setattr(ties, "MAX_NEIGHBOURS", 1)
     assert (
         len(rescore_ambiguity_set(valley, as_if_found(only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG))).fits)
@@ -125,22 +125,26 @@ def test_no_more_places_are_weighed_than_can_be_waited_for(valley, monkeypatch):
     )
 
 
-def test_what_was_not_weighed_again_is_no_contender(valley, monkeypatch):
+def test_what_was_not_rescored_is_no_candidate(valley, monkeypatch):
     monkeypatch.setattr(ties, "CANDIDATES_PER_EFFECT", 2)
     monkeypatch.setattr(ties, "MAX_NEIGHBOURS", 0)
     alike = only(valley, TRUE - 1, TRUE, TRUE + 1, added_kg=LITTLE_KG)
     assert alike.fits[2].log_evidence > alike.fits[0].log_evidence - ties.AMBIGUOUS
-    found = rescore_ambiguity_set(valley, alike)
-    assert [fit.log_evidence > found.fits[0].log_evidence - ties.AMBIGUOUS for fit in found.fits] == [True, True, False]
+    ranking = rescore_ambiguity_set(valley, alike)
+    assert [fit.log_evidence > ranking.fits[0].log_evidence - ties.AMBIGUOUS for fit in ranking.fits] == [
+        True,
+        True,
+        False,
+    ]
 
 
-def test_nothing_is_looked_for_beside_what_explains_nothing(valley):
+def test_no_neighbours_are_added_to_what_explains_nothing(valley):
     assert len(rescore_ambiguity_set(valley, only(valley, ASTRAY, ASTRAY + 1, added_kg=LITTLE_KG)).fits) == 2
 
 
 @pytest.mark.parametrize(("tried", "first"), [(2, "grounded_spring"), (0, "coupling_spring")])
-def test_what_looks_like_the_best_is_weighed_where_the_best_sits_now(nominal, monkeypatch, tried, first):
-    """A search that came to a spring to a node beside the clamped end, which hardly moves."""
+def test_imitators_are_rescored_at_the_location_of_the_best(nominal, monkeypatch, tried, first):
+    """A search that found a spring to a node beside the clamped end, which hardly moves."""
     monkeypatch.setattr(ties, "add_distant_candidates", lambda *_: 0)
     monkeypatch.setattr(ties, "MAX_NEIGHBOURS", 0)
     monkeypatch.setattr(ties, "MAX_IMITATOR_ROUNDS", tried)
@@ -149,14 +153,14 @@ def test_what_looks_like_the_best_is_weighed_where_the_best_sits_now(nominal, mo
     problem = problem_of(nominal, frfs, ("grounded_spring", "coupling_spring"))
     effect = problem.effects["coupling_spring"]
     locations = effect.locations(problem.context)
-    near_it = [location for location in locations if location.entries["nodes"] in ([2, TRUE], [2, TRUE + 1])]
-    components = [Component(effect=effect, location=location, n_locations=len(locations)) for location in near_it]
+    wrong = [location for location in locations if location.entries["nodes"] in ([2, TRUE], [2, TRUE + 1])]
+    components = [Component(effect=effect, location=location, n_locations=len(locations)) for location in wrong]
     fits = sorted(
         (problem.fit((component,), np.array([SPRING_N_M])) for component in components),
         key=lambda fit: -fit.log_evidence,
     )
-    found = rescore_ambiguity_set(problem, Ranking(base=fit_null_model(problem), fits=tuple(fits), n_tried=0))
-    assert found.best.hypothesis.components[-1].effect.name == first
+    ranking = rescore_ambiguity_set(problem, Ranking(base=fit_null_model(problem), fits=tuple(fits), n_tried=0))
+    assert ranking.best.hypothesis.components[-1].effect.name == first
 
 
 def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypatch):
@@ -169,6 +173,6 @@ def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypa
 
     n_all, expected = prior()
     monkeypatch.setattr(coupling_spring, "MAX_IN_A_ROW", 9)
-    n_few, found = prior()
+    n_few, log_prior = prior()
     assert n_few < n_all / 4
-    assert found == pytest.approx(expected, abs=0.4)
+    assert log_prior == pytest.approx(expected, abs=0.4)

@@ -59,9 +59,9 @@ def changed_frfs(model, name, key, values, names=None):
     return hypothesis.respond(np.array(values, float), np.zeros(nuisance_prior.size), S).values
 
 
-def assert_same(found, expected, tolerance):
-    assert np.abs(found - expected).max() < tolerance * np.abs(expected).max()
-    assert_allclose(np.abs(found - expected) / np.abs(expected).mean(0), 0, atol=30 * tolerance, rtol=0)
+def assert_same(actual, expected, tolerance):
+    assert np.abs(actual - expected).max() < tolerance * np.abs(expected).max()
+    assert_allclose(np.abs(actual - expected) / np.abs(expected).mean(0), 0, atol=30 * tolerance, rtol=0)
 
 
 def test_the_nominal_model_is_that_of_the_fe_stage(tmp_path):
@@ -108,7 +108,7 @@ def damped_frfs(model, stiffness, mass, names, ratio=0.01):
     return np.stack(columns, 1)
 
 
-def test_local_stiffness_of_a_stretch_and_of_a_spring(tmp_path):
+def test_local_stiffness_of_a_segment_and_of_a_spring(tmp_path):
     model = beam(tmp_path)
     expected = model_frfs(with_scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
     assert_same(changed_frfs(model, "local_stiffness", ("element", 5, 6), [0.6]), expected, REDUCED)
@@ -237,12 +237,12 @@ def test_a_damping_matrix_is_that_of_the_fe_stage_and_its_modal_part_scatters(tm
         assert np.linalg.norm(jacobian[:, :, location] - slope) < DIFFERENCE * np.linalg.norm(slope)
 
 
-def test_another_level_of_damping_replaces_a_damping_matrix(tmp_path):
+def test_a_damping_level_replaces_a_damping_matrix(tmp_path):
     frame = lumped(tmp_path, damping="rayleigh = { alpha_1_s = 3.0, beta_s = 2e-5 }")
     names = labels(("3:+x",), ("2:+x",))
     undamped = replace(frame, damping_all=0 * frame.damping_all, modal_damping=np.array([0.03]))
-    found = changed_frfs(frame, "damping_level", (), [0.03], names)
-    assert_same(found, model_frfs(undamped, names, S), REDUCED)
+    frfs_changed = changed_frfs(frame, "damping_level", (), [0.03], names)
+    assert_same(frfs_changed, model_frfs(undamped, names, S), REDUCED)
     context = context_of(frame, names)
     effect = shipped_effects()["damping_level"]
     (location,) = effect.locations(context)
@@ -282,9 +282,9 @@ def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path,
 def test_channels(tmp_path, name, key, values, factor):
     model = beam(tmp_path)
     plain = changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0])
-    found = changed_frfs(model, name, key, values)
-    assert_allclose(found[:, 0], plain[:, 0], rtol=EXACT)
-    assert_allclose(found[:, 1], plain[:, 1] * factor(S), rtol=EXACT)
+    frfs_changed = changed_frfs(model, name, key, values)
+    assert_allclose(frfs_changed[:, 0], plain[:, 0], rtol=EXACT)
+    assert_allclose(frfs_changed[:, 1], plain[:, 1] * factor(S), rtol=EXACT)
     force = changed_frfs(model, name, ("force", *key[1:]), values)
     assert_allclose(force * np.broadcast_to(factor(S), S.shape)[:, None], plain, rtol=EXACT)
 
@@ -309,8 +309,8 @@ def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
     context = context_of(model, labels())
     change = shipped_effects()[name].build(context, Location(key=key))(np.array(values))
     s = 1j * S.imag
-    found = model_frfs(with_change(model, change), labels(), S)
-    assert_same(found, changed_frfs(model, name, key, values), LOSSES)
+    changed = model_frfs(with_change(model, change), labels(), S)
+    assert_same(changed, changed_frfs(model, name, key, values), LOSSES)
     assert np.isfinite(model_frfs(with_change(model, change), labels(), s)).all()
 
 
@@ -328,22 +328,22 @@ def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_pa
     one_by_one = with_change(with_change(model, resonator_), joint)
     together = with_change(model, resonator_ + joint)
     assert len(together.all_dofs) == len(model.all_dofs) + 2 == len(set(together.all_dofs))
-    found, expected = model_frfs(together, labels(), S), model_frfs(one_by_one, labels(), S)
-    assert_allclose(found, expected, rtol=EXACT)
-    assert not np.allclose(found, model_frfs(with_change(model, resonator_), labels(), S), rtol=LOSSES)
+    changed, expected = model_frfs(together, labels(), S), model_frfs(one_by_one, labels(), S)
+    assert_allclose(changed, expected, rtol=EXACT)
+    assert not np.allclose(changed, model_frfs(with_change(model, resonator_), labels(), S), rtol=LOSSES)
 
 
-def test_derivatives_by_what_cannot_be_known(tmp_path):
+def test_derivatives_by_nuisance_parameters(tmp_path):
     model = beam(tmp_path, right="pinned")
     context = context_of(model, labels(("9:+z",)))
     nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
     hypothesis = make_hypothesis(context, nuisance_prior, ())
     start = 0.3 * np.random.default_rng(1).standard_normal(nuisance_prior.size)
     here = hypothesis.respond(np.zeros(0), start, S)
-    found = nuisance_jacobian(here, nuisance_prior, context.layout)
+    jacobian = nuisance_jacobian(here, nuisance_prior, context.layout)
     for index in range(0, nuisance_prior.size, 3):
         moved = start.copy()
         moved[index] += STEP
         difference = (hypothesis.respond(np.zeros(0), moved, S).values - here.values) / STEP
-        scale = np.abs(found[:, :, index]).max() + 1e-6 * np.abs(here.values).max()  # rounding of the difference
-        assert np.abs(difference - found[:, :, index]).max() < DIFFERENCE * scale
+        scale = np.abs(jacobian[:, :, index]).max() + 1e-6 * np.abs(here.values).max()  # rounding of the difference
+        assert np.abs(difference - jacobian[:, :, index]).max() < DIFFERENCE * scale

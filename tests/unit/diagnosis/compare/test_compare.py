@@ -41,22 +41,22 @@ def real_one(model):
     return replace(heavier, stiffness_all=1.03 * heavier.stiffness_all, modal_damping=damping)
 
 
-def state(model, machine, seed, **more):
-    return frf_ipz.State(model=model, observed=observed(measured(machine, seed=seed, **more)))
+def state(model, machine, seed, **options):
+    return frf_ipz.State(model=model, observed=observed(measured(machine, seed=seed, **options)))
 
 
 def test_nothing_has_changed(nominal, real):
-    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, real, 2), FEW)
-    assert not found.is_changed
-    assert found.changes == ()
-    assert found.statement.startswith("Nothing has changed")
+    comparison = frf_ipz.compare(state(nominal, real, 1), state(nominal, real, 2), FEW)
+    assert not comparison.is_changed
+    assert comparison.changes == ()
+    assert comparison.statement.startswith("Nothing has changed")
 
 
 def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
     after = with_point_masses(real, {12: ADDED_KG})
-    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
-    assert found.diagnosis.verdict == "explained"
-    (change,) = found.changes
+    comparison = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    assert comparison.diagnosis.verdict == "explained"
+    (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("added_mass", {"nodes": [12]})
     size = change.parameters["mass_kg"]
     assert size.low < ADDED_KG < size.high
@@ -66,17 +66,17 @@ def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
 def test_a_mass_that_is_gone_is_found(nominal):
     with_piece = with_point_masses(nominal, {14: 1.2 * HUNG_KG})  # its mass is not known well either
     machine = real_one(with_point_masses(nominal, {14: HUNG_KG}))
-    found = frf_ipz.compare(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), FEW)
-    (change,) = found.changes
+    comparison = frf_ipz.compare(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), FEW)
+    (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("mass_loss", {"nodes": [14]})
     assert change.parameters["mass_kg"].value == pytest.approx(HUNG_KG, rel=SIZE)
-    assert "is gone from node 14" in found.statement
+    assert "is gone from node 14" in comparison.statement
 
 
-def test_softer_elements_are_found_with_their_place(nominal, real):
+def test_softer_elements_are_located(nominal, real):
     after = with_scaled_parts(real, "element", ["7", "8"], stiffness_ratio=0.8)
-    found = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
-    (change,) = found.changes
+    comparison = frf_ipz.compare(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("local_stiffness", {"elements": [7, 8]})
     assert change.parameters["stiffness_ratio"].value == pytest.approx(0.8, rel=SIZE)
 
@@ -90,49 +90,49 @@ def test_gains_that_were_there_before_are_no_change(nominal, real):
     assert frf_ipz.compare(state(nominal, real, 1), after, FEW).is_changed
 
 
-def test_repeats_teach_what_differs_from_test_to_test(nominal, real):
+def test_scatter_is_learnt_from_repeats(nominal, real):
     drawn = np.random.default_rng(0).standard_normal(7)
-    machines = [replace(real, stiffness_all=(1 + SCATTER * one) * real.stiffness_all) for one in drawn]
+    machines = [replace(real, stiffness_all=(1 + SCATTER * deviation) * real.stiffness_all) for deviation in drawn]
     repeats = [state(nominal, machine, seed) for seed, machine in enumerate(machines)]
-    found = frf_ipz.compare(repeats[:-1], repeats[-1], FEW)
-    assert not found.is_changed
+    comparison = frf_ipz.compare(repeats[:-1], repeats[-1], FEW)
+    assert not comparison.is_changed
     std = SCATTER * drawn[:-1].std(ddof=1) / 2  # of frequencies; tolerances are half widths
-    assert found.scatter.frequency_tolerance == pytest.approx(np.sqrt(3 * (1 + 1 / 6)) * std, rel=SIZE)
+    assert comparison.scatter.frequency_tolerance == pytest.approx(np.sqrt(3 * (1 + 1 / 6)) * std, rel=SIZE)
     assert frf_ipz.compare(repeats[4], repeats[6], FEW).is_changed
 
 
 def test_the_corrected_model_has_the_measured_frfs(nominal, real):
-    one = state(nominal, real, 1, noise=1e-6)
-    source = split_data(one.observed)
+    before = state(nominal, real, 1, noise=1e-6)
+    source = split_data(before.observed)
     options = replace(FEW, model=replace(FEW.model, gain_tolerance=1e-5, position_tolerance_m_per_m=1e-6))
-    corrected = predict_unchanged_model(one, learn([one], options), options, source)
+    corrected = predict_unchanged_model(before, learn([before], options), options, source)
     s = 2j * np.pi * np.linspace(*BAND_HZ, 300)
-    wanted, got, plain = (model_frfs(model, labels(), s) for model in (real, corrected, nominal))
-    assert np.linalg.norm(got - wanted) < 0.02 * np.linalg.norm(plain - wanted)
+    required, predicted, plain = (model_frfs(model, labels(), s) for model in (real, corrected, nominal))
+    assert np.linalg.norm(predicted - required) < 0.02 * np.linalg.norm(plain - required)
 
 
 def test_a_mode_whose_stiffness_a_fit_made_negative_stays_stable(nominal, real):
-    """Modes below the band are pulled wherever lines above them want."""
-    one = state(nominal, real, 1)
-    problem = pose_state_problem(one, split_data(one.observed), FEW.model)
+    """Modes below the band follow lines above them."""
+    before = state(nominal, real, 1)
+    problem = pose_state_problem(before, split_data(before.observed), FEW.model)
     nuisance = np.zeros(problem.nuisance_prior.size)
     nuisance[problem.nuisance_prior.frequency_indices[0]] = -1.1 / problem.nuisance_prior.kappa_std[0, 0]
-    found = solve_modes(correct_model(problem.make_hypothesis(()), nuisance)).natural_frequency_hz
+    frequency_hz = solve_modes(correct_model(problem.make_hypothesis(()), nuisance)).natural_frequency_hz
     stated = solve_modes(nominal).natural_frequency_hz
-    assert found[0] == pytest.approx(np.sqrt(MIN_SQUARE) * stated[0], rel=1e-6)
-    np.testing.assert_allclose(found[1:4], stated[1:4], rtol=1e-6)
+    assert frequency_hz[0] == pytest.approx(np.sqrt(MIN_SQUARE) * stated[0], rel=1e-6)
+    np.testing.assert_allclose(frequency_hz[1:4], stated[1:4], rtol=1e-6)
 
 
 def test_a_node_cannot_lose_more_than_it_has(nominal):
-    one = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
-    context = pose_state_problem(one, split_data(one.observed), FEW.model).context
+    before = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
+    context = pose_state_problem(before, split_data(before.observed), FEW.model).context
     effect = MassLoss()
     (location,) = [location for location in effect.locations(context) if location.entries == {"nodes": [14]}]
     (mass,) = effect.parameters(context, location)
     assert HUNG_KG < mass.high < HUNG_KG + context.mass_kg / 16  # and what an element has
     change = effect.build(context, location)(np.array([mass.high]))
-    left = (context.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
-    assert np.linalg.eigvalsh(left).min() > 0
+    remaining = (context.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
+    assert np.linalg.eigvalsh(remaining).min() > 0
 
 
 def test_no_state_before_is_refused(nominal, real):
@@ -141,8 +141,8 @@ def test_no_state_before_is_refused(nominal, real):
 
 
 def test_states_of_other_channels_are_refused(nominal, real):
-    other = state(nominal, real, 2, names=labels(outputs=("17:+z",)))
+    single_channel = state(nominal, real, 2, names=labels(outputs=("17:+z",)))
     with pytest.raises(InputError, match="channels"):
-        frf_ipz.compare([state(nominal, real, 1), other], state(nominal, real, 3), FEW)
+        frf_ipz.compare([state(nominal, real, 1), single_channel], state(nominal, real, 3), FEW)
     with pytest.raises(InputError, match="channels"):
-        frf_ipz.compare(state(nominal, real, 1), other, FEW)
+        frf_ipz.compare(state(nominal, real, 1), single_channel, FEW)

@@ -1,4 +1,4 @@
-"""What the search rests on: bounds of tolerances, exact modes, steps to places, several causes."""
+"""What the search rests on: bounds of tolerances, exact modes, steps to locations, several effects."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -72,11 +72,13 @@ def test_far_outside_a_tolerance_the_prior_rises_faster_but_not_for_shapes(probl
     assert_allclose(nuisance_prior.whiten(far, is_bounded=False)[0], far, rtol=0)
 
 
-def test_a_frequency_far_outside_its_tolerance_is_no_tolerance(nominal):
-    found = diagnose(nominal, observed(measured(with_point_masses(nominal, {17: 4e-4}))), DiagnoseOptions(effects=FEW))
-    assert found.verdict == "explained"
-    assert found.numbers["log_bayes_factor"] > 100
-    assert found.findings[0].effect == "added_mass"
+def test_a_frequency_far_outside_its_tolerance_is_not_consistent(nominal):
+    diagnosis = diagnose(
+        nominal, observed(measured(with_point_masses(nominal, {17: 4e-4}))), DiagnoseOptions(effects=FEW)
+    )
+    assert diagnosis.verdict == "explained"
+    assert diagnosis.numbers["log_bayes_factor"] > 100
+    assert diagnosis.findings[0].effect == "added_mass"
 
 
 def test_low_modes_keep_their_digits_beside_static_shapes_of_high_frequency():
@@ -100,7 +102,7 @@ def test_an_unstable_structure_has_modes_too(problem):
     assert np.isfinite(modes.vectors).all()
 
 
-def test_a_misfit_is_traced_to_its_node(nominal):
+def test_a_misfit_is_localised_at_its_node(nominal):
     problem = problem_of(nominal, measured(with_springs(nominal, {parse_dof("8:z"): 8e3})))
     assert localise_mismatch(problem, fit_null_model(problem)) == {"nodes": [8]}
 
@@ -110,14 +112,16 @@ def test_one_frf_tells_no_node_from_another(nominal):
     assert localise_mismatch(problem, fit_null_model(problem)) == {}
 
 
-def test_where_nothing_is_wrong_nothing_is_traced(nominal):
-    found = diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=FEW))
-    assert found.to_json()["mismatch"]["location"] == {}
+def test_where_nothing_is_wrong_nothing_is_localised(nominal):
+    diagnosis = diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=FEW))
+    assert diagnosis.to_json()["mismatch"]["location"] == {}
 
 
 def test_what_was_found_says_where_the_mismatch_is(nominal):
-    found = diagnose(nominal, observed(measured(with_point_masses(nominal, {12: 0.02}))), DiagnoseOptions(effects=FEW))
-    assert found.to_json()["mismatch"]["location"] == {"nodes": [12]}
+    diagnosis = diagnose(
+        nominal, observed(measured(with_point_masses(nominal, {12: 0.02}))), DiagnoseOptions(effects=FEW)
+    )
+    assert diagnosis.to_json()["mismatch"]["location"] == {"nodes": [12]}
 
 
 def test_a_frequency_beyond_the_tolerances_is_not_explained(nominal):
@@ -130,24 +134,24 @@ def test_a_frequency_beyond_the_tolerances_is_not_explained(nominal):
     assert assess_goodness(problem, beyond).frequency_deviation == pytest.approx(2.6)
 
 
-def test_three_causes_are_found_at_once(nominal):
+def test_three_effects_are_found_at_once(nominal):
     changed = with_springs(with_point_masses(nominal, {12: 0.02}), {parse_dof("6:z"): 6e3})
     gain = np.array([1.0, 1.06])
     frfs = measured(changed, factors=lambda frequency: np.ones((len(frequency), 1)) * gain)
-    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=FEW))
-    assert found.verdict == "explained"
-    assert {finding.effect for finding in found.findings} == set(FEW)
-    assert all(finding.log_evidence_gain > 50 for finding in found.findings)
+    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=FEW))
+    assert diagnosis.verdict == "explained"
+    assert {finding.effect for finding in diagnosis.findings} == set(FEW)
+    assert all(finding.log_evidence_gain > 50 for finding in diagnosis.findings)
 
 
 def test_both_ends_of_a_spring_move_at_once(nominal):
     problem = problem_of(nominal, measured(nominal), ("coupling_spring",))
     effect = problem.effects["coupling_spring"]
     location = next(location for location in effect.locations(problem.context) if location.key == (5, 12, "z"))
-    beside = {other.key[:2] for other in effect.neighbours(problem.context, location)}
+    beside = {neighbour.key[:2] for neighbour in effect.neighbours(problem.context, location)}
     assert {(4, 13), (6, 11), (4, 11), (6, 13)} <= beside
     at_the_end = next(location for location in effect.locations(problem.context) if location.key == (5, 17, "z"))
-    assert all(max(other.key[:2]) <= 17 for other in effect.neighbours(problem.context, at_the_end))
+    assert all(max(neighbour.key[:2]) <= 17 for neighbour in effect.neighbours(problem.context, at_the_end))
 
 
 def with_coupling(model, pair, stiffness):
@@ -157,18 +161,18 @@ def with_coupling(model, pair, stiffness):
     return with_change(model, effect.build(context, location)(np.array([stiffness])))
 
 
-def test_the_ends_of_a_spring_are_looked_for_further_around(nominal):
+def test_the_ends_of_a_spring_are_searched_further_around(nominal):
     effect = shipped_effects()["coupling_spring"]
     problem = problem_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
     locations = {location.key[:2]: location for location in effect.locations(problem.context)}
-    assert locations[6, 13].key in {other.key for other in effect.surroundings(problem.context, locations[3, 14])}
+    assert locations[6, 13].key in {location.key for location in effect.surroundings(problem.context, locations[3, 14])}
     component = Component(effect=effect, location=locations[3, 14], n_locations=100)
-    found = climb.refine_surroundings(problem, (component,), np.array([2e4]))
-    assert found[0][0][-1].location.entries == {"nodes": [6, 13]}
-    assert found[0][1] == pytest.approx(2e4, rel=0.05)
+    refined = climb.refine_surroundings(problem, (component,), np.array([2e4]))
+    assert refined[0][0][-1].location.entries == {"nodes": [6, 13]}
+    assert refined[0][1] == pytest.approx(2e4, rel=0.05)
 
 
-def test_where_nothing_far_off_fits_places_around_are_tried(nominal, monkeypatch):
+def test_where_no_start_fits_its_surroundings_are_tried(nominal, monkeypatch):
     effect = shipped_effects()["coupling_spring"]
     problem = problem_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
     wrong = next(location for location in effect.locations(problem.context) if location.key[:2] == (3, 14))
@@ -211,22 +215,22 @@ def fit_of(name, evidence, value, std, location):
     )
 
 
-def test_an_effect_is_as_probable_as_all_its_places():
-    one = fit_of("grounded_spring", 10.0, 0.1, 0.01, 1)
-    others = [fit_of("added_mass", 9.5, 0.1, 0.01, location) for location in (3, 4, 5)]
-    groups = group_by_effect([one, *others])
+def test_an_effect_is_as_probable_as_all_its_locations():
+    spring = fit_of("grounded_spring", 10.0, 0.1, 0.01, 1)
+    masses = [fit_of("added_mass", 9.5, 0.1, 0.01, location) for location in (3, 4, 5)]
+    groups = group_by_effect([spring, *masses])
     assert [group[0].hypothesis.components[-1].effect.name for group in groups] == ["added_mass", "grounded_spring"]
-    first, second = rank_effects([one, *others], 1.0)
+    first, second = rank_effects([spring, *masses], 1.0)
     assert first.name == "added_mass"
     assert first.probability == pytest.approx(3 * np.exp(-0.5) / (1 + 3 * np.exp(-0.5)))
     assert first.probability + second.probability == pytest.approx(1.0)
 
 
-def test_an_interval_spans_the_places_that_are_possible():
+def test_an_interval_spans_the_possible_locations():
     fits = tuple(fit_of("added_mass", 9.5, value, 0.01, location) for location, value in ((3, 0.1), (4, 0.2)))
     known = RankedEffect(fits=fits, probability=1.0, shares=(1.0, 0.0))
     nuisance = RankedEffect(fits=fits, probability=1.0, shares=(0.6, 0.4))
-    narrow, wide = (make_finding(one, 100.0, 1.0).parameters["mass_kg"] for one in (known, nuisance))
+    narrow, wide = (make_finding(effect, 100.0, 1.0).parameters["mass_kg"] for effect in (known, nuisance))
     assert narrow.high < 0.11
     assert wide.low < 0.1
     assert wide.high > 0.2

@@ -1,4 +1,4 @@
-"""Two causes together, small ones beside large ones, and causes that only look like others."""
+"""Two effects together, small ones beside large ones, and imitators."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -89,12 +89,12 @@ def test_a_thick_beam_of_a_softer_material_is_found_and_put_right(thick):
     exchanged = with_formulation(thick, "timoshenko")
     true = replace(exchanged, stiffness_all=SOFTER * exchanged.stiffness_all)
     options = DiagnoseOptions(effects=("shear_rotary_inertia", "global_stiffness", "added_mass", "axial_load"))
-    found = diagnose(thick, observed(measured(true, band_hz=HIGH_HZ), HIGH_HZ), options)
-    assert found.verdict == "explained"
-    assert {finding.effect for finding in found.findings} == {"shear_rotary_inertia", "global_stiffness"}
-    (ratio,) = (one.parameters["stiffness_ratio"].value for one in found.findings if one.parameters)
+    diagnosis = diagnose(thick, observed(measured(true, band_hz=HIGH_HZ), HIGH_HZ), options)
+    assert diagnosis.verdict == "explained"
+    assert {finding.effect for finding in diagnosis.findings} == {"shear_rotary_inertia", "global_stiffness"}
+    (ratio,) = (finding.parameters["stiffness_ratio"].value for finding in diagnosis.findings if finding.parameters)
     assert ratio == pytest.approx(SOFTER, rel=SEEN)
-    right = apply_to_model(thick, found).stiffness_all.diagonal()
+    right = apply_to_model(thick, diagnosis).stiffness_all.diagonal()
     assert_allclose(right, true.stiffness_all.diagonal(), rtol=SEEN)
 
 
@@ -104,9 +104,9 @@ def test_a_wrong_sign_and_a_support_that_gives_way_are_found_together(tmp_path):
     names = labels(outputs=("12:+z", "9:-z"))
     frfs = measured(true, names, factors=lambda f: -np.ones((len(f), 2)))
     options = DiagnoseOptions(effects=("sensor_gain", "boundary_compliance", "added_mass", "global_stiffness"))
-    found = diagnose(held, observed(frfs), options)
-    assert found.verdict == "explained"
-    assert {finding.effect for finding in found.findings} == {"sensor_gain", "boundary_compliance"}
+    diagnosis = diagnose(held, observed(frfs), options)
+    assert diagnosis.verdict == "explained"
+    assert {finding.effect for finding in diagnosis.findings} == {"sensor_gain", "boundary_compliance"}
 
 
 def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
@@ -121,7 +121,7 @@ def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
     assert best.values[0] == pytest.approx(3e-5, rel=SEEN)
 
 
-def test_a_small_cause_beside_one_that_explains_nearly_all_is_named(nominal, monkeypatch):
+def test_a_small_effect_beside_one_that_explains_nearly_all_is_named(nominal, monkeypatch):
     true = with_springs(with_point_masses(nominal, {12: 0.02}), {Dof(8, "z"): WEAK_N_M})
     problem = problem_of(nominal, measured(true), ("added_mass", "grounded_spring", "sensor_gain"))
     assert [component.effect.name for component in decide(problem, silent).final.hypothesis.components] == [
@@ -130,19 +130,19 @@ def test_a_small_cause_beside_one_that_explains_nearly_all_is_named(nominal, mon
     monkeypatch.setitem(
         LIMITS, "frf", replace(LIMITS["frf"], beside_log_bayes_factor=LIMITS["hammer"].beside_log_bayes_factor)
     )
-    found = decide(problem, silent)
-    assert [component.effect.name for component in found.final.hypothesis.components] == [
+    decision = decide(problem, silent)
+    assert [component.effect.name for component in decision.final.hypothesis.components] == [
         "added_mass",
         "grounded_spring",
     ]
-    assert found.further_rankings[0].base.hypothesis.components[0].location.entries == {"nodes": [12]}
+    assert decision.further_rankings[0].base.hypothesis.components[0].location.entries == {"nodes": [12]}
 
 
 @pytest.mark.parametrize(("part", "verdict"), [(0.95, "consistent"), (0.8, "explained")])
-def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is_asked(
+def test_what_a_good_model_leaves_in_its_worst_subband_raises_the_required_evidence(
     nominal, monkeypatch, part, verdict
 ):
-    """Errors that are underrated make something out of nothing: the piece is 1.13 times the expected misfit."""
+    """Underestimated errors make something out of nothing: the subband is 1.13 times the expected misfit."""
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 1.5 * LITTLE_KG})), ("added_mass",))
     null = fit_null_model(problem)
     gain = search_component(problem, null).best.log_evidence - null.log_evidence
@@ -151,45 +151,45 @@ def test_what_a_good_model_leaves_on_its_worst_piece_raises_the_evidence_that_is
     assert decide(problem, silent).verdict == verdict
 
 
-def test_the_smallest_size_that_is_told_has_the_evidence_that_is_asked(nominal, monkeypatch):
+def test_the_detectable_size_has_the_required_evidence(nominal, monkeypatch):
     frfs = measured(nominal)
     problem = problem_of(nominal, frfs, ("added_mass",))
     needed = assess_goodness(problem, fit_null_model(problem)).required_log_bayes_factor
     assert needed > LIMITS["frf"].first_log_bayes_factor
     monkeypatch.setattr(diagnosing, "find_detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
-    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
-    assert found.detectability["added_mass"]["nats"] == pytest.approx(needed)
+    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    assert diagnosis.detectability["added_mass"]["nats"] == pytest.approx(needed)
 
 
-def test_places_are_stepped_only_where_a_cause_explains_something(nominal):
+def test_neighbourhoods_are_searched_only_where_an_effect_explains_something(nominal):
     names = ("added_mass", "grounded_spring")
     nothing = problem_of(nominal, measured(nominal), names)
     assert len(search_component(nothing, fit_null_model(nothing)).fits) <= len(names) * SCORED_PER_EFFECT
     heavier = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
-    found = {fit.hypothesis.components[0].key for fit in search_component(heavier, fit_null_model(heavier)).fits}
-    assert {("added_mass", node, "z") for node in (11, 12, 13)} <= found
+    keys = {fit.hypothesis.components[0].key for fit in search_component(heavier, fit_null_model(heavier)).fits}
+    assert {("added_mass", node, "z") for node in (11, 12, 13)} <= keys
 
 
-def test_nothing_is_added_to_a_cause_that_explains_all(nominal):
+def test_nothing_is_added_to_an_effect_that_explains_all(nominal):
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("added_mass", "grounded_spring"))
-    one = search_component(problem, fit_null_model(problem)).best
-    beside = search_small_component(problem, one, LIMITS["hammer"].beside_log_bayes_factor)
+    best = search_component(problem, fit_null_model(problem)).best
+    beside = search_small_component(problem, best, LIMITS["hammer"].beside_log_bayes_factor)
     assert beside.fits == ()
     assert beside.n_tried > 5
 
 
 def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
     true = replace(with_point_masses(nominal, {12: 0.02}), modal_damping=GUESSED)
-    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
-    assert found.verdict == "unexplained"
-    assert "damping ratios are not those of the model" in found.statement
-    assert "4 % instead of 1 %" in found.statement
-    (finding,) = found.findings
+    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert diagnosis.verdict == "unexplained"
+    assert "damping ratios are not those of the model" in diagnosis.statement
+    assert "4 % instead of 1 %" in diagnosis.statement
+    (finding,) = diagnosis.findings
     assert dict(finding.location) == {"nodes": [12]}
     assert finding.parameters["mass_kg"].value == pytest.approx(0.02, rel=SEEN)
 
 
-def test_a_stretch_of_usual_length_is_preferred_to_a_short_one_that_looks_the_same(nominal):
+def test_a_segment_of_usual_length_is_preferred_to_a_short_one_that_does_the_same(nominal):
     problem = problem_of(nominal, measured(nominal), ("local_stiffness",))
     effect = problem.effects["local_stiffness"]
     locations = {location.key[1:]: location for location in effect.locations(problem.context)}
@@ -203,7 +203,9 @@ def with_components(problem, *named):
     components = []
     for name, node in named:
         effect = problem.effects[name]
-        location = next(one for one in effect.locations(problem.context) if one.entries.get("nodes") == [node])
+        location = next(
+            location for location in effect.locations(problem.context) if location.entries.get("nodes") == [node]
+        )
         components.append(Component(effect=effect, location=location, n_locations=1))
     hypothesis = problem.make_hypothesis(tuple(components))
     return SimpleNamespace(hypothesis=hypothesis, values=hypothesis.to_physical((hypothesis.low + hypothesis.high) / 2))
@@ -219,7 +221,7 @@ def with_components(problem, *named):
         ((("added_mass", 9), ("local_damper", 4), ("viscoelastic_joint", 4)), True),
     ],
 )
-def test_two_with_dynamics_of_their_own_alike_or_at_one_place_are_one_of_another_kind(nominal, named, expected):
+def test_two_dynamic_effects_of_one_kind_or_at_one_location_are_implausible(nominal, named, expected):
     names = ("attached_resonator", "local_damper", "added_mass", "viscoelastic_joint")
     assert (
         bool(describe_implausibility(with_components(problem_of(nominal, measured(nominal), names), *named)))
@@ -227,13 +229,13 @@ def test_two_with_dynamics_of_their_own_alike_or_at_one_place_are_one_of_another
     )
 
 
-@pytest.mark.parametrize(("ratio", "said"), [(0.05, ""), (0.3, "damping ratio of 30 %")])
-def test_a_resonator_that_hardly_swings_is_something_else(nominal, ratio, said):
+@pytest.mark.parametrize(("ratio", "reason"), [(0.05, ""), (0.3, "damping ratio of 30 %")])
+def test_a_resonator_of_large_damping_is_implausible(nominal, ratio, reason):
     names = ("attached_resonator", "added_mass")
     fit = with_components(problem_of(nominal, measured(nominal), names), ("added_mass", 3), ("attached_resonator", 9))
     fit.values[-1] = ratio
-    assert (said in describe_implausibility(fit)) is True
-    assert bool(describe_implausibility(fit)) is bool(said)
+    assert (reason in describe_implausibility(fit)) is True
+    assert bool(describe_implausibility(fit)) is bool(reason)
 
 
 def test_two_resonators_at_one_node_are_not_named(nominal):
@@ -241,28 +243,28 @@ def test_two_resonators_at_one_node_are_not_named(nominal):
         Component(effect=ATTACHED, location=Location(key=(17, "z"), entries={"nodes": [17]}), n_locations=1),
     ) * 2
     problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
-    both = problem.make_hypothesis((first, second))
+    hypothesis = problem.make_hypothesis((first, second))
     values, nuisance = np.array([0.02, 40.0, 0.03, 0.02, 250.0, 0.03]), np.zeros(problem.nuisance_prior.size)
 
     def chain(frequency_hz):
         s = 2j * np.pi * frequency_hz
         alone = problem.make_hypothesis(()).respond(np.zeros(0), nuisance, s).values
-        return both.respond(values, nuisance, s).values / alone
+        return hypothesis.respond(values, nuisance, s).values / alone
 
-    found = diagnose(nominal, observed(measured(nominal, factors=chain)), DiagnoseOptions(effects=(ATTACHED.name,)))
-    assert found.verdict == "unexplained"
-    assert "one thing of another kind" in found.statement
-    assert [dict(finding.location) for finding in found.findings] == [{"nodes": [17]}] * 2
+    diagnosis = diagnose(nominal, observed(measured(nominal, factors=chain)), DiagnoseOptions(effects=(ATTACHED.name,)))
+    assert diagnosis.verdict == "unexplained"
+    assert "one thing of another kind" in diagnosis.statement
+    assert [dict(finding.location) for finding in diagnosis.findings] == [{"nodes": [17]}] * 2
 
 
 def test_all_sensors_may_be_late_together(nominal):
     frfs = measured(nominal, factors=lambda f: np.exp(-2j * np.pi * f[:, None] * np.full(2, 1.2e-3)))
-    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("time_delay", "sensor_gain")))
-    (finding,) = found.findings
+    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("time_delay", "sensor_gain")))
+    (finding,) = diagnosis.findings
     assert dict(finding.location) == {"channels": ["acc_1", "acc_2"]}
     assert finding.parameters["delay_s"].value == pytest.approx(1.2e-3, rel=SEEN)
     assert "All sensors together" in finding.statement
-    early, true = apply_to_frfs(frfs, found).values, measured(nominal).values
+    early, true = apply_to_frfs(frfs, diagnosis).values, measured(nominal).values
     assert np.linalg.norm(early - true) < SEEN * np.linalg.norm(true)
 
 
@@ -280,18 +282,18 @@ def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp
 
 def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
     true = replace(nominal, modal_damping=np.array([0.01, 0.01, 0.0035, 0.01]))
-    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
-    assert found.verdict == "unexplained"
-    assert "0.35 % instead of 1 % at 287.1 Hz" in found.statement
+    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert diagnosis.verdict == "unexplained"
+    assert "0.35 % instead of 1 % at 287.1 Hz" in diagnosis.statement
     allowed = DiagnoseOptions(effects=("added_mass", "damping_level"), damping_tolerance=0.7)
     assert diagnose(nominal, observed(measured(true)), allowed).verdict == "consistent"
 
 
 def test_a_level_that_alone_explains_is_significant_though_not_far_beyond_its_tolerance(nominal):
     true = replace(nominal, modal_damping=np.full(4, 0.0042))
-    found = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
-    assert found.verdict == "explained"
-    assert [(finding.effect, finding.is_significant) for finding in found.findings] == [("damping_level", True)]
+    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    assert diagnosis.verdict == "explained"
+    assert [(finding.effect, finding.is_significant) for finding in diagnosis.findings] == [("damping_level", True)]
 
 
 @pytest.mark.parametrize("ratio", [0.002, 0.03])
@@ -313,14 +315,14 @@ def test_a_small_gain_is_not_taken_for_a_wrong_sign(nominal):
 
 
 @pytest.mark.slow
-def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_first_causes(nominal):
+def test_a_pair_that_explains_all_is_compared_with_pairs_of_other_firsts(nominal):
     """A resonator stands for a mass and a spring as long as nothing stands beside it."""
     true = with_springs(with_point_masses(nominal, {12: 0.005}), {Dof(8, "z"): 3 * WEAK_N_M})
     problem = problem_of(nominal, measured(true), ("added_mass", "grounded_spring", "attached_resonator"))
     first = search_component(problem, fit_null_model(problem))
     assert first.best.hypothesis.components[0].effect.name == "attached_resonator"
-    found = search_pair(problem, first, lambda _: True)
-    assert [component.effect.name for component in found.best.hypothesis.components] == [
+    ranking = search_pair(problem, first, lambda _: True)
+    assert [component.effect.name for component in ranking.best.hypothesis.components] == [
         "added_mass",
         "grounded_spring",
     ]
@@ -330,14 +332,14 @@ def test_a_resonator_of_much_damping_is_less_likely_than_a_damper_that_explains_
     values = [np.array([0.01, 100.0, ratio]) for ratio in (0.005, 0.05, 0.15, 0.4)]
     problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
     location = ATTACHED.locations(problem.context)[0]
-    little, usual, much, most = (ATTACHED.log_prior(problem.context, location, one) for one in values)
+    little, usual, much, overdamped = (ATTACHED.log_prior(problem.context, location, start) for start in values)
     assert little == usual == 0
     assert -3 < much < -1  # nats: still easily named
-    assert most < -6
+    assert overdamped < -6
 
 
 @pytest.mark.parametrize(("is_good", "count"), [(True, pairs.N_OTHERS), (False, pairs.N_OTHERS_INCOMPLETE)])
-def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
+def test_more_firsts_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
     tried = []
     monkeypatch.setattr(pairs, "search_component", lambda _, base: Ranking(base=base, fits=(), n_tried=0))
     monkeypatch.setattr(
@@ -351,7 +353,7 @@ def test_more_first_causes_are_tried_where_no_pair_explains_all(monkeypatch, is_
     assert tried == fits[1 : 1 + count]
 
 
-def test_the_best_place_of_each_effect_is_fitted_before_others_of_better_ones():
+def test_the_best_location_of_each_effect_is_fitted_before_second_ones():
     """A linear step promises a small part of what some effects explain."""
     promised = [
         (number, location, 100.0 - 12 * number - location / 10) for number in range(6) for location in (0, 10, 20)
@@ -360,7 +362,7 @@ def test_the_best_place_of_each_effect_is_fitted_before_others_of_better_ones():
         Start(component=a_component(number, location), values=np.ones(1), cost=-nats)
         for number, location, nats in promised
     ]
-    chosen = [(one.component.effect.name, one.component.location.key[0]) for one in _most_promising(starts, 45.0)]
+    chosen = [(start.component.effect.name, start.component.location.key[0]) for start in _most_promising(starts, 45.0)]
     assert chosen[:5] == [(number, 0) for number in range(5)]  # the sixth promises less
     assert len(chosen) == N_SCORED - 1
     assert (4, 10) not in chosen
@@ -372,17 +374,17 @@ def a_component(name, location):
 
 def one_of(name, log_evidence):
     component = SimpleNamespace(effect=SimpleNamespace(name=name))
-    near = {"is_nearly_right": True, "explains_nearly_all": True, "is_far_off": False, "mean_misfit": 1.0}
-    return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence, **near)
+    flags = {"is_nearly_right": True, "explains_nearly_all": True, "is_far_off": False, "mean_misfit": 1.0}
+    return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence, **flags)
 
 
-def test_the_first_of_two_causes_is_placed_anew_beside_the_second(nominal):
+def test_the_first_of_two_components_is_located_anew_beside_the_second(nominal):
     true = with_springs(with_point_masses(nominal, {12: 0.002}), {Dof(8, "z"): 3e3})
     problem, mass = problem_of(nominal, measured(true), ("grounded_spring",)), shipped_effects()["added_mass"]
     beside = next(location for location in mass.locations(problem.context) if location.entries == {"nodes": [13]})
     wrong = problem.fit((Component(effect=mass, location=beside, n_locations=16),), np.array([0.002]))
-    found = search_pair(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=1), lambda _: True)
-    assert {component.key[:2] for component in found.best.hypothesis.components} == {
+    ranking = search_pair(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=1), lambda _: True)
+    assert {component.key[:2] for component in ranking.best.hypothesis.components} == {
         ("added_mass", 12),
         ("grounded_spring", 8),
     }

@@ -1,4 +1,4 @@
-"""What is worst about a fit is what is said about it."""
+"""The shortfall of a fit is its worst figure."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from frf_ipz.diagnosis.verdict.goodness import Goodness, Limits
 @pytest.mark.parametrize(
     "worst", ["misfit", "nuisance_chi2", "worst_subband", "largest_deviation", "frequency_deviation"]
 )
-def test_the_complaint_names_the_figure_that_is_farthest_over_its_limit(worst):
+def test_the_shortfall_names_the_figure_that_is_farthest_over_its_limit(worst):
     limits = Limits(misfit=1.0, subband=1.0)
     figures = {
         "misfit": 1.5,
@@ -18,8 +18,8 @@ def test_the_complaint_names_the_figure_that_is_farthest_over_its_limit(worst):
         "frequency_deviation": 3.0,
     }
     figures[worst] *= 10
-    found = Goodness(**figures, limits=limits, nuisance_chi2_limit=10.0)
-    assert not found.is_good
+    goodness = Goodness(**figures, limits=limits, nuisance_chi2_limit=10.0)
+    assert not goodness.is_good
     words = {
         "misfit": "leaves 3.87 times the expected misfit",
         "nuisance_chi2": "tolerances",
@@ -27,15 +27,15 @@ def test_the_complaint_names_the_figure_that_is_farthest_over_its_limit(worst):
         "largest_deviation": "a damping ratio or a gain that is 23 times its tolerance",
         "frequency_deviation": "a natural frequency that is 17 times",
     }
-    assert words[worst] in found.shortfall
-    assert (worst == "worst_subband") == ("part of the band" in found.shortfall)
+    assert words[worst] in goodness.shortfall
+    assert (worst == "worst_subband") == ("part of the band" in goodness.shortfall)
 
 
 @pytest.mark.parametrize(("misfit", "subband", "times"), [(0.5, 0.6, 1.0), (0.5, 2.0, 2.0), (3.0, 2.0, 1.0)])
-def test_beside_a_model_whose_errors_are_underrated_somewhere_a_cause_must_explain_more(misfit, subband, times):
+def test_beside_a_model_with_underestimated_errors_an_effect_must_explain_more(misfit, subband, times):
     """Unless the model does not explain: then that it leaves much is no fault of its errors."""
     limits = Limits(misfit=1.0, subband=4.0)
-    found = Goodness(
+    goodness = Goodness(
         misfit=misfit,
         nuisance_chi2=0.0,
         worst_subband=subband,
@@ -44,5 +44,5 @@ def test_beside_a_model_whose_errors_are_underrated_somewhere_a_cause_must_expla
         limits=limits,
         nuisance_chi2_limit=45.0,
     )
-    assert found.error_underestimation == times
-    assert found.required_log_bayes_factor == times * limits.first_log_bayes_factor
+    assert goodness.error_underestimation == times
+    assert goodness.required_log_bayes_factor == times * limits.first_log_bayes_factor

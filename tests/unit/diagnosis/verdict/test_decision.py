@@ -1,4 +1,4 @@
-"""How much a second cause must explain to be one."""
+"""How much a second effect must explain to be accepted."""
 
 from types import SimpleNamespace
 
@@ -38,19 +38,17 @@ def found(score):
 
 
 @pytest.mark.parametrize(
-    ("left", "gain", "n_locations", "verdict"),
+    ("score", "gain", "n_locations", "verdict"),
     [(1.1, 2.0, 1, None), (1.1, 3.1, 1, "explained"), (1.1, 2.0, 4, "explained"), (0.8, 7.0, 1, None)],
 )
-def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_wherever_it_is(
-    monkeypatch, left, gain, n_locations, verdict
-):
+def test_a_second_component_needs_odds_of_twenty_to_one_at_any_location(monkeypatch, score, gain, n_locations, verdict):
     """Where nothing is left to explain, more is asked for."""
     assert np.exp(LIMITS["hammer"].second_log_bayes_factor) == pytest.approx(20, rel=0.01)
     monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
-    one = found(left)
-    second = Ranking(base=one.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_locations)), n_tried=9)
-    both = decision._accept_further(SimpleNamespace(kind="hammer"), one, second)
-    assert (both and both.verdict) == verdict
+    first = found(score)
+    second = Ranking(base=first.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_locations)), n_tried=9)
+    pair = decision._accept_further(SimpleNamespace(kind="hammer"), first, second)
+    assert (pair and pair.verdict) == verdict
 
 
 @pytest.mark.parametrize(
@@ -63,7 +61,7 @@ def test_what_is_left_is_explained_by_a_second_cause_with_odds_of_twenty_to_one_
     ],
 )
 def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain, verdict):
-    """The nominal model leaves a little too much, and a cause a little less: odds of twenty to one."""
+    """The nominal model leaves a little too much, and an effect a little less: odds of twenty to one."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + gain, "attached_resonator")
     best.explains_nearly_all = True
     monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
@@ -85,13 +83,17 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
     assert decided.final is (best if verdict == "explained" else null)
 
 
-@pytest.mark.parametrize(("left", "verdict"), [(1.0, "explained"), (1.7, "consistent")])
-def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(monkeypatch, left, verdict):
-    """A resonance that the nominal model lacks is one piece of one FRF; errors of the data stay beside any cause."""
+@pytest.mark.parametrize(("underestimation", "verdict"), [(1.0, "explained"), (1.7, "consistent")])
+def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestimated(
+    monkeypatch, underestimation, verdict
+):
+    """A resonance that the nominal model lacks is a subband of one FRF; errors of the data stay beside any effect."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + 33.0, "attached_resonator")
     best.explains_nearly_all = True
     monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
-    monkeypatch.setattr(decision, "assess_goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else left))
+    monkeypatch.setattr(
+        decision, "assess_goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else underestimation)
+    )
     monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
@@ -100,15 +102,17 @@ def test_what_a_cause_leaves_of_a_piece_tells_whether_its_errors_are_underrated(
 
 
 @pytest.mark.parametrize(("score", "n_components"), [(0.7, 1), (0.8, 2)])
-def test_a_cause_that_explains_under_strain_gives_way_to_two_others(monkeypatch, score, n_components):
-    """A joint may stand for a resonator and a damper, if what cannot be known is bent for it."""
-    one = found(score)
+def test_an_effect_that_needs_much_nuisance_gives_way_to_two(monkeypatch, score, n_components):
+    """A joint may stand for a resonator and a damper, with a large nuisance chi2."""
+    first = found(score)
     pair = a_fit(ALONE + 28.0)
     pair.hypothesis.components *= 2
     monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
-    nothing, tied = (Ranking(base=one.final, fits=fits, n_tried=9) for fits in ((), (a_fit(ALONE - 1.0),)))
-    settled = Ranking(base=one.final, fits=(pair,), n_tried=9)
+    nothing, tied = (Ranking(base=first.final, fits=fits, n_tried=9) for fits in ((), (a_fit(ALONE - 1.0),)))
+    settled = Ranking(base=first.final, fits=(pair,), n_tried=9)
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: settled if ranking is tied else ranking)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: nothing)
     monkeypatch.setattr(decision, "search_pair", lambda *_: tied)
-    assert len(decision._accept_first(SimpleNamespace(kind="hammer"), one).final.hypothesis.components) == n_components
+    assert (
+        len(decision._accept_first(SimpleNamespace(kind="hammer"), first).final.hypothesis.components) == n_components
+    )

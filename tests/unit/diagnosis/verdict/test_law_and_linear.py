@@ -1,4 +1,4 @@
-"""A law beside a linear cause, which goes into the model or out of the recordings before the law is sought."""
+"""A law beside a linear effect, which goes into the model or out of the recordings before the law is searched."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -50,18 +50,18 @@ class Laws:
 
 
 def beside(model, frfs, names, laws, *, alone=0.0, linear=decide_without_search):
-    """Search; without a linear cause a law strains the model by `alone`."""
+    """Search; without a linear effect the nuisance chi2 of a law is `alone`."""
     problem = problem_of(model, frfs, names)
     return search_beside_linear(problem, linear(problem), a_law("unexplained", alone), model, observed(frfs), laws)
 
 
-def test_a_linear_cause_goes_into_the_model_before_the_law_is_sought(nominal):
+def test_a_linear_effect_goes_into_the_model_before_the_law_is_searched(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     laws = Laws("explained")
-    found = beside(nominal, frfs, ("added_mass",), laws)
-    (given, _), (law, component) = laws.given[0], found
+    pair = beside(nominal, frfs, ("added_mass",), laws)
+    (changed_model, _), (law, component) = laws.given[0], pair
     location = nominal.full_index(Dof(12, "z"))
-    added = given.mass_all.toarray()[location, location] - nominal.mass_all.toarray()[location, location]
+    added = changed_model.mass_all.toarray()[location, location] - nominal.mass_all.toarray()[location, location]
     assert added == pytest.approx(MASS_KG, rel=SEEN)
     assert law.verdict == "explained"
     assert (component.effect, dict(component.location)) == ("added_mass", {"nodes": [12]})
@@ -75,20 +75,20 @@ def test_without_a_law_nothing_is_named(nominal):
 
 
 @pytest.mark.parametrize(
-    ("alone", "with_it", "said"), [(50.0, 5.0, True), (50.0, 12.0, False), (12.0, 7.0, False), (5.0, 1.0, False)]
+    ("alone", "with_it", "is_named"), [(50.0, 5.0, True), (50.0, 12.0, False), (12.0, 7.0, False), (5.0, 1.0, False)]
 )
-def test_a_cause_that_relieves_a_strained_model_is_named_beside_a_law_that_does_not_explain(
-    nominal, alone, with_it, said
+def test_an_effect_that_relieves_a_strained_model_is_named_beside_a_law_that_does_not_explain(
+    nominal, alone, with_it, is_named
 ):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
-    found = beside(nominal, frfs, ("added_mass",), Laws("unexplained", with_it), alone=alone)
-    assert (found is not None) == said
-    if said:
-        assert found[0].verdict == "unexplained"
-        assert found[1].effect == "added_mass"
+    pair = beside(nominal, frfs, ("added_mass",), Laws("unexplained", with_it), alone=alone)
+    assert (pair is not None) == is_named
+    if is_named:
+        assert pair[0].verdict == "unexplained"
+        assert pair[1].effect == "added_mass"
 
 
-def test_blows_that_agree_beside_a_linear_cause_are_no_law(nominal):
+def test_records_that_agree_beside_a_linear_effect_are_no_law(nominal):
     laws = Laws("linear")
     laws.law.fit = None
     assert (
@@ -97,11 +97,11 @@ def test_blows_that_agree_beside_a_linear_cause_are_no_law(nominal):
 
 
 @pytest.mark.parametrize(
-    ("alone", "verdict", "with_it", "said"),
+    ("alone", "verdict", "with_it", "is_named"),
     [(50.0, "explained", 1.0, True), (50.0, "explained", 40.0, False), (50.0, "unexplained", 1.0, False)],
 )
-def test_a_cause_that_leaves_half_is_named_where_beside_it_a_law_explains_and_strains_nothing(
-    nominal, alone, verdict, with_it, said
+def test_an_effect_that_leaves_half_is_named_beside_a_law_that_explains_and_strains_nothing(
+    nominal, alone, verdict, with_it, is_named
 ):
     def halved(problem):
         nothing = decide_without_search(problem)
@@ -111,11 +111,11 @@ def test_a_cause_that_leaves_half_is_named_where_beside_it_a_law_explains_and_st
 
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     laws = Laws(verdict, with_it)
-    assert (beside(nominal, frfs, ("added_mass",), laws, alone=alone, linear=halved) is not None) == said
+    assert (beside(nominal, frfs, ("added_mass",), laws, alone=alone, linear=halved) is not None) == is_named
     assert len(laws.given) == 1
 
 
-def test_a_cause_that_leaves_half_is_not_looked_at_beside_a_law_that_strains_nothing(nominal):
+def test_an_effect_that_leaves_half_is_not_tried_beside_a_law_that_strains_nothing(nominal):
     def halved(problem):
         nothing = decide_without_search(problem)
         best = search_component(problem, nothing.null).best
@@ -128,34 +128,34 @@ def test_a_cause_that_leaves_half_is_not_looked_at_beside_a_law_that_strains_not
 
 
 @pytest.mark.parametrize(
-    ("verdict", "linear_first", "asked"),
+    ("verdict", "linear_first", "searches"),
     [("unexplained", False, ["linear", "law"]), ("unexplained", True, ["linear"]), ("explained", False, ["law"])],
 )
-def test_a_cause_is_looked_for_beside_the_law_where_the_other_way_led_to_nothing(
-    monkeypatch, verdict, linear_first, asked
+def test_an_effect_is_searched_beside_the_law_where_the_opposite_order_led_to_nothing(
+    monkeypatch, verdict, linear_first, searches
 ):
-    seen, nothing = [], SimpleNamespace(findings=(), statement="")
+    called, nothing = [], SimpleNamespace(findings=(), statement="")
     component = SimpleNamespace(log_evidence_gain=1.0, statement="")
 
     def first(*_):
-        seen.append("linear")
+        called.append("linear")
         return (nothing, component) if linear_first else None
 
     replaced = {
         "search_beside_linear": first,
-        "search_beside_law": lambda *_: seen.append("law"),
-        "_with_law": lambda *_: nothing,
-        "replace": lambda found, **_: found,
+        "search_beside_law": lambda *_: called.append("law"),
+        "_add_law": lambda *_: nothing,
+        "replace": lambda diagnosis, **_: diagnosis,
     }
     for name, stub in replaced.items():
         monkeypatch.setattr(diagnose, name, stub)
     problem = SimpleNamespace(effects={"added_mass": None})
     diagnose._diagnose_nonlinear(nothing, problem, None, None, None, None, SimpleNamespace(verdict=verdict), None)
-    assert seen == asked
+    assert called == searches
 
 
-def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):
-    """The misfit falls to a half only, but the pull of the tolerances from ten times as much to none."""
+def test_an_effect_may_explain_what_strains_the_nominal_model(nominal):
+    """The misfit falls to a half only, but the nuisance chi2 from ten times as much to none."""
 
     def strained(problem):
         nothing = decide_without_search(problem)
@@ -168,7 +168,7 @@ def test_a_cause_may_explain_what_the_nominal_model_is_strained_by(nominal):
 
 def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):
     problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
-    location = next(one for one in ATTACHED.locations(problem.context) if one.entries == {"nodes": [12]})
+    location = next(location for location in ATTACHED.locations(problem.context) if location.entries == {"nodes": [12]})
     true = with_change(nominal, ATTACHED.build(problem.context, location)(np.array([0.01, 250.0, 0.02])))
     frfs = measured(true)
     laws = Laws("explained")
@@ -189,8 +189,8 @@ def pulse(shift_s):
     return np.exp(-((time / 0.01) ** 2)) * np.cos(2 * np.pi * 60 * time)
 
 
-@pytest.mark.parametrize("left", [np.inf, np.nan, 1e30])
-def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkeypatch, left):
+@pytest.mark.parametrize("remaining", [np.inf, np.nan, 1e30])
+def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkeypatch, remaining):
     record = ObservedRecord(
         name="a",
         input_channel="force",
@@ -201,7 +201,7 @@ def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkey
         sensors=(Sensor(channel="acc", dof=parse_dof("9:+z"), quantity=FrfQuantity.ACCELERANCE),),
     )
     observations = Observations(kind="hammer", records=(record,), band_hz=(10.0, 500.0))
-    gone = replace(observations, records=(replace(record, responses=np.full((1, SAMPLES), left)),))
+    gone = replace(observations, records=(replace(record, responses=np.full((1, SAMPLES), remaining)),))
     monkeypatch.setattr(law_beside, "subtract_law", lambda *_: gone)
     law = SimpleNamespace(
         verdict="explained",
@@ -234,14 +234,16 @@ def test_recordings_are_restored():
         },
         moved={"acc_2": 6},
     )
-    (found,) = undo_chain_effects(Observations(kind="hammer", records=(record,), band_hz=(10.0, 200.0)), change).records
-    assert_allclose(found.force, pulse(0.0), rtol=0, atol=WRAPPED)
-    assert_allclose(found.responses[0], pulse(0.0), rtol=0, atol=WRAPPED)
-    assert np.array_equal(found.responses[1], record.responses[1])
-    assert [sensor.dof.name for sensor in found.sensors] == ["9:z", "6:z"]
-    assert found.sensors[1].dof.sign == -1
+    (restored,) = undo_chain_effects(
+        Observations(kind="hammer", records=(record,), band_hz=(10.0, 200.0)), change
+    ).records
+    assert_allclose(restored.force, pulse(0.0), rtol=0, atol=WRAPPED)
+    assert_allclose(restored.responses[0], pulse(0.0), rtol=0, atol=WRAPPED)
+    assert np.array_equal(restored.responses[1], record.responses[1])
+    assert [sensor.dof.name for sensor in restored.sensors] == ["9:z", "6:z"]
+    assert restored.sensors[1].dof.sign == -1
 
 
 def test_a_faultless_chain_is_left_alone():
-    seen = Observations(kind="hammer", records=(), band_hz=(10.0, 200.0))
-    assert undo_chain_effects(seen, Change()) is seen
+    observations = Observations(kind="hammer", records=(), band_hz=(10.0, 200.0))
+    assert undo_chain_effects(observations, Change()) is observations

@@ -1,4 +1,4 @@
-"""What cannot be known: how many modes scatter, and how much."""
+"""The nuisance prior: how many modes scatter, and how much."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def nuisance_prior_of(model, top_hz):
     return make_nuisance_prior(basis, make_layout([label]), DiagnoseOptions())
 
 
-def test_nobody_states_the_damping_of_modes_beyond_the_band(tmp_path):
+def test_the_damping_of_modes_beyond_the_band_is_less_certain(tmp_path):
     model, top_hz = model_of(tmp_path), 1500.0
     nuisance_prior = nuisance_prior_of(model, top_hz)
     frequency_hz = solve_modes(model, n_modes=nuisance_prior.n_modes).natural_frequency_hz

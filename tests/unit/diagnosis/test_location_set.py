@@ -1,4 +1,4 @@
-"""How a finding says between which places a test does not decide."""
+"""How a finding lists the locations between which a test cannot decide."""
 
 import pytest
 
@@ -12,7 +12,7 @@ ADDED_KG = 2e-3
 
 
 @pytest.mark.parametrize(
-    ("locations", "said"),
+    ("locations", "words"),
     [
         ([{"nodes": [7]}], ""),
         ([{"nodes": [7]}, {"nodes": [5]}, {"nodes": [6]}, {"nodes": [12]}], "nodes 5 to 7, 12"),
@@ -22,16 +22,16 @@ ADDED_KG = 2e-3
         ([{"end": "right"}, {"nodes": [3]}, {"nodes": [2]}], "end right or nodes 2 to 3"),
     ],
 )
-def test_places_that_a_test_does_not_tell_apart_are_said(locations, said):
-    assert describe_location_set(locations) == (f" The test tells its place no closer than {said}." if said else "")
+def test_locations_that_a_test_cannot_distinguish_are_listed(locations, words):
+    assert describe_location_set(locations) == (f" The test locates it no closer than {words}." if words else "")
 
 
-def test_a_finding_says_how_closely_its_place_is_known(tmp_path):
-    """A beam clamped at both ends and looked at in its middle has no left and right."""
+def test_a_finding_says_how_closely_it_is_located(tmp_path):
+    """A beam clamped at both ends and measured in its middle has no left and right."""
     nominal = beam(tmp_path, elements=24, right="clamped")
     frfs = measured(with_point_masses(nominal, {6: ADDED_KG}), labels(outputs=("13:+z",), inputs=("13:+z",)))
-    found = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
-    (finding,) = found.findings
+    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    (finding,) = diagnosis.findings
     assert {6, 20} <= {location["nodes"][0] for location in finding.location_set}
     assert finding.statement.endswith(describe_location_set(finding.location_set))
-    assert "no closer than nodes" in found.statement
+    assert "no closer than nodes" in diagnosis.statement

@@ -1,4 +1,4 @@
-"""A force at one place that springs, dampers and masses only imitate."""
+"""A force at one location that springs, dampers and masses only imitate."""
 
 import re
 
@@ -47,23 +47,23 @@ def diagnosed(model, stiffness, effects=IMITATORS):
 @pytest.mark.parametrize("order", [pytest.param(0.3, marks=pytest.mark.slow), 0.5])
 def test_a_fractional_damper_is_not_named_by_what_imitates_it(nominal, order):
     middle = 2 * np.pi * np.sqrt(np.prod(BAND_HZ))
-    found = diagnosed(nominal, lambda s: 300.0 * (s / middle) ** order)
-    assert found.verdict == "unexplained"
-    assert found.mismatch_location == {"nodes": [12]}
-    said = re.search(r"at node 12 \(x = 0.344 m\) that grows with the power (\S+) of frequency", found.statement)
-    assert float(said[1]) == pytest.approx(order, abs=SEEN)
+    diagnosis = diagnosed(nominal, lambda s: 300.0 * (s / middle) ** order)
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.mismatch_location == {"nodes": [12]}
+    match = re.search(r"at node 12 \(x = 0.344 m\) that grows with the power (\S+) of frequency", diagnosis.statement)
+    assert float(match[1]) == pytest.approx(order, abs=SEEN)
 
 
 def test_a_joint_that_relaxes_once_is_named(nominal):
     time = 1 / (2 * np.pi * 100.0)
-    found = diagnosed(nominal, lambda s: 300.0 * s * time / (1 + s * time))
-    assert found.verdict == "explained"
-    assert [finding.effect for finding in found.findings] == ["viscoelastic_joint"]
+    diagnosis = diagnosed(nominal, lambda s: 300.0 * s * time / (1 + s * time))
+    assert diagnosis.verdict == "explained"
+    assert [finding.effect for finding in diagnosis.findings] == ["viscoelastic_joint"]
 
 
 def test_a_late_force_is_not_named_by_what_looks_like_it(nominal):
     """Control by a sensor's signal that comes late takes stiffness away, and damps."""
-    found = diagnosed(nominal, lambda s: -40.0 * np.exp(-s * DELAY_S), effects=("local_damper", "added_mass"))
-    assert found.verdict == "unexplained"
-    assert found.mismatch_location == {"nodes": [12]}
-    assert "at node 12 (x = 0.344 m) that takes stiffness away, with a loss factor of" in found.statement
+    diagnosis = diagnosed(nominal, lambda s: -40.0 * np.exp(-s * DELAY_S), effects=("local_damper", "added_mass"))
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.mismatch_location == {"nodes": [12]}
+    assert "at node 12 (x = 0.344 m) that takes stiffness away, with a loss factor of" in diagnosis.statement

@@ -1,4 +1,4 @@
-"""What explains a test nearly as well as the best does, weighed with the errors of the model that are likely."""
+"""Candidates of an ambiguity set are rescored with the model errors that are likely."""
 
 from dataclasses import replace
 
@@ -23,29 +23,29 @@ def nominal(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("beam"))
 
 
-def test_a_place_that_needs_more_of_the_tolerances_falls_behind_where_the_model_is_better(nominal):
+def test_a_location_that_needs_more_of_the_tolerances_falls_behind_where_the_model_is_better(nominal):
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
-    found = search_component(problem, fit_null_model(problem))
-    settled = rescore_ambiguity_set(problem, found)
+    ranking = search_component(problem, fit_null_model(problem))
+    settled = rescore_ambiguity_set(problem, ranking)
     assert settled.best.hypothesis.components[0].location.entries == {"nodes": [12]}
-    assert settled.best.log_evidence == pytest.approx(found.best.log_evidence)
-    assert ahead(found) < 5  # nats
-    assert ahead(settled) > 2 * ahead(found)
+    assert settled.best.log_evidence == pytest.approx(ranking.best.log_evidence)
+    assert ahead(ranking) < 5  # nats
+    assert ahead(settled) > 2 * ahead(ranking)
 
 
-def test_a_model_that_is_ten_times_better_than_stated_tells_still_more(nominal, monkeypatch):
+def test_a_model_that_is_ten_times_better_than_stated_distinguishes_still_more(nominal, monkeypatch):
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: LITTLE_KG})), ("added_mass",))
-    found = search_component(problem, fit_null_model(problem))
-    finely = rescore_ambiguity_set(problem, found)
+    ranking = search_component(problem, fit_null_model(problem))
+    finely = rescore_ambiguity_set(problem, ranking)
     monkeypatch.setattr(ties, "PARTS", (0.3,))
-    assert ahead(finely) > ahead(rescore_ambiguity_set(problem, found)) + 1  # nats
+    assert ahead(finely) > ahead(rescore_ambiguity_set(problem, ranking)) + 1  # nats
 
 
-def test_places_stay_alike_where_the_model_needs_its_tolerances(nominal, tmp_path):
+def test_locations_stay_ambiguous_where_the_model_needs_its_tolerances(nominal, tmp_path):
     true = with_point_masses(beam(tmp_path, thickness_m=0.005 * THICKER), {12: 2 * LITTLE_KG})
     problem = problem_of(nominal, measured(true), ("added_mass",))
-    found = search_component(problem, fit_null_model(problem))
-    assert ahead(rescore_ambiguity_set(problem, found)) == pytest.approx(ahead(found), abs=0.5)
+    ranking = search_component(problem, fit_null_model(problem))
+    assert ahead(rescore_ambiguity_set(problem, ranking)) == pytest.approx(ahead(ranking), abs=0.5)
 
 
 @pytest.mark.parametrize(("error", "expected"), [(0.0, 0.1), (3e-4, 0.3), (1e-3, 1.0)])
@@ -74,20 +74,20 @@ def test_errors_of_frfs_that_no_parameter_stands_for_are_as_large_as_the_best_ex
 
 @pytest.mark.parametrize("shared", [0.0, 0.02])
 def test_the_log_density_of_whitening_is_that_of_a_normal_distribution(nominal, shared):
-    """Blows at one place share the noise of their force."""
+    """FRFs at one excited point share the noise of the force."""
     problem = problem_of(nominal, measured(nominal), ())
-    few = select_points(problem.data.measured, np.arange(0, len(problem.data.measured.s), 40))
-    few = replace(few, shared_errors=(np.full((len(few.s), 1), shared),))
-    errors = few.size * 1e-3 * np.exp(1j * np.arange(few.values.size)).reshape(few.values.shape)
-    nats, exact = [], []
+    sparse = select_points(problem.data.measured, np.arange(0, len(problem.data.measured.s), 40))
+    sparse = replace(sparse, shared_errors=(np.full((len(sparse.s), 1), shared),))
+    errors = sparse.size * 1e-3 * np.exp(1j * np.arange(sparse.values.size)).reshape(sparse.values.shape)
+    approximate, exact = [], []
     for floor in (1.0, 0.3):
-        white = make_data(few, problem.context.options, floor=floor).whitening
+        white = make_data(sparse, problem.context.options, floor=floor).whitening
         roots = [np.linalg.inv(factor) for factor in white.factors]
-        force = (few.values_above_noise * few.shared_errors[0]).T.ravel()
+        force = (sparse.values_above_noise * sparse.shared_errors[0]).T.ravel()
         covariance = linalg.block_diag(*(root @ root.conj().T for root in roots)) + np.outer(force, force.conj())
-        nats.append(white.log_density - 0.5 * np.sum(white(errors) ** 2))
+        approximate.append(white.log_density - 0.5 * np.sum(white(errors) ** 2))
         exact.append(log_normal(errors.T.ravel(), covariance))
-    assert nats[1] - nats[0] == pytest.approx(exact[1] - exact[0])
+    assert approximate[1] - approximate[0] == pytest.approx(exact[1] - exact[0])
 
 
 def log_normal(errors, covariance):
@@ -96,5 +96,5 @@ def log_normal(errors, covariance):
 
 
 def ahead(ranking):
-    """How far the best place is ahead of the next, nats."""
+    """Log Bayes factor of the best location over the next."""
     return ranking.fits[0].log_evidence - ranking.fits[1].log_evidence

@@ -1,4 +1,4 @@
-"""Fits that do not come near the best are given up, and what a step asks for twice is solved for once."""
+"""Fits that cannot come near the best are stopped early, and equal values are solved for once."""
 
 from types import SimpleNamespace
 
@@ -37,7 +37,7 @@ def mass_at(problem, node):
     return next(component for component in components if component.location.entries == {"nodes": [node]})
 
 
-def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(problem):
+def test_a_fit_at_a_wrong_location_is_stopped_above_the_limit(problem):
     right = problem.fit((mass_at(problem, 12),), START)
     wrong = (mass_at(problem, 16),)
     to_the_end = problem.fit(wrong, START)
@@ -47,10 +47,10 @@ def test_a_fit_at_a_wrong_place_is_given_up_above_the_bar(problem):
     assert not given_up.has_converged
 
 
-def test_a_bar_does_not_stop_a_fit_on_its_way_below_it(problem):
+def test_the_limit_does_not_stop_a_fit_on_its_way_below_it(problem):
     right = problem.fit((mass_at(problem, 12),), START)
-    again = problem.fit((mass_at(problem, 12),), START, cost_limit=climb.find_cost_limit([right]))
-    assert again.cost == right.cost
+    limited = problem.fit((mass_at(problem, 12),), START, cost_limit=climb.find_cost_limit([right]))
+    assert limited.cost == right.cost
 
 
 def a_fit(cost, *, explains_nearly_all, has_converged=True):
@@ -63,27 +63,27 @@ def a_fit(cost, *, explains_nearly_all, has_converged=True):
     )
 
 
-def test_the_bar_is_near_the_best_if_that_explains_nearly_all():
+def test_the_limit_is_near_the_best_if_that_explains_nearly_all():
     worse = a_fit(9000.0, explains_nearly_all=False)
     assert climb.find_cost_limit([]) == np.inf
     assert climb.find_cost_limit([worse]) == np.inf
     assert climb.find_cost_limit([worse, a_fit(100.0, explains_nearly_all=True)]) == pytest.approx(500.0)
 
 
-def test_only_a_fit_below_the_bar_goes_on():
-    gone_on = []
-    problem = SimpleNamespace(fit_to_convergence=lambda fit: gone_on.append(fit) or fit)
+def test_only_a_fit_below_the_limit_is_continued():
+    continued = []
+    problem = SimpleNamespace(fit_to_convergence=lambda fit: continued.append(fit) or fit)
     best = a_fit(100.0, explains_nearly_all=True, has_converged=False)
-    near, far = (a_fit(cost, explains_nearly_all=False, has_converged=False) for cost in (300.0, 9000.0))
-    search.rank_fits(problem, [best, far])
-    search.rank_fits(problem, [best, near])
-    assert gone_on == [best, best, near]
+    close, distant = (a_fit(cost, explains_nearly_all=False, has_converged=False) for cost in (300.0, 9000.0))
+    search.rank_fits(problem, [best, distant])
+    search.rank_fits(problem, [best, close])
+    assert continued == [best, best, close]
 
 
 def test_the_modes_of_the_same_values_are_solved_for_once(problem, monkeypatch):
     solved = []
-    modify = hypotheses.modify
-    monkeypatch.setattr(hypotheses, "modify_structure", lambda *args: solved.append(args) or modify(*args))
+    modify_structure = hypotheses.modify_structure
+    monkeypatch.setattr(hypotheses, "modify_structure", lambda *args: solved.append(args) or modify_structure(*args))
     hypothesis = problem.make_hypothesis((mass_at(problem, 12),))
     nothing = np.zeros(hypothesis.nuisance_prior.size)
     scattered = nothing.copy()

@@ -1,4 +1,4 @@
-"""FRFs whose scale nobody knows: the rest of them still tells what is missing."""
+"""FRFs of unknown scale still show what is missing."""
 
 from dataclasses import replace
 
@@ -30,8 +30,8 @@ def of_unknown_scale(machine, kind="per_channel"):
 
 def fit_of(nominal, kind):
     """The fit of the model without a mass to FRFs with one."""
-    seen = of_unknown_scale(with_point_masses(nominal, {12: MASS_KG}), kind)
-    problem = pose_problem(nominal, split_data(seen), BAND_HZ, FEW, {}, free_gains=kind)
+    observations = of_unknown_scale(with_point_masses(nominal, {12: MASS_KG}), kind)
+    problem = pose_problem(nominal, split_data(observations), BAND_HZ, FEW, {}, free_gains=kind)
     return problem, fit_null_model(problem)
 
 
@@ -58,12 +58,12 @@ def test_slopes_are_those_of_the_misfit_with_the_best_gains(nominal, kind):
 
 
 def test_a_mass_is_found_without_scales(nominal):
-    found = diagnose(nominal, of_unknown_scale(with_point_masses(nominal, {12: SMALL_KG})), FEW)
-    assert found.verdict == "explained"
-    (finding,) = found.findings
+    diagnosis = diagnose(nominal, of_unknown_scale(with_point_masses(nominal, {12: SMALL_KG})), FEW)
+    assert diagnosis.verdict == "explained"
+    (finding,) = diagnosis.findings
     assert (finding.effect, dict(finding.location)) == ("added_mass", {"nodes": [12]})
     assert finding.parameters["mass_kg"].value == pytest.approx(SMALL_KG, rel=0.05)
-    assert found.after.held_out < 0.05 * found.before.held_out
+    assert diagnosis.after.held_out < 0.05 * diagnosis.before.held_out
 
 
 def test_nothing_missing_is_consistent_without_scales(nominal):

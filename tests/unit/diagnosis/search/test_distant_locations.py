@@ -20,7 +20,7 @@ from frf_ipz.progress import silent
 
 ENDS, WRONG = (6, 13), (7, 12)
 STIFFNESS_N_M = 3e3
-ROUGHLY, EXACTLY = 0.05, 0.01  # relative: amplitudes of the first look are a factor of two apart
+ROUGHLY, EXACTLY = 0.05, 0.01  # relative: amplitudes of the scan are a factor of two apart
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +37,13 @@ def nodes_of(component):
     return tuple(component.location.entries["nodes"])
 
 
-def test_a_wide_search_finds_values_closer_than_its_amplitudes_are_apart(problem):
+def test_a_global_scan_finds_values_closer_than_its_amplitudes_are_spaced(problem):
     best = scan_globally(problem, fit_null_model(problem))[0]
     assert nodes_of(best.component) == ENDS
     assert best.values[0] == pytest.approx(STIFFNESS_N_M, rel=ROUGHLY)
 
 
-def test_a_wide_search_looks_between_the_places_of_a_thinned_row(problem, monkeypatch):
+def test_a_global_scan_looks_between_the_locations_of_a_thinned_row(problem, monkeypatch):
     monkeypatch.setattr(coupling_spring, "MAX_IN_A_ROW", 12)
     locations = problem.effects["coupling_spring"].locations(problem.context)
     assert ENDS not in [tuple(location.entries["nodes"]) for location in locations]
@@ -51,18 +51,18 @@ def test_a_wide_search_looks_between_the_places_of_a_thinned_row(problem, monkey
     assert nodes_of(best.component) == ENDS
 
 
-def test_a_place_that_needs_too_much_of_the_tolerances_gives_way_to_another(problem, monkeypatch):
+def test_a_location_that_needs_too_much_of_the_tolerances_gives_way_to_a_better_one(problem, monkeypatch):
     null = fit_null_model(problem)
     start = next(start for start in scan_globally(problem, null) if nodes_of(start.component) == WRONG)
     wrong = problem.fit((start.component,), start.values)
     assert wrong.explains_nearly_all
     monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
     monkeypatch.setattr(decision, "search_pair", lambda *_: Ranking(base=wrong, fits=(), n_tried=0))
-    found = decision.decide(problem, silent)
-    assert found.verdict == "explained"
-    (component,) = found.final.hypothesis.components
+    decided = decision.decide(problem, silent)
+    assert decided.verdict == "explained"
+    (component,) = decided.final.hypothesis.components
     assert nodes_of(component) == ENDS
-    assert found.final.values[0] == pytest.approx(STIFFNESS_N_M, rel=EXACTLY)
+    assert decided.final.values[0] == pytest.approx(STIFFNESS_N_M, rel=EXACTLY)
 
 
 TRUE, ASTRAY, RESONATOR = 13, 14, np.array([0.02, 150.0, 0.02])  # nodes; kg, Hz, 1
@@ -74,16 +74,16 @@ def at_node(problem, node):
     return Component(effect=effect, location=location, n_locations=1)
 
 
-def test_another_place_is_fitted_from_the_best_values_where_a_wide_search_finds_none(tmp_path_factory, monkeypatch):
+def test_a_location_is_fitted_from_the_best_values_where_a_global_scan_finds_none(tmp_path_factory, monkeypatch):
     nominal = beam(tmp_path_factory.mktemp("beam"), elements=24)
-    one = problem_of(nominal, measured(nominal), ("attached_resonator",))
-    component = at_node(one, TRUE)
-    true = with_change(nominal, component.effect.build(one.context, component.location)(RESONATOR))
+    blank = problem_of(nominal, measured(nominal), ("attached_resonator",))
+    component = at_node(blank, TRUE)
+    true = with_change(nominal, component.effect.build(blank.context, component.location)(RESONATOR))
     problem = problem_of(nominal, measured(true), ("attached_resonator",))
     wrong = problem.fit((at_node(problem, ASTRAY),), RESONATOR)
     lost = Start(component=at_node(problem, TRUE), values=np.array([1e-4, 900.0, 0.5]), cost=0.0)
     monkeypatch.setattr(elsewhere, "scan_globally", lambda *_: [lost])
     monkeypatch.setattr(elsewhere, "search_neighbourhoods", lambda *_: None)
-    found = elsewhere.fit_distant_locations(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=0))
-    assert found.best.hypothesis.components[-1].location.entries == {"nodes": [TRUE]}
-    assert found.best.values[:2] == pytest.approx(RESONATOR[:2], rel=EXACTLY)
+    ranking = elsewhere.fit_distant_locations(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=0))
+    assert ranking.best.hypothesis.components[-1].location.entries == {"nodes": [TRUE]}
+    assert ranking.best.values[:2] == pytest.approx(RESONATOR[:2], rel=EXACTLY)

@@ -24,8 +24,8 @@ def test_what_scatter_explains_is_no_evidence_however_much_it_changes(monkeypatc
     hypothesis = SimpleNamespace(respond=lambda *_: answer)
     problem = SimpleNamespace(data=data, nuisance_prior=SimpleNamespace(size=3), context=SimpleNamespace(layout=None))
     null = SimpleNamespace(hypothesis=hypothesis, values=None)
-    found = detectable._make_evidence(problem, null)(hypothesis, None)
-    left = np.linalg.lstsq(np.vstack([columns, np.eye(3)]), np.concatenate([white, np.zeros(3)]), rcond=1e-15)
-    expected = 0.5 * float(np.sum((white - columns @ left[0]) ** 2) + np.sum(left[0] ** 2))
-    assert found == pytest.approx(expected, rel=1e-6)
-    assert found > 2.0 - 1e-6
+    evidence = detectable._make_evidence(problem, null)(hypothesis, None)
+    remaining = np.linalg.lstsq(np.vstack([columns, np.eye(3)]), np.concatenate([white, np.zeros(3)]), rcond=1e-15)
+    expected = 0.5 * float(np.sum((white - columns @ remaining[0]) ** 2) + np.sum(remaining[0] ** 2))
+    assert evidence == pytest.approx(expected, rel=1e-6)
+    assert evidence > 2.0 - 1e-6

@@ -1,4 +1,4 @@
-"""Steps from a cause to its neighbours and to what looks like it, alone and in pairs."""
+"""Steps from a component to its neighbours and imitators, alone and in pairs."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def joint_at_end(problem):
 
 
 def problem_with(nominal, names, components, values):
-    """A bench for what a beam with some causes is measured to do."""
+    """The problem of a beam with some components."""
     blank = problem_of(nominal, measured(nominal), tuple({*names, *(name for name, *_ in components)}))
     return problem_doing(
         nominal, names, blank, tuple(component_at(blank, *component) for component in components), values
@@ -44,13 +44,13 @@ def problem_with(nominal, names, components, values):
 
 
 def problem_doing(nominal, names, blank, components, values):
-    both = blank.make_hypothesis(components)
+    hypothesis = blank.make_hypothesis(components)
     values, nuisance = np.array(values), np.zeros(blank.nuisance_prior.size)
 
     def chain(frequency_hz):
         s = 2j * np.pi * frequency_hz
         alone = blank.make_hypothesis(()).respond(np.zeros(0), nuisance, s).values
-        return both.respond(values, nuisance, s).values / alone
+        return hypothesis.respond(values, nuisance, s).values / alone
 
     return problem_of(nominal, measured(nominal, factors=chain), names)
 
@@ -66,32 +66,34 @@ def climbed(problem, base, fit):
 
 
 @pytest.mark.parametrize(("times", "is_settled"), [(3.0, True), (30.0, False)])
-def test_a_fit_beside_the_best_that_was_given_up_is_gone_on_with(nominal, times, is_settled):
+def test_a_neighbour_whose_fit_was_stopped_early_is_continued(nominal, times, is_settled):
     problem = problem_with(nominal, ("local_damper",), [("local_damper", 12)], [20.0])
     base = fit_null_model(problem)
-    near = problem.fit_to_convergence(problem.fit((component_at(problem, "local_damper", 11),), np.array([20.0])))
+    neighbour = problem.fit_to_convergence(problem.fit((component_at(problem, "local_damper", 11),), np.array([20.0])))
     true = problem.fit((component_at(problem, "local_damper", 12),), np.array([20.0]))
-    assert true.log_evidence > near.log_evidence
-    on_its_way = replace(true, has_converged=False, misfit=2 * times * near.cost, log_evidence=near.log_evidence - 100)
-    fits = {fit.hypothesis.components[-1].key: fit for fit in (near, on_its_way)}
-    climb._search_neighbourhood(problem, base, near, fits)
+    assert true.log_evidence > neighbour.log_evidence
+    on_its_way = replace(
+        true, has_converged=False, misfit=2 * times * neighbour.cost, log_evidence=neighbour.log_evidence - 100
+    )
+    fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, on_its_way)}
+    climb._search_neighbourhood(problem, base, neighbour, fits)
     assert fits[true.hypothesis.components[-1].key].has_converged == is_settled
     assert (likeliest(fits.values()).hypothesis.components[-1].location.entries == {"nodes": [12]}) == is_settled
 
 
-def test_a_fit_beside_the_best_that_cannot_go_on_begins_anew_from_there(nominal, monkeypatch):
+def test_a_neighbour_that_cannot_be_continued_is_fitted_anew_from_the_best(nominal, monkeypatch):
     problem = problem_with(nominal, ("local_damper",), [("local_damper", 12)], [20.0])
-    near = problem.fit_to_convergence(problem.fit((component_at(problem, "local_damper", 11),), np.array([20.0])))
+    neighbour = problem.fit_to_convergence(problem.fit((component_at(problem, "local_damper", 11),), np.array([20.0])))
     true = problem.fit((component_at(problem, "local_damper", 12),), np.array([20.0]))
-    stuck = replace(true, has_converged=False, misfit=2 * near.cost, log_evidence=near.log_evidence - 100)
+    stuck = replace(true, has_converged=False, misfit=2 * neighbour.cost, log_evidence=neighbour.log_evidence - 100)
     monkeypatch.setattr(type(problem), "fit_to_convergence", lambda _bench, fit: fit)
-    fits = {fit.hypothesis.components[-1].key: fit for fit in (near, stuck)}
-    climb._search_neighbourhood(problem, fit_null_model(problem), near, fits)
+    fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, stuck)}
+    climb._search_neighbourhood(problem, fit_null_model(problem), neighbour, fits)
     assert likeliest(fits.values()).hypothesis.components[-1].location.entries == {"nodes": [12]}
     assert likeliest(fits.values()).cost == pytest.approx(true.cost, rel=SEEN)
 
 
-def test_where_settling_moves_the_first_cause_others_are_searched_beside_it_again(nominal, monkeypatch):
+def test_where_the_first_component_moves_second_ones_are_searched_again(nominal, monkeypatch):
     """Beside a mass one node off, another effect may have explained more than the true one."""
     names = ("added_mass", "grounded_spring", "coupling_spring")
     problem = problem_with(nominal, names, [("added_mass", 12), ("grounded_spring", 7)], [0.03, 250.0])
@@ -112,7 +114,7 @@ def test_where_settling_moves_the_first_cause_others_are_searched_beside_it_agai
     assert pairs._reposition(problem, Ranking(base=first, fits=(pair,), n_tried=1)).best is true
 
 
-def test_where_all_are_far_off_what_stands_out_beside_fitted_scatter_is_tried(nominal, monkeypatch):
+def test_where_all_are_far_off_what_stands_out_beside_the_nuisance_is_tried(nominal, monkeypatch):
     problem = problem_with(
         nominal, ("attached_resonator", "added_mass"), [("attached_resonator", 12)], [4e-3, 120.0, 0.01]
     )
@@ -126,26 +128,26 @@ def test_where_all_are_far_off_what_stands_out_beside_fitted_scatter_is_tried(no
 def test_a_spring_whose_other_end_hardly_moves_is_tried_as_a_support(nominal):
     problem = problem_with(nominal, ("coupling_spring", "grounded_spring"), [("grounded_spring", 12)], [2e3])
     base = fit_null_model(problem)
-    near = problem.fit((component_at(problem, "coupling_spring", 2, 12),), np.array([2e3]))
-    assert near.is_nearly_right
-    best = climbed(problem, base, near).hypothesis.components[-1]
+    neighbour = problem.fit((component_at(problem, "coupling_spring", 2, 12),), np.array([2e3]))
+    assert neighbour.is_nearly_right
+    best = climbed(problem, base, neighbour).hypothesis.components[-1]
     assert (best.effect.name, best.location.entries) == ("grounded_spring", {"nodes": [12]})
 
 
-def test_what_looks_alike_is_fitted_from_values_that_do_the_same_in_the_band(nominal, monkeypatch):
+def test_an_imitator_is_fitted_from_values_that_do_the_same_in_the_band(nominal, monkeypatch):
     """What is best far from the axis may be far off near it."""
     names = ("attached_resonator", "viscoelastic_joint")
     problem = problem_with(nominal, names, [("viscoelastic_joint", 14)], [3e3, 4e-4])
     base = fit_null_model(problem)
-    near = problem.fit((component_at(problem, "attached_resonator", 14),), np.array([0.2, 9.0, 0.3]))
+    neighbour = problem.fit((component_at(problem, "attached_resonator", 14),), np.array([0.2, 9.0, 0.3]))
     monkeypatch.setattr(
         climb,
         "find_best_start",
         lambda _bench, _base, component, *_: Start(component=component, values=np.array([0.5, 1e-6]), cost=0.0),
     )
-    monkeypatch.setattr(type(problem), "fit", lambda *_, **__: near)  # no beginning anew
+    monkeypatch.setattr(type(problem), "fit", lambda *_, **__: neighbour)  # no beginning anew
     monkeypatch.setattr(climb, "refine", lambda _hypothesis, _measured, _weights, values, **_: (values, 0.0))
-    best = climbed(problem, base, near)
+    best = climbed(problem, base, neighbour)
     component = best.hypothesis.components[-1]
     assert (component.effect.name, component.location.entries) == ("viscoelastic_joint", {"nodes": [14]})
     assert best.values == pytest.approx([3e3, 4e-4], rel=SEEN)
@@ -157,27 +159,27 @@ def test_the_end_of_a_beam_is_tried_with_values_of_its_own(tmp_path, monkeypatch
     blank = problem_of(pinned, measured(pinned), names)
     problem = problem_doing(pinned, names, blank, (joint_at_end(blank),), [30.0, 5e-4])
     base = fit_null_model(problem)
-    near = problem.fit((component_at(problem, "viscoelastic_joint", 2),), np.array([3e4, 5e-4]))
-    monkeypatch.setattr(type(problem), "fit", lambda *_, **__: near)  # no beginning anew
+    neighbour = problem.fit((component_at(problem, "viscoelastic_joint", 2),), np.array([3e4, 5e-4]))
+    monkeypatch.setattr(type(problem), "fit", lambda *_, **__: neighbour)  # no beginning anew
     monkeypatch.setattr(climb, "refine", lambda _hypothesis, _measured, _weights, values, **_: (values, 0.0))
-    best = climbed(problem, base, near)
+    best = climbed(problem, base, neighbour)
     assert best.hypothesis.components[-1].location.entries == {"end": "left", "nodes": [1]}
     assert best.values == pytest.approx([30.0, 5e-4], rel=SEEN)
 
 
-def test_places_around_are_chosen_near_the_axis(nominal, monkeypatch):
+def test_surroundings_are_chosen_near_the_axis(nominal, monkeypatch):
     """Far from the axis other pairs of nodes may look better than the true one, and no step beside leads there."""
     problem = problem_with(nominal, ("coupling_spring",), [("coupling_spring", 6, 15)], [4e3])
-    near = problem.fit((component_at(problem, "coupling_spring", 4, 14),), np.array([4e3]))
-    around = climb.refine_surroundings(problem, near.hypothesis.components, near.values)
+    neighbour = problem.fit((component_at(problem, "coupling_spring", 4, 14),), np.array([4e3]))
+    around = climb.refine_surroundings(problem, neighbour.hypothesis.components, neighbour.values)
     true = [components[-1].location.entries["nodes"] for components, _ in around].index([6, 15])
-    others = [one for index, one in enumerate(around) if index != true]
-    blurred = [*others[: climb.N_GLANCED - 1], around[true], *others[climb.N_GLANCED - 1 :]]
+    wrong = [entry for index, entry in enumerate(around) if index != true]
+    blurred = [*wrong[: climb.N_GLANCED - 1], around[true], *wrong[climb.N_GLANCED - 1 :]]
     monkeypatch.setattr(climb, "refine_surroundings", lambda *_: blurred)
-    assert climb._promising_surroundings(problem, near)[0].entries == {"nodes": [6, 15]}
+    assert climb._promising_surroundings(problem, neighbour)[0].entries == {"nodes": [6, 15]}
 
 
-def test_of_equal_starts_that_is_taken_which_the_data_support(nominal):
+def test_of_several_starts_the_data_choose(nominal):
     problem = problem_with(nominal, ("grounded_spring",), [("grounded_spring", 12)], [2e3])
     hypothesis = problem.make_hypothesis((component_at(problem, "grounded_spring", 12),))
     right = problem.fit(hypothesis.components, np.array([2e3]))
@@ -188,24 +190,24 @@ def test_of_equal_starts_that_is_taken_which_the_data_support(nominal):
 
 def test_a_grid_is_thinned_so_that_every_value_stays():
     grid = np.array([[a, b, c] for a in range(8) for b in range(8) for c in range(8)], float)
-    some = climb._thin_grid(grid)
-    assert 32 <= len(some) <= climb.MAX_STARTS
-    assert all(set(column) == set(range(8)) for column in some.T)
+    thinned = climb._thin_grid(grid)
+    assert 32 <= len(thinned) <= climb.MAX_STARTS
+    assert all(set(column) == set(range(8)) for column in thinned.T)
     assert len(climb._thin_grid(grid[:5])) == 5
 
 
-def test_a_second_cause_is_looked_for_beside_a_first_that_leaves_much(nominal, monkeypatch):
+def test_a_second_component_is_searched_beside_a_first_that_leaves_much(nominal, monkeypatch):
     """A slow high-pass of a channel changes nothing far from the axis, where pairs are searched."""
     names = ("grounded_spring", "sensor_dynamics", "sensor_gain")
     problem = problem_with(nominal, names, [("grounded_spring", 12)], [2e3])
     late = problem.effects["sensor_dynamics"]
     location = next(location for location in late.locations(problem.context) if location.key == ("acc_2", "highpass"))
-    both = (component_at(problem, "grounded_spring", 12), Component(effect=late, location=location, n_locations=4))
+    pair = (component_at(problem, "grounded_spring", 12), Component(effect=late, location=location, n_locations=4))
 
     def chain(frequency_hz):
         s, nuisance = 2j * np.pi * frequency_hz, np.zeros(problem.nuisance_prior.size)
         alone = problem.make_hypothesis(()).respond(np.zeros(0), nuisance, s).values
-        return problem.make_hypothesis(both).respond(np.array([2e3, 1.2]), nuisance, s).values / alone
+        return problem.make_hypothesis(pair).respond(np.array([2e3, 1.2]), nuisance, s).values / alone
 
     problem = problem_of(nominal, measured(nominal, factors=chain), names)
     first = search_component(problem, fit_null_model(problem))
@@ -213,20 +215,20 @@ def test_a_second_cause_is_looked_for_beside_a_first_that_leaves_much(nominal, m
     assert not first.best.is_far_off
     assert first.refined
     monkeypatch.setattr(pairs, "_search_far_pairs", lambda *_: [])
-    found = pairs.search_pair(problem, first, lambda fit: fit.explains_nearly_all).best
-    assert {component.effect.name for component in found.hypothesis.components} == {
+    best = pairs.search_pair(problem, first, lambda fit: fit.explains_nearly_all).best
+    assert {component.effect.name for component in best.hypothesis.components} == {
         "grounded_spring",
         "sensor_dynamics",
     }
 
 
-def test_two_resonators_are_taken_for_simpler_things(nominal):
+def test_two_resonators_give_way_to_simpler_effects(nominal):
     problem = problem_with(nominal, KINDS, [("local_damper", 15), ("grounded_spring", 9)], [0.4, 1.5e3])
     two = (component_at(problem, "attached_resonator", 15), component_at(problem, "attached_resonator", 9))
     fit = problem.fit(two, np.array([0.02, 11.0, 0.5, 0.3, 11.0, 1e-3]))
     base = problem.fit(two[:1], fit.values[:3])
-    found = pairs._try_simpler_effects(problem, Ranking(base=base, fits=(fit,), n_tried=1)).best
+    best = pairs._try_simpler_effects(problem, Ranking(base=base, fits=(fit,), n_tried=1)).best
     components = {
-        (component.effect.name, *component.location.entries["nodes"]) for component in found.hypothesis.components
+        (component.effect.name, *component.location.entries["nodes"]) for component in best.hypothesis.components
     }
     assert components == {("local_damper", 15), ("grounded_spring", 9)}
