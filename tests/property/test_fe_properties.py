@@ -44,8 +44,8 @@ def translations(model):
     return [dof for dof in model.dofs if dof.direction == "z"]
 
 
-def label(output, blow, quantity=FrfQuantity.RECEPTANCE):
-    return FrfLabel(output, blow, quantity)
+def label(output, excited, quantity=FrfQuantity.RECEPTANCE):
+    return FrfLabel(output, excited, quantity)
 
 
 def band(model):

@@ -9,7 +9,7 @@ from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of
 
 FREQUENCY = np.arange(1.0, 6.0)
-PAIRS = [(1, 8), (2, 8), (1, 9)]  # node 2 was not measured for blows at node 9
+PAIRS = [(1, 8), (2, 8), (1, 9)]  # node 2 was not measured for the excitation at node 9
 
 
 def frf_set(**changes):

@@ -205,7 +205,7 @@ def _integral(polynomials: FloatArray) -> FloatArray:
     return np.asarray((product + np.swapaxes(product, -1, -2)) / 2)  # symmetric to the last bit
 
 
-def _symmetric(left: FloatArray, right: FloatArray) -> FloatArray:
+def _symmetric(first: FloatArray, second: FloatArray) -> FloatArray:
     """(n, 4, 4) mean of the products of two values of all DOFs, (n, 4), in both orders."""
-    product = left[:, :, None] * right[:, None, :]
+    product = first[:, :, None] * second[:, None, :]
     return np.asarray((product + np.swapaxes(product, 1, 2)) / 2)

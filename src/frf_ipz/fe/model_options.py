@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from frf_ipz.toml_files import STRICT
 
-# Numbers are strict: TOML tells numbers, texts and truth values apart, so a length of "0.5" or of true is a slip.
+# Numbers are strict: TOML distinguishes numbers, texts and truth values, so a length of "0.5" or of true is a slip.
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]

@@ -12,13 +12,13 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
-DIFFERENCE = 3  # order of the differences: what a parabola can follow over four lines is no noise
+DIFFERENCE = 3  # order of the differences: a parabola over four lines is no noise
 BLOCK_LINES = 48  # lines behind one estimate: its scatter is then some 20 %
 TINY = 1e-300  # so that the logarithm of a dead channel stays finite
 
 
 def rough_variance(values: ComplexArray) -> FloatArray:
-    """Estimate the variance of what differs from line to line.
+    """Estimate the noise variance from the differences between lines.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from scipy.linalg import lapack
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import NumericalError
 
-INFINITE = 1e-13  # beta over alpha of a root that QZ cannot tell from infinity
+INFINITE = 1e-13  # beta over alpha of a root that QZ cannot distinguish from infinity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -211,7 +211,11 @@ MATRIX_CASES = {
     "coordinate that is none": (edit("dofs.csv", ",0.0,", ",here,"), "dofs.csv", ["line 2", "coordinates"]),
     "coordinate without end": (edit("dofs.csv", ",0.0,", ",nan,"), "dofs.csv", ["line 2", "finite"]),
     "DOF twice": (edit("dofs.csv", "2,ry", "2,z"), "dofs.csv", ["line 3", "2:z", "line 2"]),
-    "node in two places": (edit("dofs.csv", ",0.0,", ",0.5,"), "dofs.csv", ["line 3", "node 2 lies elsewhere"]),
+    "node at two positions": (
+        edit("dofs.csv", ",0.0,", ",0.5,"),
+        "dofs.csv",
+        ["line 3", "node 2 has other coordinates"],
+    ),
     "group twice": (
         lambda folder: add_text(folder, '[[matrices.group]]\nname = "a"\nstiffness = "K.mtx"\n' * 2),
         "model.toml",

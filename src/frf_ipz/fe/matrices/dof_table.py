@@ -72,7 +72,7 @@ def read_dof_table(path: Path) -> DofTable:
         lines[dof] = rows.line_num
         first = positions.setdefault(dof.node, position)
         if max(abs(old - new) for old, new in zip(first, position, strict=True)) > SAME_POSITION_M:
-            raise FileFormatError(path, f"node {dof.node} lies elsewhere in an earlier line", where=where)
+            raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
     if not lines:
         raise FileFormatError(path, "names no DOF; one row a row of the matrices is needed")
     nodes = sorted(positions)

@@ -1,1 +1,1 @@
-"""From the FE model to the reduced one: what is asked for, which DOFs are retained, and the reduced matrices."""
+"""Reduction of the FE model: its requirements, the retained DOFs, and the reduced matrices."""

@@ -123,7 +123,7 @@ def compress(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> Co
     poles : (n_poles,) complex array
         rad/s.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def model_columns(
     poles : (n_poles,) complex array
         rad/s.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     real_modes : bool
         Residues have imaginary parts only.
     with_slopes : bool
@@ -191,7 +191,7 @@ def response(system: CompressedSystem, terms: SmoothTerms, s: ComplexArray) -> C
     system : CompressedSystem
         The fit.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     s : (n,) complex array
         Where, rad/s.
 

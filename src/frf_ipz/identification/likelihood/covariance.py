@@ -31,7 +31,7 @@ class FitErrors:
     system : CompressedSystem
         At the optimum.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     pole_root : (2 n_poles, 2 n_poles) array
         A root of the covariance of the poles: all real parts, then all imaginary parts, rad/s.
     level : float
@@ -98,7 +98,7 @@ def fit_errors(fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: 
     fit : RefinedPoles
         The fit.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     level : (2 n_poles,) array
         Factor on the variance of each pole's real part, then imaginary part, where lines or FRFs have errors in
         common.
@@ -129,7 +129,7 @@ def model_rows(system: CompressedSystem, terms: SmoothTerms, s: ComplexArray) ->
     system : CompressedSystem
         The fit.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     s : (n,) complex array
         rad/s.
 
@@ -197,6 +197,6 @@ def _nearest_poles(poles: ComplexArray, s: ComplexArray) -> IntArray:
 
 
 def _regularised(information: FloatArray) -> FloatArray:
-    """Give a pole that nothing is known about a large variance, not a failure."""
+    """Regularise the information, so that an undetermined pole has a large variance instead of a failure."""
     least = np.finfo(float).eps * len(information)
     return np.asarray(information + np.diag(least * np.diag(information) + np.finfo(float).tiny))

@@ -34,7 +34,7 @@ def find_delays(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, ch
     poles : (n_poles,) complex array
         rad/s.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     channels : (n_frfs,) int array
         Channel of each FRF.
 

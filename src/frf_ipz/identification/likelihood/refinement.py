@@ -76,9 +76,9 @@ def refine_poles(
     poles : (n_poles,) complex array
         Where to start, rad/s.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     iterations : int
-        At most so many steps.
+        Largest number of steps.
 
     Returns
     -------
@@ -167,10 +167,10 @@ def _stepped_poles(poles: ComplexArray, step: FloatArray, line: float) -> Comple
     change = step[:n] + 1j * step[n:]
     limit = MAX_STEP * np.maximum(-poles.real, line / 4)
     change *= np.minimum(1.0, limit / np.maximum(np.abs(change), np.finfo(float).tiny))
-    moved = poles + change
+    stepped = poles + change
     # a pole stays in the left half plane and in the upper one
-    real = np.where(moved.real < 0, moved.real, 0.3 * poles.real)
-    return np.asarray(real + 1j * np.abs(moved.imag))
+    real = np.where(stepped.real < 0, stepped.real, 0.3 * poles.real)
+    return np.asarray(real + 1j * np.abs(stepped.imag))
 
 
 def _is_invalid(poles: ComplexArray, band: tuple[float, float]) -> BoolArray:

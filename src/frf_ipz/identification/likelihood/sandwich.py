@@ -3,7 +3,7 @@
 The covariance of an optimum is ``I^-1 B I^-1`` with the information I and the covariance B of the score, which is
 ``I`` itself for white noise [Huber1967]. B is found from the score of each line, summed over the FRFs: a structure
 whose frequencies waver moves all FRFs at once. Scores of neighbouring lines are added with falling weights
-[Newey1987], and each line's misfit is raised by what its own coefficients have taken from it.
+[Newey1987], and each line's misfit is corrected for its leverage on the coefficients.
 
 [Huber1967] P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley
 Symposium on Mathematical Statistics and Probability 1, 1967, 221-233.
@@ -40,7 +40,7 @@ def pole_variance_factors(data: WeightedLines, fit: RefinedPoles, terms: SmoothT
     fit : RefinedPoles
         The fit.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
 
     Returns
     -------

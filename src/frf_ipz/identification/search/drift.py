@@ -58,7 +58,7 @@ def find_drift(
     fit : RefinedPoles
         A fit without drift.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     poles_are_held : bool
         Poles are given: the drift is against them, and one FRF is enough.
 

@@ -45,7 +45,7 @@ class FittedModes:
     lines : MeasuredLines
         With the variance that weighs them.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     fit : RefinedPoles
         Poles and residues.
     goodness : GoodnessOfFit

@@ -74,7 +74,7 @@ def assess_fit(
     fit : RefinedPoles
         The fit.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     best : GoodnessOfFit, optional
         Of a fit with more poles: its level is the part that the model cannot follow. Otherwise each pole that is
         dropped would raise the level that the next one is compared with.

@@ -86,7 +86,7 @@ def select_modes(
     poles : (n_poles,) complex array
         Start poles, rad/s.
     terms : SmoothTerms
-        What lies out of band.
+        Terms for modes out of band.
     options : FitOptions
         Poles that are pinned and rejected.
     noise_is_known : bool
