@@ -39,7 +39,7 @@ def apply_to_model(
     diagnosis : Diagnosis
         Of it.
     effects : mapping of str to Effect, optional
-        Those that were looked for; the shipped ones where it is left out. Needed for users' own effects.
+        Those that were searched for; the shipped ones where it is left out. Needed for users' own effects.
 
     Returns
     -------

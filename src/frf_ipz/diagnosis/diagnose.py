@@ -269,7 +269,7 @@ def _diagnose_nonlinear(
     laws: LawSearch,
     laws_of: Callable[[StructuralModel, Observations], LawSearch],
 ) -> Diagnosis:
-    """Search for a linear effect beside a law, where that strains the model or none explains by itself."""
+    """Search for a linear effect beside a law, where that has a large nuisance chi2 or none explains by itself."""
     beside = None
     if problem.effects and laws.verdict == UNEXPLAINED:
         beside = search_beside_linear(problem, decision, laws, model, observations, laws_of)

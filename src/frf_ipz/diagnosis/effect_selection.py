@@ -1,4 +1,4 @@
-"""Which effects to look for: those of the catalogue that a user chose, and their own."""
+"""Which effects to search for: those of the catalogue that a user selected, and their own."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def select_effects(options: DiagnoseOptions, folder: Path) -> dict[str, Effect]:
-    """Select the effects to look for, force laws apart.
+    """Select the effects to search for, without force laws.
 
     Parameters
     ----------

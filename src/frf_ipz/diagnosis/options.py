@@ -16,7 +16,7 @@ class DiagnoseOptions:
     apply : bool
         The finding flows on into updating and prediction.
     effects : tuple of str
-        Look for these effects only, force laws among them; all of the contract's table where it is empty.
+        Search for these effects only, force laws among them; all of the contract's table where it is empty.
     extra_effects : tuple of str
         Further effects and force laws as ``file.py:ClassName``.
     stiffness_tolerance, frequency_tolerance : float

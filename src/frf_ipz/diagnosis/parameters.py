@@ -45,7 +45,7 @@ def diagnosed_basis(
     reduced : ReducedModel
         Of the model with what it lacked, as `apply_to_model` gives it.
     effects : mapping of str to Effect, optional
-        Those that were looked for; the shipped ones where it is left out.
+        Those that were searched for; the shipped ones where it is left out.
 
     Returns
     -------

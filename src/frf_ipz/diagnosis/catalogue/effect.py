@@ -173,7 +173,7 @@ class Effect(ABC):
         return value
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
-        """Locations beside one, to look at when it is nearly right."""
+        """Neighbours of a location, to try when it is nearly right."""
         del context, location
         return ()
 

@@ -254,7 +254,7 @@ def _frequency_change(hypothesis: Hypothesis, nuisance: FloatArray) -> FloatArra
 
 
 def _mask_modes_in_band(hypothesis: Hypothesis) -> BoolArray:
-    """Tell which elastic modes lie in the band: nothing is known of others."""
+    """Mask the elastic modes in the band: nothing is known of the rest."""
     nuisance_prior = hypothesis.nuisance_prior
     modes = hypothesis.modes(np.zeros(0), np.zeros(nuisance_prior.size))
     frequency = modes.omega[nuisance_prior.n_rigid : nuisance_prior.n_modes] / (2 * np.pi)

@@ -46,7 +46,7 @@ class CompareOptions:
     scatter : DiagnoseOptions
         What differs from test to test with nothing changed; what repeated states before show beyond that is added.
     effects : tuple of str
-        Look for these changes only, besides `mass_loss`; for all effects of the catalogue where it is empty.
+        Search for these changes only, besides `mass_loss`; for all effects of the catalogue where it is empty.
     """
 
     model: DiagnoseOptions = field(default=ROUGH_MODEL)

@@ -32,7 +32,7 @@ LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear ra
 PRIOR_CURVATURE = 12.0  # over the squared range: that of a uniform prior, where the data say nothing
 MODE_CORRECTIONS = 2  # corrections of the frequencies after a step
 MAX_CORRECTION = 0.1  # of a squared frequency: more is no small correction
-LEAST_OF_RATIO = 0.05  # of a stated damping ratio: scatter takes no more away
+MIN_RATIO_PART = 0.05  # of a stated damping ratio: scatter takes no more away
 MIN_INFLUENCE = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
 PATIENCE = 3  # steps after which a fit may be stopped early
@@ -225,7 +225,7 @@ def _correct_modes(
     old, new = point.nuisance[indices] * nuisance_prior.damping_std, nuisance[indices] * nuisance_prior.damping_std
     required_ratio = linear_ratio * (1 + old) + here.stated_ratio[:m] * (new - old)
     damped = slope.used[indices] & (there.stated_ratio[:m] > 0)
-    least = LEAST_OF_RATIO * there.stated_ratio[:m]
+    least = MIN_RATIO_PART * there.stated_ratio[:m]
     stated = np.where(damped, there.stated_ratio[:m], 1.0)
     relative = np.maximum(required_ratio, least) / stated - 1
     corrected[indices] = np.where(damped, relative / nuisance_prior.damping_std, nuisance[indices])

@@ -51,7 +51,7 @@ class Change:
     Parameters
     ----------
     model : StructuralModel, optional
-        Another model in the place of the nominal one, with the same DOFs.
+        A model that replaces the nominal one, with the same DOFs.
     mass, stiffness : (n_all, n_all) sparse array, optional
         What is added to the matrices of all DOFs.
     released : tuple of int

@@ -51,7 +51,7 @@ REDUCED = 80.0  # the same with the square: what is far beyond the band may be l
 LOCAL_PART = 0.05  # of the compliance of all modes beyond those with scatter: what is not known
 MAX_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
-STEEPER = 1.0  # per standard deviation: how much faster
+STEEPNESS = 1.0  # per standard deviation: how much faster
 MAX_BEYOND_EDGE = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
 UNSTATED_SPREAD = 0.5  # of a damping ratio that is not stated: on its suspension, or far beyond the band
 
@@ -231,8 +231,8 @@ class NuisancePrior:
             return values, np.ones_like(values)
         outside = np.where(self.is_bounded, np.maximum(np.abs(values) - EDGE, 0.0), 0.0)
         curved = np.minimum(outside, MAX_BEYOND_EDGE)
-        added = STEEPER * curved * (2 * outside - curved)
-        return values + np.sign(values) * added, 1 + 2 * STEEPER * curved
+        added = STEEPNESS * curved * (2 * outside - curved)
+        return values + np.sign(values) * added, 1 + 2 * STEEPNESS * curved
 
     def unpack(self, values: FloatArray) -> NuisanceValues:
         """Give physical values.

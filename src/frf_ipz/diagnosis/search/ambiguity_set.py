@@ -7,7 +7,7 @@ are makes those vanish, and nothing changes. How much of its FRFs no parameter o
 tolerance too; the best explanation says which part is likely.
 
 A search steps to better locations and stops where none is; what is as good on the far side of a structure, or along a
-flat valley, it need not have seen. Without these a location looks surer than it is, and now and then the best of them
+flat valley, it need not have found. Without these a location looks surer than it is, and now and then the best of them
 is the true one. So candidates are added wherever a global scan finds the best effect likely, and beside the best ones
 until all neighbours are worse.
 """

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
 
-STRAINED_SCORE = 0.75  # score of a component that explains, but may stand for two others: 3 of 89 single ones had more
+PAIR_SCORE = 0.75  # of a component that explains: above, pairs are tried too; 3 of 89 single ones had more
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 
 
@@ -137,7 +137,7 @@ def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
         problem, search_small_component(problem, first.final, LIMITS[problem.kind].beside_log_bayes_factor)
     )
     pair_decision = _accept_further(problem, first, second)
-    if pair_decision is None and first.goodness.score > STRAINED_SCORE:
+    if pair_decision is None and first.goodness.score > PAIR_SCORE:
         pair_decision = _accept_further(problem, first, _search_pair(problem, first.ranking))
     return pair_decision or first
 

@@ -1,4 +1,4 @@
-"""What a measurement can show: the smallest size of each effect, and which sensor would tell two explanations apart."""
+"""What a measurement can show: the smallest size of each effect, and the sensor that distinguishes two explanations."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """A nonlinear law and a linear effect together: the one is taken out of the recordings, and the other is searched for.
 
-The linear effect goes first where no law explains by itself; the law, where it explains but strains the nominal model,
-or where the linear effect first led to nothing and the law follows the recordings all the same.
+The linear effect goes first where no law explains by itself; the law, where it explains but
+needs a large nuisance chi2 of the nominal model, or where the linear effect first led to nothing and the law follows
+the recordings all the same.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 MAX_COST_LEFT = 1 / 3  # of the linear cost: a law's own traces are not explained so well by one linear effect
-STRAINED = 10.0  # nuisance chi2 of a law, per parameter: those of laws alone are up to 6
+MAX_NUISANCE_CHI2 = 10.0  # of a law, per parameter: laws alone need up to 6
 MAX_MISFIT = 1.3  # misfit over noise of a law that follows the recordings, whatever the nuisance chi2
 MAX_GROWTH = 100.0  # times the largest response: no structure moves so much more without a law
-RELIEF = 0.5  # times the nuisance chi2: what it must come down to beside a linear effect
+NUISANCE_REDUCTION = 0.5  # times the nuisance chi2: what it must come down to beside a linear effect
 
 
 def search_beside_linear(
@@ -65,13 +66,13 @@ def search_beside_linear(
     -------
     tuple of LawSearch and Finding, or None
         The law and the linear effect, where two of three hold: the effect explains most of the misfit, the law the
-        rest, and beside the effect the law no longer strains the nominal model. None where less holds.
+        rest, and beside the effect the law needs no large nuisance chi2. None where less holds.
     """
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search_component(problem, null)
     best = ranking.best
     is_most = best.cost <= MAX_COST_LEFT * null.cost
-    if best is null or not (is_most or alone.nuisance_chi2 >= STRAINED) or not is_significant(best, -1):
+    if best is null or not (is_most or alone.nuisance_chi2 >= MAX_NUISANCE_CHI2) or not is_significant(best, -1):
         return None
     if (
         log_bayes_factor(best, null) < LIMITS[problem.kind].first_log_bayes_factor
@@ -80,8 +81,8 @@ def search_beside_linear(
         return None  # resonators and dampers follow the traces of laws
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
-    is_relieved = laws.fit is not None and laws.nuisance_chi2 < STRAINED and _relieves(laws, alone)
-    if sum((is_most, laws.verdict == EXPLAINED, is_relieved)) < 2:
+    is_reduced = laws.fit is not None and laws.nuisance_chi2 < MAX_NUISANCE_CHI2 and _reduces_nuisance(laws, alone)
+    if sum((is_most, laws.verdict == EXPLAINED, is_reduced)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
@@ -94,7 +95,7 @@ def search_beside_law(
     observations: Observations,
     search_laws: Callable[[StructuralModel, Observations], LawSearch],
 ) -> tuple[LawSearch, Finding] | None:
-    """Search for a linear effect beside a law that strains the nominal model, whether it explains by itself or not.
+    """Search for a linear effect beside a law with a large nuisance chi2, whether it explains by itself or not.
 
     Parameters
     ----------
@@ -112,8 +113,8 @@ def search_beside_law(
     Returns
     -------
     tuple of LawSearch and Finding, or None
-        The law and the linear effect, which both explain; None where the law did not strain the model, where it did
-        not even follow the recordings, where no effect relieves the model, or where the law explains first moments
+        The law and the linear effect, which both explain; None where its nuisance chi2 was small, where it did
+        not even follow the recordings, where no effect reduces it, or where the law explains first moments
         only, with the effect as without it.
     """
     remaining = _remove_law(observations, laws)
@@ -136,8 +137,8 @@ def search_beside_law(
     laws_beside = search_laws(with_change(model, change), undo_chain_effects(observations, change))
     if (
         laws_beside.verdict != EXPLAINED
-        or not _relieves(laws_beside, laws)
-        or not (explains or laws_beside.nuisance_chi2 < STRAINED)
+        or not _reduces_nuisance(laws_beside, laws)
+        or not (explains or laws_beside.nuisance_chi2 < MAX_NUISANCE_CHI2)
     ):
         return None
     if laws.is_early and laws_beside.is_early:  # what the law misses later is no better explained
@@ -147,9 +148,9 @@ def search_beside_law(
 
 
 def _remove_law(observations: Observations, laws: LawSearch) -> Observations | None:
-    """Take a law out that strained the model; None where it did not, or where the rest is no linear system."""
+    """Subtract a law of large nuisance chi2; None where it is small, or where the rest is no linear system."""
     if (
-        laws.nuisance_chi2 < STRAINED
+        laws.nuisance_chi2 < MAX_NUISANCE_CHI2
         or laws.fit is None
         or laws.nuisance_prior is None
         or len(laws.nuisance_prior.moving)
@@ -167,6 +168,6 @@ def _remove_law(observations: Observations, laws: LawSearch) -> Observations | N
     return None if runs_away else linear
 
 
-def _relieves(beside: LawSearch, alone: LawSearch) -> bool:
-    """Say whether a law strains the nominal model, and much less so beside a linear effect."""
-    return alone.nuisance_chi2 >= STRAINED and beside.nuisance_chi2 <= RELIEF * alone.nuisance_chi2
+def _reduces_nuisance(beside: LawSearch, alone: LawSearch) -> bool:
+    """Say whether the nuisance chi2 of a law is large, and much smaller beside a linear effect."""
+    return alone.nuisance_chi2 >= MAX_NUISANCE_CHI2 and beside.nuisance_chi2 <= NUISANCE_REDUCTION * alone.nuisance_chi2

@@ -1,7 +1,7 @@
 """Where the nominal model disagrees with the measurement: in which FRFs and bands, and at which node of the structure.
 
 The node is the one at which one free dynamic stiffness explains most of the misfit. On each line the stiffness may be
-any complex number; all FRFs of the line share it, so that two FRFs or more tell one node from another.
+any complex number; all FRFs of the line share it, so that two FRFs or more distinguish the nodes.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.nonlinear.simulate import simulate, subtract_law
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
-from frf_ipz.diagnosis.verdict.law_and_linear import STRAINED
+from frf_ipz.diagnosis.verdict.law_and_linear import MAX_NUISANCE_CHI2
 
 CASES = {
     "cubic_stiffness": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}, {"cubic_N_m3": 2e10}),
@@ -175,7 +175,7 @@ def test_a_law_is_subtracted_from_whole_records_from_rest_that_are_loudest_late(
 
 
 def test_a_law_alone_needs_no_nuisance(solved):
-    assert solved[-1].nuisance_chi2 < 0.1 * STRAINED
+    assert solved[-1].nuisance_chi2 < 0.1 * MAX_NUISANCE_CHI2
 
 
 @pytest.mark.parametrize(

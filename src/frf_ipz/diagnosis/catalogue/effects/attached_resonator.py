@@ -29,7 +29,7 @@ LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, 
 RATIOS = 1e-3, 0.5
 USUAL_RATIO, WITHIN = 0.05, 1.7  # the largest of real resonators, and the factor by which it may be more
 FREQUENCY_STEP = 1.06
-TRIED_RATIOS = (0.01, 0.06)
+START_RATIOS = (0.01, 0.06)
 MAX_RATIO = 0.2  # with more, what fits is a resonator in name only
 
 
@@ -75,7 +75,7 @@ class AttachedResonator(Effect):
         """All frequencies and some damping ratios."""
         low, high = context.band_hz
         count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
-        pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), TRIED_RATIOS))
+        pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), START_RATIOS))
         return Signature(
             motion=_motion(context, location),
             shapes=np.array([dynamic_mass(context.contour, frequency, ratio) for frequency, ratio in pairs]),
@@ -94,7 +94,7 @@ class AttachedResonator(Effect):
         return -0.5 * (beyond / float(np.log(WITHIN))) ** 2
 
     def implausibility(self, values: FloatArray) -> str:
-        """Doubt one of large damping: it can imitate many other losses."""
+        """Refuse one of large damping: it can imitate many other losses."""
         _, frequency_hz, ratio = values
         if ratio <= MAX_RATIO:
             return ""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 NEARLY_BUCKLED, STRONGEST = 0.97, 10.0  # of the buckling load: compression and tension
-TRIED = np.array([0.01, 0.03, 0.1, 0.25, 0.5, 0.8])
+START_VALUES = np.array([0.01, 0.03, 0.1, 0.25, 0.5, 0.8])
 
 
 class AxialLoad(Effect):
@@ -51,7 +51,7 @@ class AxialLoad(Effect):
         """Both signs, from weak to strong."""
         del location
         load = buckling_load(context)
-        return load * np.concatenate([-TRIED, TRIED, [1.2, 2.0, 3.5, 6.0]])[:, None]
+        return load * np.concatenate([-START_VALUES, START_VALUES, [1.2, 2.0, 3.5, 6.0]])[:, None]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how strong."""

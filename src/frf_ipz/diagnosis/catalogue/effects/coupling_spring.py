@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
-MAX_IN_A_ROW, MAX_NODES = 48, 100  # of which all pairs are looked at; those between are stepped to
+MAX_IN_A_ROW, MAX_NODES = 48, 100  # of which all pairs are listed; those between are stepped to
 FURTHEST = 3  # nodes in a row around each end
 NEXT_TO = 2  # nodes in a row that count as one location: what joins them is the structure itself
 

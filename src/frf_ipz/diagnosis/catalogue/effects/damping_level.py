@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 BOUNDS = 1e-5, 0.5
-TRIED = np.geomspace(1 / 16, 16, 17)
+START_VALUES = np.geomspace(1 / 16, 16, 17)
 UNSTATED = 1e-3  # taken where the model states no damping
 
 
@@ -54,7 +54,7 @@ class DampingLevel(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Less and more than stated."""
         del location
-        return np.clip(_stated(context) * TRIED, *BOUNDS)[:, None]
+        return np.clip(_stated(context) * START_VALUES, *BOUNDS)[:, None]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 BOUNDS = 0.2, 5.0
-TRIED = np.array([1.005, 1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2])
+START_VALUES = np.array([1.005, 1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2])
 
 
 class GlobalStiffness(Effect):
@@ -45,7 +45,7 @@ class GlobalStiffness(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""
         del context, location
-        return np.concatenate([TRIED, 1 / TRIED])[:, None]
+        return np.concatenate([START_VALUES, 1 / START_VALUES])[:, None]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say by how much."""

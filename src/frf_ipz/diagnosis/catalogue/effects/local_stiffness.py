@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from frf_ipz.structure import Part
 
 BOUNDS = 0.02, 20.0
-TRIED = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.97, 1.03, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
+START_VALUES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.97, 1.03, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
 LENGTHS = (1, 2, 4, 8, 16)  # of segments of elements that are searched; others are found from them
 USUAL_LENGTH, WITHIN = 0.04, 2.0  # of the whole: a crack takes away stiffness over about three heights; to a factor
-LEAST_CHANGE = 0.03  # of stiffness: below, all changes are as likely
+MIN_CHANGE = 0.03  # of stiffness: below, all changes are as likely
 LONGEST = 4  # of the whole, as a divisor: longer segments are not local
 KEYS = {"element": "elements", "spring": "springs", "group": "groups"}
 
@@ -61,7 +61,7 @@ class LocalStiffness(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""
         del context, location
-        return TRIED[:, None]
+        return START_VALUES[:, None]
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Bend a segment with constant curvature, extend a spring; a group has no such single motion."""
@@ -69,9 +69,9 @@ class LocalStiffness(Effect):
         if kind == "group":
             return None
         motion, stiffness = (_curvature if kind == "element" else _extension)(context, location)
-        changes = (TRIED - 1) * stiffness
+        changes = (START_VALUES - 1) * stiffness
         shapes = np.repeat(changes[:, None] + 0j, len(context.contour), 1)
-        return Signature(motion=motion, shapes=shapes, values=TRIED[:, None], amplitudes=np.ones(1))
+        return Signature(motion=motion, shapes=shapes, values=START_VALUES[:, None], amplitudes=np.ones(1))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Segments that begin or end an element earlier or later; all other springs or groups are searched anyway."""
@@ -90,7 +90,7 @@ class LocalStiffness(Effect):
         A short segment that changes much and a longer one that changes little look alike. Without this the short one
         is preferred, whose change has the larger uncertainty.
         """
-        by_size = -float(np.log(max(abs(values[0] - 1), LEAST_CHANGE)))
+        by_size = -float(np.log(max(abs(values[0] - 1), MIN_CHANGE)))
         if location.key[0] != "element":
             return by_size
         usual = max(USUAL_LENGTH * sum(part.kind == "element" for part in context.model.parts), 1.0)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 HIGHPASS, LOWPASS = "highpass", "lowpass"
 BOUNDS = {HIGHPASS: (1e-3, 10.0), LOWPASS: (0.1, 1e3)}  # over the lower edge, over the upper edge of the band
-TRIED = {HIGHPASS: np.geomspace(0.03, 5, 10), LOWPASS: np.geomspace(0.2, 30, 10)}
+START_VALUES = {HIGHPASS: np.geomspace(0.03, 5, 10), LOWPASS: np.geomspace(0.2, 30, 10)}
 
 
 class SensorDynamics(Effect):
@@ -52,7 +52,7 @@ class SensorDynamics(Effect):
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From outside the band to within."""
-        return TRIED[str(location.key[1])][:, None] * _edge(context, location)
+        return START_VALUES[str(location.key[1])][:, None] * _edge(context, location)
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, which filter."""

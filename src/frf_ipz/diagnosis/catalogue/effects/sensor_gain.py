@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 BOUNDS = 0.02, 50.0
-TRIED = np.array(
+START_VALUES = np.array(
     [0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0]
 )
 
@@ -54,7 +54,7 @@ class SensorGain(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From much less to much more."""
         del context, location
-        return TRIED[:, None]
+        return START_VALUES[:, None]
 
     def report_value(self, location: Location, name: str, value: float) -> float:
         """Give the ratio its sign."""

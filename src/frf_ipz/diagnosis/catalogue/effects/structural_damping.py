@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BOUNDS = 1e-5, 1.0
 CAUSAL, KEEPING_MODES, OF_MODES = "causal", "causal, mode by mode", "of modes"
 LESS_LIKELY = -3.0  # log prior: less than distinguishes explanations, more than priors of two numbers differ by
-TRIED = np.geomspace(2e-4, 0.5, 16)
+START_VALUES = np.geomspace(2e-4, 0.5, 16)
 
 
 class StructuralDamping(Effect):
@@ -55,7 +55,7 @@ class StructuralDamping(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From little to much."""
         del context, location
-        return TRIED[:, None]
+        return START_VALUES[:, None]
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
 
 SHORTEST, LONGEST = 1e-4, 1.5  # periods of the band's upper edge
-TRIED = np.array([0.003, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.6, 0.75, 0.95, 1.2])
+START_VALUES = np.array([0.003, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.6, 0.75, 0.95, 1.2])
 
 
 class TimeDelay(Effect):
@@ -56,7 +56,7 @@ class TimeDelay(Effect):
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From little to much."""
         del location
-        return TRIED[:, None] / context.band_hz[1]
+        return START_VALUES[:, None] / context.band_hz[1]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
