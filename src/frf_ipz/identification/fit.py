@@ -141,9 +141,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     unconfirmed = unconfirmed_reasons(halves, modes)
     factor, shift = (halves.variance_factor, halves.shift) if halves else (1.0, np.zeros(2 * len(fit.poles)))
     errors = fit_errors(fit, terms, variance_factors(fitted) * factor, shift)
-    residue_errors = replace(
-        errors, pole_root=np.zeros_like(errors.pole_root)
-    )  # errors of poles move equal FRFs by the same
+    # errors of the poles change equal FRFs by the same: gains follow from the other errors alone
+    residue_errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
     gains = find_channel_gains(
         frfs.labels,
         fit.system.residues()[modes],
@@ -212,8 +211,8 @@ def _warnings(
         noise = "of the recordings" if fitted.lines.known.all() else "that differs from line to line"
         texts.append(
             f"the misfit is {np.median(ratio):.2g} times the noise {noise} (median FRF; {ratio.max():.2g} at worst): "
-            "no linear model with these modes describes the structure to the noise, so standard deviations are taken "
-            "from the misfit"
+            "no linear model with these modes describes the structure to within the noise, so standard deviations are "
+            "taken from the misfit"
         )
     if halves is not None and halves.scatter > 1:
         texts.append(

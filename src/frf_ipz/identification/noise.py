@@ -82,9 +82,8 @@ def smooth_level(squares: FloatArray) -> FloatArray:
     n_lines = len(squares)
     edges = np.linspace(0, n_lines, max(1, n_lines // BLOCK_LINES) + 1).astype(int)
     block_lines = edges[:-1, None] + np.arange(np.diff(edges).min())
-    blocks = np.median(squares[block_lines], axis=1) / log(
-        2
-    )  # an exponential distribution has ln 2 times its mean there
+    # an exponential distribution has ln 2 times its mean at the median
+    blocks = np.median(squares[block_lines], axis=1) / log(2)
     middles = (edges[:-1] + edges[1:] - 1) / 2
     levels = np.log(np.maximum(blocks, TINY))
     lines = np.arange(n_lines)

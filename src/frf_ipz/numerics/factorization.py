@@ -194,9 +194,8 @@ class _Pardiso:
         triangle = sparse.csr_matrix(sparse.triu(matrix))
         solver.factorize(triangle)
         factorization = cls(solver, triangle)
-        weakref.finalize(
-            factorization, solver.free_memory, everything=True
-        )  # MKL holds the factors until told to free them
+        # MKL holds the factors until told to free them
+        weakref.finalize(factorization, solver.free_memory, everything=True)
         return factorization
 
     def solve(self, loads: FloatArray) -> FloatArray:

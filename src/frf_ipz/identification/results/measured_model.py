@@ -93,9 +93,8 @@ def residue_covariance(errors: FitErrors, powers: IntArray, modes: IntArray) -> 
     for frf, power in enumerate(powers):
         white, common = errors.linear_errors(rows, slopes, frf)
         factor = poles**power
-        parts = (
-            np.concatenate([white, common], axis=1) * factor[:, None]
-        )  # the error of the factor itself is far smaller
+        # the error of the factor itself is far smaller
+        parts = np.concatenate([white, common], axis=1) * factor[:, None]
         stacked = np.stack([parts.real, parts.imag], axis=1)
         covariance[:, frf] = stacked @ stacked.transpose(0, 2, 1)
     return covariance

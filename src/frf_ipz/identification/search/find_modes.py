@@ -132,10 +132,8 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
     """
     squares = np.abs(fitted.lines.receptance - response(fitted.fit.system, fitted.terms, fitted.lines.s)) ** 2
     power = np.abs(fitted.lines.receptance) ** 2
-    # an exponential distribution has ln 2 times its mean at the median
-    error = np.median(np.maximum(squares - fitted.noise, 0.0) / np.maximum(power, np.finfo(float).tiny), axis=0) / log(
-        2
-    )
+    relative = np.maximum(squares - fitted.noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
+    error = np.median(relative, axis=0) / log(2)  # an exponential distribution has ln 2 times its mean at the median
     lines = replace(fitted.lines, variance=fitted.noise + error * power)
     selected = _select(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False)
     lines = replace(lines, known=np.ones_like(lines.known))  # the model error is part of it: not to be estimated again
