@@ -1,3 +1,4 @@
+from . import plotting as plotting
 from .diagnosis.apply import apply_to_frfs as apply_to_frfs
 from .diagnosis.apply import apply_to_model as apply_to_model
 from .diagnosis.compare.compare import Comparison as Comparison

@@ -10,7 +10,8 @@ SOURCE = Path(__file__).parents[2] / "src" / "frf_ipz"
 PAGES = [path for area in ("report", "show") for path in sorted((SOURCE / area).rglob("*.py"))]
 TEMPLATES = [path for area in ("report", "show") for path in sorted((SOURCE / area / "templates").glob("*.html"))]
 TAG = re.compile(r"</?[a-zA-Z][\w-]*(?:[\s/>]|$)|<!|&\w+;")
-NO_HTML = ("<br>", "<extra>", "</extra>", "<f4")  # tags of Plotly's texts, which know no scripts; a type of NumPy's
+# Tags of Plotly's texts, which know no scripts; what their own signs become in them; a type of NumPy's.
+NO_HTML = ("<br>", "<extra>", "</extra>", "&amp;", "&lt;", "&gt;", "<f4")
 MARKED_AS_SAFE = {"style", "script", "plotly"}
 
 

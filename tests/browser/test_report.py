@@ -213,4 +213,9 @@ def test_hostile_names_are_drawn_as_text(browser, tmp_path):
     assert page.execute_script("return window.hacked") is None
     assert page.execute_script("return document.querySelectorAll('img').length") == 0
     assert HOSTILE in page.find_element("css selector", "h1").text
+    for picture in ("records", "law-response"):
+        drawn = page.execute_script(f"return document.querySelector('#{picture} .main-svg').parentNode.textContent")
+        assert HOSTILE in drawn, picture
+    entry = page.execute_script("return document.querySelector('#records .legend .traces').getAttribute('aria-label')")
+    assert entry.endswith(HOSTILE)
     assert errors(page) == []

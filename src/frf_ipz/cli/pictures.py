@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.plotting.registry import draw, picture_names
-from frf_ipz.plotting.style import FORMATS, save_figure
-from frf_ipz.runs.folder import read_run
+from frf_ipz.plotting.figures import FORMATS, draw_pictures, save_figure
+from frf_ipz.plotting.registry import describe, picture_names
+from frf_ipz.runs.contents import read_contents
+from frf_ipz.runs.results import open_results
 
 
 def picture_list(folder: Path) -> str:
@@ -28,8 +29,8 @@ def picture_list(folder: Path) -> str:
     InputError
         If there is no run in the folder.
     """
-    read_run(folder)
-    return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *picture_names()])
+    run = read_contents(open_results(folder))
+    return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *picture_names(run)])
 
 
 def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) -> str:
@@ -59,7 +60,7 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     if file_format not in FORMATS:
         raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
     path = Path(f"{name}.{file_format}") if out is None else out
-    figure = draw(name, read_run(folder))
+    figure = draw_pictures(describe(name, read_contents(open_results(folder))))
     try:
         save_figure(figure, path, file_format=file_format)
     except OSError as error:

@@ -20,6 +20,31 @@ PHASE_CUT = 135.0  # degrees: structures stay near multiples of 90, so that nois
 PHASE_LIMITS = (PHASE_CUT - 365, PHASE_CUT + 5)
 
 
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+N_COLOURS = 7  # curves that differ in their colour; more of them differ in their dashes too
+
+
+def dash_of(number: int) -> str:
+    """Dash of the n-th curve: curves that share a colour differ in it.
+
+    Parameters
+    ----------
+    number : int
+        From 0.
+
+    Returns
+    -------
+    str
+        As a `Line` has it.
+
+    Examples
+    --------
+    >>> [dash_of(number) for number in (0, 6, 7)]
+    ['solid', 'solid', 'dash']
+    """
+    return DASHES[(number // N_COLOURS) % len(DASHES)]
+
+
 def phase_degrees(values: ComplexArray) -> FloatArray:
     """Phase, cut where structures hardly ever are.
 

@@ -1,94 +1,109 @@
-"""Pictures of a run by their names: what ``frf-ipz plot DIR NAME`` draws."""
+"""Pictures of a run by their names: what ``frf-ipz plot DIR NAME`` draws, and the sections of the report show."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from matplotlib.figure import Figure
-
 from frf_ipz.errors import InputError, did_you_mean
-from frf_ipz.plotting.diagnosis import plot_law, plot_levels, plot_mismatch, plot_proof, plot_ranking
-from frf_ipz.plotting.frfs import plot_coherence, plot_fit, plot_frfs, plot_misfit, plot_phases
-from frf_ipz.plotting.poles import plot_pairs, plot_pole_zero_map, plot_stabilization
-from frf_ipz.plotting.recordings import plot_records, plot_structure
-from frf_ipz.plotting.style import WIDTH_IN
-from frf_ipz.plotting.targets import target_rows
-from frf_ipz.plotting.updating import plot_convergence, plot_prediction, plot_stiffness_change, plot_targets
+from frf_ipz.plotting.diagnosis import (
+    describe_data_checks,
+    describe_expected_misfit,
+    describe_mismatch,
+    describe_proof,
+    describe_ranking,
+)
+from frf_ipz.plotting.frfs import describe_fit, describe_frfs
+from frf_ipz.plotting.nonlinear import (
+    describe_law_force,
+    describe_law_response,
+    describe_level_modes,
+    describe_levels,
+)
+from frf_ipz.plotting.picture import select_panel
+from frf_ipz.plotting.poles import describe_pairs, describe_pole_zero_map, describe_stabilization
+from frf_ipz.plotting.prediction import describe_prediction
+from frf_ipz.plotting.records import describe_forces, describe_responses
+from frf_ipz.plotting.structure import StructureMarks, describe_structure, finding_nodes, mismatch_nodes
+from frf_ipz.plotting.updating import (
+    describe_convergence,
+    describe_flexibility_change,
+    describe_modal_change,
+    describe_stiffness_change,
+    describe_targets,
+)
+from frf_ipz.prediction.reference import measured_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
-    from matplotlib.axes import Axes
+    from frf_ipz.plotting.picture import Picture
+    from frf_ipz.runs.contents import RunContents
 
-    from frf_ipz.diagnosis.measured.levels import LevelDependence
-    from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.runs.folder import RunFolder
-    from frf_ipz.updating.updated_model import UpdatedModel
+Describe: TypeAlias = "Callable[[RunContents], Iterable[Picture | None]]"
 
-Draw: TypeAlias = "Callable[..., Axes]"
-HEIGHT_OF_ONE_IN = 2.6  # of each predicted FRF, where there are several
+# What a run holds, by the stage that gives it.
+CONTENTS = {
+    "ingest": "estimate",
+    "fit": "fit",
+    "pair": "pairs",
+    "update": "updated",
+    "predict": "prediction",
+    "diagnose": "diagnosis",
+    "levels": "levels",
+}
+MOST_PREDICTIONS = 8  # predicted FRFs drawn; all stand in the file
 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A picture: which stages' results it takes, and what draws it."""
+    """A picture, or several that belong together.
+
+    Parameters
+    ----------
+    stages : tuple of str
+        Whose results it shows.
+    describe : callable
+        Gives the descriptions; None for what this run has nothing to show of.
+    otherwise : str
+        Why there may be none.
+    """
 
     stages: tuple[str, ...]
-    draw: Draw
+    describe: Describe
+    otherwise: str = "this run has nothing to show there"
 
 
-PICTURES: dict[str, _Entry] = {
-    "records": _Entry(("ingest",), plot_records),
-    "frfs": _Entry(("ingest",), lambda estimate: plot_frfs(estimate.frfs)),
-    "phases": _Entry(("ingest",), lambda estimate: plot_phases(estimate.frfs)),
-    "coherence": _Entry(("ingest",), lambda estimate: plot_coherence(estimate.frfs)),
-    "stabilization": _Entry(("fit", "ingest"), lambda fit, estimate: plot_stabilization(fit, estimate.frfs)),
-    "poles": _Entry(("fit",), plot_pole_zero_map),
-    "fit": _Entry(("ingest", "fit"), lambda estimate, fit: plot_fit(estimate.frfs, fit)),
-    "misfit": _Entry(("ingest", "fit"), lambda estimate, fit: plot_misfit(estimate.frfs, fit)),
-    "pairs": _Entry(("pair", "fit"), lambda pairs, fit: plot_pairs(pairs, fit.labels)),
-    "targets": _Entry(
-        ("update", "pair", "fit"), lambda updated, pairs, fit: plot_targets(target_rows(updated, pairs, fit.labels))
-    ),
-    "convergence": _Entry(("update",), plot_convergence),
-    "change": _Entry(("update",), lambda updated: _change(updated)),
-    "prediction": _Entry(("predict",), lambda prediction: _predictions(prediction)),
-    "structure": _Entry(("model", "ingest"), lambda model, estimate: _structure(model, estimate)),
-    "mismatch": _Entry(("diagnose",), plot_mismatch),
-    "ranking": _Entry(("diagnose",), plot_ranking),
-    "proof": _Entry(("diagnose",), plot_proof),
-    "law": _Entry(("diagnose",), lambda diagnosis: _law(diagnosis)),
-    "levels": _Entry(("levels",), lambda levels: _levels(levels)),
-}
+def picture_names(run: RunContents | None = None) -> tuple[str, ...]:
+    """Names of all pictures, or of those whose stages a run holds.
 
-
-def picture_names() -> tuple[str, ...]:
-    """Names of all pictures.
+    Parameters
+    ----------
+    run : RunContents, optional
+        What the run holds.
 
     Returns
     -------
     tuple of str
         In the order of the chain.
     """
-    return tuple(PICTURES)
+    return tuple(name for name, entry in PICTURES.items() if run is None or not _missing_stages(entry, run))
 
 
-def draw(name: str, folder: RunFolder) -> Figure:
-    """Draw a picture of a run.
+def describe(name: str, run: RunContents) -> tuple[Picture, ...]:
+    """Describe a picture of a run.
 
     Parameters
     ----------
     name : str
         One of `picture_names`.
-    folder : RunFolder
-        The run.
+    run : RunContents
+        What the run holds.
 
     Returns
     -------
-    Figure
-        To be saved with `plotting.style.save_figure`.
+    tuple of Picture
+        Those of that name, from the top down.
 
     Raises
     ------
@@ -97,45 +112,152 @@ def draw(name: str, folder: RunFolder) -> Figure:
     """
     if name not in PICTURES:
         raise InputError(f"there is no picture '{name}'; {did_you_mean(name, PICTURES)}")
-    entry = PICTURES[name]
-    results = [folder.load(stage) for stage in entry.stages]
-    missing = [stage for stage, result in zip(entry.stages, results, strict=True) if result is None]
+    missing = _missing_stages(PICTURES[name], run)
     if missing:
         raise InputError(f"the picture '{name}' needs the result of '{missing[0]}', which this run does not hold")
-    figure = entry.draw(*results).figure
-    return figure if isinstance(figure, Figure) else figure.figure
+    pictures = run_pictures(run, name)
+    if not pictures:
+        raise InputError(f"{PICTURES[name].otherwise}, so there is no such picture")
+    return pictures
 
 
-def _predictions(prediction: Prediction) -> Axes:
-    count = len(prediction.labels)
-    if not count:
-        raise InputError("this run predicts no FRF: name points of interest in [predict] points")
-    figure = Figure(figsize=(WIDTH_IN, 0.6 + HEIGHT_OF_ONE_IN * count), layout="constrained")
-    for place, ax in enumerate(figure.subplots(count, 1, squeeze=False)[:, 0]):
-        plot_prediction(prediction, frf=place, ax=ax)
-    return figure.axes[0]
+def run_pictures(run: RunContents, *names: str) -> tuple[Picture, ...]:
+    """Describe those pictures that a run has something to show in.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    *names : str
+        Some of `picture_names`.
+
+    Returns
+    -------
+    tuple of Picture
+        In the order of the names; empty where there is nothing to show.
+    """
+    entries = [PICTURES[name] for name in names]
+    drawn = [picture for entry in entries if not _missing_stages(entry, run) for picture in entry.describe(run)]
+    return tuple(picture for picture in drawn if picture is not None)
 
 
-def _change(updated: UpdatedModel) -> Axes:
-    if not len(updated.parts):
-        raise InputError(
-            "the update of this run has not changed named parts of the FE model, so there is no such picture"
-        )
-    return plot_stiffness_change(updated.parts)
+def _missing_stages(entry: _Entry, run: RunContents) -> list[str]:
+    return [stage for stage in entry.stages if getattr(run, CONTENTS[stage]) is None]
 
 
-def _law(diagnosis: Diagnosis) -> Axes:
-    if diagnosis.law_in_time is None:
-        raise InputError("the diagnosis of this run has found no force law, so there is no such picture")
-    return plot_law(diagnosis.law_in_time)
+def _of(attribute: str, describe_result: Callable[[Any], Picture | None]) -> Describe:
+    """Describe one result of a run that is known to be there."""
+    return lambda run: [describe_result(getattr(run, attribute))]
 
 
-def _levels(levels: LevelDependence) -> Axes:
-    if not len(levels.modes):
-        raise InputError("no input was excited at several levels, so there is no such picture")
-    return plot_levels(levels)
+def _frfs(run: RunContents) -> list[Picture]:
+    fitted = None if run.fit is None else run.fit.band_hz
+    return [] if run.frfs is None else [describe_frfs(run.frfs, band_hz=run.band_hz, fitted_hz=fitted)]
 
 
-def _structure(model: Any, estimate: Any) -> Axes:  # noqa: ANN401  results of stages as the folder gives them
-    geometry = getattr(model, "geometry", model)
-    return plot_structure(geometry, sensors=estimate.frfs.output_dofs, inputs=estimate.frfs.input_dofs)
+def _coherence(run: RunContents) -> list[Picture]:
+    return [select_panel(picture, 2) for picture in _frfs(run) if len(picture.panels) > 2]
+
+
+def _fit(run: RunContents) -> list[Picture]:
+    return [] if run.fit is None or run.frfs is None else [describe_fit(run.frfs, run.fit)]
+
+
+def _stabilization(run: RunContents) -> list[Picture]:
+    return [describe_stabilization(run.fit, run.frfs)] if run.fit is not None and len(run.fit.stabilization) else []
+
+
+def _pairs(run: RunContents) -> list[Picture]:
+    if run.pairs is None or not run.pairs.rows:
+        return []
+    return [describe_pairs(run.pairs, run.labels, band_hz=run.band_hz)]
+
+
+def _flexibility(run: RunContents) -> list[Picture | None]:
+    return [] if run.updated is None else [describe_flexibility_change(run.updated, run.geometry, run.labels)]
+
+
+def _predictions(run: RunContents) -> list[Picture]:
+    if run.prediction is None:
+        return []
+    measured = {**measured_at(run.prediction, run.frfs), **measured_at(run.prediction, run.reference)}
+    count = min(len(run.prediction.labels), MOST_PREDICTIONS)
+    return [describe_prediction(run.prediction, frf, measured.get(frf)) for frf in range(count)]
+
+
+def _structure(run: RunContents) -> list[Picture | None]:
+    frfs = run.frfs
+    marks = StructureMarks(
+        sensors=() if frfs is None else frfs.output_dofs,
+        inputs=() if frfs is None else frfs.input_dofs,
+        points=run.points,
+        missing=finding_nodes(run.diagnosis, frfs),
+        mismatch=mismatch_nodes(run.diagnosis, frfs),
+        across="Masses in a row" if run.is_lumped else "Position, m",
+    )
+    return [describe_structure(run.geometry, marks)]
+
+
+def _law(run: RunContents) -> list[Picture | None]:
+    law = None if run.diagnosis is None else run.diagnosis.law_in_time
+    return [] if law is None else [describe_law_force(law), describe_law_response(law)]
+
+
+def _expected_misfit(run: RunContents) -> list[Picture | None]:
+    return [] if run.diagnosis is None else [describe_expected_misfit(run.diagnosis, band_hz=run.band_hz)]
+
+
+def _levels(run: RunContents) -> list[Picture | None]:
+    if run.levels is None:
+        return []
+    return [describe_levels(run.levels, run.labels, band_hz=run.band_hz), describe_level_modes(run.levels)]
+
+
+PICTURES: dict[str, _Entry] = {
+    "structure": _Entry((), _structure),
+    "records": _Entry(("ingest",), _of("estimate", describe_forces)),
+    "responses": _Entry(("ingest",), _of("estimate", describe_responses)),
+    "frfs": _Entry(("ingest",), _frfs),
+    "phases": _Entry(("ingest",), lambda run: [select_panel(picture, 1) for picture in _frfs(run)]),
+    "coherence": _Entry(("ingest",), _coherence, "the coherence of these FRFs is not known"),
+    "stabilization": _Entry(("fit",), _stabilization, "the fit has kept no diagram"),
+    "poles": _Entry(("fit",), _of("fit", describe_pole_zero_map)),
+    "fit": _Entry(("ingest", "fit"), _fit),
+    "misfit": _Entry(("ingest", "fit"), lambda run: [select_panel(picture, 1) for picture in _fit(run)]),
+    "pairs": _Entry(("pair", "fit"), _pairs, "there was nothing to pair"),
+    "targets": _Entry(
+        ("update", "pair", "fit"),
+        lambda run: [describe_targets(run.targets())],
+        "no measured pole or zero has a counterpart in the model",
+    ),
+    "convergence": _Entry(("update",), _of("updated", describe_convergence), "the update took one step"),
+    "change": _Entry(
+        ("update",),
+        lambda run: [describe_stiffness_change(run.parts)],
+        "the update of this run has not changed named parts of the FE model",
+    ),
+    "flexibility": _Entry(("update",), _flexibility, "the model has no positions"),
+    "modal-change": _Entry(("update",), _of("updated", describe_modal_change)),
+    "prediction": _Entry(
+        ("predict",), _predictions, "this run predicts no FRF: name points of interest in [predict] points"
+    ),
+    "mismatch": _Entry(("diagnose",), _of("diagnosis", describe_mismatch)),
+    "ranking": _Entry(
+        ("diagnose",),
+        _of("diagnosis", describe_ranking),
+        "no explanation of this run gains any evidence",
+    ),
+    "law": _Entry(("diagnose",), _law, "the diagnosis of this run has found no force law"),
+    "proof": _Entry(("diagnose",), _of("diagnosis", describe_proof)),
+    "expected-misfit": _Entry(
+        ("diagnose",),
+        _expected_misfit,
+        "the diagnosis has kept no curves",
+    ),
+    "data-checks": _Entry(
+        ("diagnose",),
+        _of("diagnosis", describe_data_checks),
+        "no check of the data could be made",
+    ),
+    "levels": _Entry(("levels",), _levels, "no input was excited at several levels"),
+}

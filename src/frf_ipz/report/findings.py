@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.frf import FrfSet
 
 ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and short when written out
 SENTENCES = {
@@ -102,67 +101,8 @@ def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
     return names, f"probability {probability:.3g}" if probability < 0.999 else "probability above 0.999"
 
 
-def finding_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
-    """Give the nodes at which something is missing.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis, optional
-        The result of the diagnosis.
-    frfs : FrfSet, optional
-        Says where channels sit.
-
-    Returns
-    -------
-    dict of int to str
-        What is missing at each node.
-    """
-    missing: dict[int, str] = {}
-    for finding in () if diagnosis is None else diagnosis.findings:
-        text = finding.effect.replace("_", " ")
-        for node in _nodes(finding.location, frfs):
-            missing[node] = text
-    return missing
-
-
-def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int, str]:
-    """Give the nodes at which the cause of an unexplained mismatch seems to sit.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis, optional
-        The result of the diagnosis.
-    frfs : FrfSet, optional
-        Says where channels sit.
-
-    Returns
-    -------
-    dict of int to str
-        What is known of each node.
-    """
-    if diagnosis is None or diagnosis.verdict != "unexplained":
-        return {}
-    return dict.fromkeys(_nodes(diagnosis.mismatch_location, frfs), "location of the mismatch: the cause is unknown")
-
-
 def _in_words(location: Mapping[str, object]) -> list[tuple[str, str]]:
     return [
         (key, ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value))
         for key, value in location.items()
     ]
-
-
-def _nodes(location: Mapping[str, object], frfs: FrfSet | None) -> list[int]:
-    nodes, elements = _numbers(location.get("nodes")), _numbers(location.get("elements"))
-    if elements:
-        nodes += list(range(elements[0], elements[-1] + 2))
-    named = location.get("channels")
-    channels = set(named) if isinstance(named, tuple | list) else set()
-    for label in () if frfs is None or nodes else frfs.labels:
-        nodes += [label.output_dof.node] if label.output_channel in channels else []
-        nodes += [label.input_dof.node] if label.input_channel in channels else []
-    return nodes
-
-
-def _numbers(value: object) -> list[int]:
-    return [int(item) for item in value] if isinstance(value, tuple | list) else []

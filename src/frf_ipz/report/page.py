@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, TypeAlias
 from plotly.offline import get_plotlyjs
 
 from frf_ipz.progress import Progress, silent
-from frf_ipz.report.contents import RunContents, read_contents
 from frf_ipz.report.html import REPORT, page_environment, read_asset
-from frf_ipz.report.packing import Packer
-from frf_ipz.report.picture import colour_of
-from frf_ipz.report.section import Section, pictures_of
+from frf_ipz.report.page_data import page_data
+from frf_ipz.report.plotly_drawing import colour_name
+from frf_ipz.report.section import Section
 from frf_ipz.report.sections import (
     diagnosis,
     fit,
@@ -31,6 +30,7 @@ from frf_ipz.report.sections import (
     state_space,
     updating,
 )
+from frf_ipz.runs.contents import RunContents, read_contents
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,7 +55,6 @@ SECTIONS: tuple[Build, ...] = (
     state_space.build,
     provenance.build,
 )
-WIDE = 30.0  # ratio of the ends of the band from which the frequency axis starts logarithmic
 
 
 def write_report(results: Results, path: Path, *, progress: Progress = silent) -> None:
@@ -134,37 +133,6 @@ def run_values(run: RunContents, sections: Sequence[Section]) -> dict[str, objec
     }
 
 
-def page_data(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
-    """Give what the page's script draws from.
-
-    Parameters
-    ----------
-    run : RunContents
-        What the run holds.
-    sections : sequence of Section
-        With the pictures.
-
-    Returns
-    -------
-    dict
-        What JSON can hold.
-    """
-    packer = Packer()
-    pictures = {
-        picture.name: {"data": packer.pack(picture.traces), "layout": packer.pack(picture.layout)}
-        for picture in pictures_of(sections)
-    }
-    low, high = run.band_hz
-    frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
-    return {
-        "pictures": pictures,
-        "hiddenFrfs": run.hidden_frfs,
-        "frequencyScale": "log" if low > 0 and high > WIDE * low else "linear",
-        "lowestHz": min([1.0, *frequencies]),
-        "arrays": packer.arrays,
-    }
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrfBox:
     """One box of the chooser of FRFs.
@@ -207,7 +175,7 @@ def frf_chooser(run: RunContents) -> dict[str, object] | None:
         box = FrfBox(
             number=number,
             label=f"{label}, {label.quantity.value}",
-            colour=colour_of(number),
+            colour=colour_name(number),
             is_visible=number not in run.hidden_frfs,
         )
         boxes.setdefault((label.output_dof, label.input_dof), []).append(box)

@@ -8,10 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-from frf_ipz.report.picture import Picture
+from frf_ipz.plotting.registry import run_pictures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from frf_ipz.plotting.picture import Picture
+    from frf_ipz.runs.contents import RunContents
 
 MOST_ROWS = 400  # of a table on the page; all rows stand in the Parquet file beside it
 
@@ -51,6 +54,27 @@ class Table:
     def n_left_out(self) -> int:
         """How many rows the page does not show."""
         return max(len(self.rows) - MOST_ROWS, 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Figure:
+    """A picture with its caption, and the numbers behind it.
+
+    Parameters
+    ----------
+    picture : Picture
+        What is drawn.
+    hint : str
+        What can be done with it on a page; stands behind its note.
+    table : Table, optional
+        The numbers.
+    """
+
+    kind: ClassVar[str] = "figure"
+
+    picture: Picture
+    hint: str = ""
+    table: Table | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +143,7 @@ class Form:
     data: Mapping[str, object] = field(default_factory=dict)
 
 
-Block: TypeAlias = "Picture | Table | Headline | Listing | Form"
+Block: TypeAlias = "Figure | Table | Headline | Listing | Form"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,6 +174,34 @@ class Section:
     choices: tuple[str, ...] = ()
 
 
+def run_figures(
+    run: RunContents, *names: str, hints: Mapping[str, str] | None = None, tables: Mapping[str, Table] | None = None
+) -> list[Figure]:
+    """Show those pictures that a run has something to show in.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    *names : str
+        Names of pictures, as `plotting.registry` has them.
+    hints : mapping of str to str, optional
+        What can be done with a picture on a page, by the picture's own name.
+    tables : mapping of str to Table, optional
+        The numbers behind a picture, likewise.
+
+    Returns
+    -------
+    list of Figure
+        In the order of the names.
+    """
+    hints, tables = hints or {}, tables or {}
+    return [
+        Figure(picture=picture, hint=hints.get(picture.name, ""), table=tables.get(picture.name))
+        for picture in run_pictures(run, *names)
+    ]
+
+
 def pictures_of(sections: Sequence[Section]) -> list[Picture]:
     """All pictures of some sections.
 
@@ -163,4 +215,4 @@ def pictures_of(sections: Sequence[Section]) -> list[Picture]:
     list of Picture
         In order.
     """
-    return [block for section in sections for block in section.blocks if isinstance(block, Picture)]
+    return [block.picture for section in sections for block in section.blocks if isinstance(block, Figure)]

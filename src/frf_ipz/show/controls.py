@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.survey.selection import is_named
+from frf_ipz.plotting.wording import number, percent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.section import Form
-from frf_ipz.report.wording import number, percent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
 
 USES = {"checks": "as the checks say", "keep": "keep", "drop": "drop"}
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.picture import Layer, Panel, Picture, Points, Role, Span, VerticalLines, with_layers
 from frf_ipz.plotting.projection import project
+from frf_ipz.plotting.wording import counted
 from frf_ipz.rational import natural_frequency_hz
-from frf_ipz.report.picture import Picture, Trace, line, markers, shaded_span
-from frf_ipz.report.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 DIAGRAM, STRUCTURE = "stabilisation", "structure"
 STRIP = 0.08  # of the height, below the poles: room for the handles
-CLEAR: Trace = {"unselected": {"marker": {"opacity": 1.0}}}  # poles outside a chosen range stay as clear as they were
 
 
 def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Picture:
@@ -42,28 +41,21 @@ def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Pictur
     Picture
         With further lines, handles and shaded ranges.
     """
-    low, high = picture.layout["yaxis"]["range"]
-    rejected = [rejection.hz for rejection in options.strike]
-    reasons = [f"rejected: {rejection.why}" for rejection in options.strike]
-    pins = [f"pinned: {pin.why}" if pin.why else "pinned" for pin in options.pinned]
-    hertz = natural_frequency_hz(fit.model.poles[: fit.n_modes])
+    (panel,) = picture.panels
+    low, high = panel.y.limits or (0.0, 1.0)
     strip = STRIP * (high - low)
-    place, hover = np.full(len(hertz), low - strip / 2), "%{x:.6g} Hz: click to pin or reject"
-    traces = [
-        markers(hertz, place, "handles of the modes", "@ink", hover=hover, symbol="triangle-up", size=12),
-        *_vertical_lines("pinned", "@good", [pin.hz for pin in options.pinned], pins, (low, high)),
-        *_vertical_lines("rejected", "@bad", rejected, reasons, (low, high)),
-    ]
-    shapes = [shaded_span(pair, 0.0, 1.0, "@muted/0.3") for pair in options.exclude_hz]
+    pins = [f"pinned: {pin.why}" if pin.why else "pinned" for pin in options.pinned]
+    rejections = [f"rejected: {rejection.why}" for rejection in options.strike]
     words = [f"{len(pins)} pinned"] if pins else []
-    words += [f"{len(rejected)} rejected"] if rejected else []
-    left_out = counted(len(options.exclude_hz), "range")
-    words += [f"{left_out} left out (shaded)"] if options.exclude_hz else []
+    words += [f"{len(rejections)} rejected"] if rejections else []
+    words += [f"{counted(len(options.exclude_hz), 'range')} left out (shaded)"] if options.exclude_hz else []
+    layers: list[Layer] = [_handles(fit, low - strip / 2)]
+    layers += _lines("pinned", Role.GOOD, [pin.hz for pin in options.pinned], pins)
+    layers += _lines("rejected", Role.BAD, [rejection.hz for rejection in options.strike], rejections)
+    layers += [_left_out(*ends) for ends in options.exclude_hz]
+    taller: Panel = replace(panel, y=replace(panel.y, limits=(low - strip, high)))
     note = f"{picture.note} Your choices: {', '.join(words)}." if words else picture.note
-    below = {**picture.layout["yaxis"], "range": [low - strip, high]}
-    layout = {**picture.layout, "yaxis": below, "shapes": [*picture.layout.get("shapes", []), *shapes]}
-    drawn = [{**trace, **CLEAR} if trace["mode"] == "markers" else trace for trace in (*picture.traces, *traces)]
-    return replace(picture, traces=tuple(drawn), layout=layout, note=note)
+    return with_layers(replace(picture, panels=(taller,), note=note), *layers)
 
 
 def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> Picture:
@@ -83,25 +75,44 @@ def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> 
     Picture
         With the rings.
     """
-    place = {int(node): row for row, node in enumerate(geometry.nodes)}
-    known = [dof for dof in dofs if dof.node in place]
+    rows = {int(node): row for row, node in enumerate(geometry.nodes)}
+    known = [dof for dof in dofs if dof.node in rows]
     if not known:
         return picture
-    at = project(geometry.coordinates_m)[[place[dof.node] for dof in known]]
-    hover = "%{text}: the model is reduced to it"
+    places = project(geometry.coordinates_m)[[rows[dof.node] for dof in known]]
     names = [dof.name for dof in known]
-    rings = markers(
-        at[:, 0], at[:, 1], "retained in the reduction", "@c3", hover=hover, symbol="circle-open", size=14, text=names
+    rings = Points(
+        name="retained in the reduction",
+        colour=3,
+        x=places[:, 0],
+        y=places[:, 1],
+        size=14,
+        is_filled=False,
+        hover="{text}: the model is reduced to it",
+        texts=names,
     )
-    return replace(picture, traces=(*picture.traces, rings), alt=f"{picture.alt}; reduced to {', '.join(names)}")
+    return with_layers(replace(picture, alt=f"{picture.alt}; reduced to {', '.join(names)}"), rings)
 
 
-def _vertical_lines(
-    name: str, colour: str, frequencies: Sequence[float], texts: Sequence[str], ends: tuple[float, float]
-) -> list[Trace]:
+def _handles(fit: ModalFit, height: float) -> Points:
+    hertz = natural_frequency_hz(fit.model.poles[: fit.n_modes])
+    return Points(
+        name="handles of the modes",
+        colour=Role.INK,
+        x=hertz,
+        y=np.full(len(hertz), height),
+        symbol="triangle-up",
+        size=12,
+        hover="{x:.6g} Hz: click to pin or reject",
+    )
+
+
+def _lines(name: str, colour: Role, frequencies: Sequence[float], texts: Sequence[str]) -> list[Layer]:
     if not frequencies:
         return []
-    x, y = np.full((len(frequencies), 3), np.nan), np.full((len(frequencies), 3), np.nan)
-    x[:, :2], y[:, :2] = np.array(frequencies)[:, None], ends
-    hover = [text for text in texts for _ in range(3)]
-    return [line(x.ravel(), y.ravel(), name, colour, hover="%{x:.6g} Hz, %{text}", width=2.5, text=hover)]
+    x = np.array(frequencies, float)
+    return [VerticalLines(name=name, colour=colour, x=x, width=2.5, hover="{x:.6g} Hz, {text}", texts=texts)]
+
+
+def _left_out(low_hz: float, high_hz: float) -> Span:
+    return Span(name="left out", colour=Role.MUTED, opacity=0.3, in_legend=False, low=low_hz, high=high_hz)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.errors import InputError
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import SECTIONS, run_values
-from frf_ipz.report.picture import Picture
-from frf_ipz.report.section import Section
+from frf_ipz.report.section import Block, Figure, Section
 from frf_ipz.show.controls import (
     Choices,
     command_line,
@@ -23,8 +22,11 @@ from frf_ipz.show.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
 from frf_ipz.show.setup import read_setup
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from frf_ipz.pipeline.config import PipelineFile
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.plotting.picture import Picture
+    from frf_ipz.runs.contents import RunContents
     from frf_ipz.show.workbench import Workbench
 
 SHOW = "frf_ipz.show"
@@ -124,11 +126,9 @@ def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Sectio
 def _with_controls(section: Section, run: RunContents, choices: PipelineFile) -> Section:
     blocks = list(section.blocks)
     if section.anchor == "stabilization" and run.fit is not None:
-        blocks = [
-            with_choices(block, run.fit, choices.fit) if isinstance(block, Picture) and block.name == DIAGRAM else block
-            for block in blocks
-        ]
-        blocks.insert(1, pole_forms(run.fit))
+        fit = run.fit
+        blocks = _redrawn(blocks, DIAGRAM, lambda picture: with_choices(picture, fit, choices.fit))
+        blocks.insert(1, pole_forms(fit))
     if section.anchor == "recordings":
         records = record_list(run, choices)
         blocks += [] if records is None else [records]
@@ -139,14 +139,21 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
 
 def _pickable(section: Section, run: RunContents, choices: PipelineFile) -> Section:
     """Let the user pick DOFs on the drawing of the structure."""
-    retained = () if run.reduced is None else run.reduced.dofs
-    blocks = [
-        with_retained(block, run.geometry, retained)
-        if isinstance(block, Picture) and block.name == STRUCTURE and run.geometry is not None
-        else block
-        for block in section.blocks
-    ]
+    retained, geometry = () if run.reduced is None else run.reduced.dofs, run.geometry
+    blocks = list(section.blocks)
+    if geometry is not None:
+        blocks = _redrawn(blocks, STRUCTURE, lambda picture: with_retained(picture, geometry, retained))
     return replace(section, blocks=(*blocks, dof_forms(run, choices, retained)))
+
+
+def _redrawn(blocks: Sequence[Block], name: str, change: Callable[[Picture], Picture]) -> list[Block]:
+    """Change the picture of some name among the blocks of a section."""
+    return [
+        replace(block, picture=change(block.picture))
+        if isinstance(block, Figure) and block.picture.name == name
+        else block
+        for block in blocks
+    ]
 
 
 def _shapes(run: RunContents) -> Section:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.report.contents import RunContents
-from frf_ipz.report.section import Block, Section, Table
-from frf_ipz.report.structure_drawing import Marks, draw_structure
-from frf_ipz.report.wording import counted, listed
+from frf_ipz.plotting.structure import StructureMarks, describe_structure
+from frf_ipz.plotting.wording import counted, listed
+from frf_ipz.report.section import Block, Figure, Section, Table
+from frf_ipz.runs.contents import RunContents
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,10 +46,12 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     run = RunContents(
         manifest={"name": inputs.name}, geometry=None if inputs.fe_model is None else inputs.fe_model.geometry
     )
-    marks = Marks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
-    drawing = draw_structure(run.geometry, marks)
+    marks = StructureMarks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
+    drawing = describe_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
-    blocks: list[Block] = [_what_was_read(inputs)] if drawing is None else [drawing, _what_was_read(inputs)]
+    blocks: list[Block] = (
+        [_what_was_read(inputs)] if drawing is None else [Figure(picture=drawing), _what_was_read(inputs)]
+    )
     return run, Section(anchor=anchor, title=title, lead=lead, blocks=tuple(blocks))
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
     from frf_ipz.structure import Geometry, ReducedModel
 
 FLAT = 1e-6  # of the largest extent: thinner than this is flat

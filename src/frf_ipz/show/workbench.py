@@ -6,7 +6,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
-from frf_ipz.report.contents import RunContents, read_contents
+from frf_ipz.runs.contents import RunContents, read_contents
 from frf_ipz.runs.folder import MANIFEST, read_manifest
 from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from frf_ipz.errors import InputError
-from frf_ipz.report.section import pictures_of
-from frf_ipz.report.sections import frfs as frf_section
+from frf_ipz.plotting.frfs import describe_frfs
+from frf_ipz.report.plotly_drawing import draw_picture
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
 
 DIGITS = 8  # of a number: neighbouring lines of a long record differ in the sixth
 
@@ -50,10 +49,9 @@ def zoomed_traces(run: RunContents, range_hz: tuple[float, float], selected: Seq
     inside[max(int(first) - 1, 0) : int(last) + 1] = True
     if np.count_nonzero(inside) < 2:
         raise InputError(f"no lines were measured from {range_hz[0]:g} to {range_hz[1]:g} Hz")
-    part = replace(estimate, frfs=estimate.frfs.select_frfs(selected).select_lines(inside))
-    section = frf_section.build(replace(run, estimate=part, fit=None))
-    (picture,) = pictures_of([] if section is None else [section])
-    return [{axis: _numbers(trace[axis]) for axis in ("x", "y")} for trace in picture.traces]
+    part = estimate.frfs.select_frfs(selected).select_lines(inside)
+    traces = draw_picture(describe_frfs(part, band_hz=range_hz))["data"]
+    return [{axis: _numbers(trace[axis]) for axis in ("x", "y")} for trace in traces]
 
 
 def _numbers(values: Any) -> list[float | None]:  # noqa: ANN401  arrays or lists, as traces hold them

@@ -8,12 +8,20 @@ from dataclasses import replace
 import pytest
 
 from frf_ipz.errors import InputError
-from frf_ipz.plotting.registry import PICTURES, draw, picture_names
-from frf_ipz.plotting.style import FORMATS, save_figure
+from frf_ipz.plotting.figures import FORMATS, draw_pictures, save_figure
+from frf_ipz.plotting.registry import PICTURES, describe, picture_names, run_pictures
+from frf_ipz.report.page import SECTIONS
+from frf_ipz.report.section import pictures_of
+from frf_ipz.runs.contents import read_contents
+from frf_ipz.runs.results import Results
 from synthetic_run import Folder, synthetic_folder, synthetic_law
 
 OF_A_DIAGNOSIS = {"mismatch", "ranking", "proof"}
 STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
+
+
+def draw(name, folder):
+    return draw_pictures(describe(name, read_contents(Results(folder))))
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +63,9 @@ def test_a_missing_stage_is_named(name):
 
 
 def test_a_run_with_one_level_has_no_picture_of_levels(folder):
-    levels = replace(folder.results["levels"], modes=folder.results["levels"].modes.iloc[:0])
+    levels = replace(folder.results["levels"], labels=(), modes=folder.results["levels"].modes.iloc[:0])
     with pytest.raises(InputError, match="no input was excited at several levels"):
-        draw("levels", Folder(results={"levels": levels}, manifest={}, stale=()))
+        draw("levels", Folder(results={"levels": levels}, manifest={"stages": {"levels": {}}}, stale=()))
 
 
 def test_a_run_without_a_law_has_no_picture_of_one():
@@ -67,16 +75,46 @@ def test_a_run_without_a_law_has_no_picture_of_one():
 
 def test_the_force_of_a_law_is_drawn_where_no_record_was_simulated(folder):
     force_alone = replace(folder.results["diagnose"], law_in_time=replace(synthetic_law(), record=""))
-    figure = draw("law", Folder(results={"diagnose": force_alone}, manifest={}, stale=()))
+    figure = draw("law", Folder(results={"diagnose": force_alone}, manifest={"stages": {"diagnose": {}}}, stale=()))
     assert figure.axes[0].get_ylabel() == "Force of the law, N"
 
 
-def test_names_are_in_the_order_of_the_chain():
+def test_names_are_in_the_order_of_the_chain_and_those_of_a_run_are_what_it_holds():
     names = picture_names()
+    held = picture_names(read_contents(Results(synthetic_folder())))
+    assert set(names) - set(held) == {*OF_A_DIAGNOSIS, "law", "expected-misfit", "data-checks", "levels"}
     assert names.index("frfs") < names.index("poles") < names.index("pairs") < names.index("prediction")
 
 
-def test_no_window_system_is_asked_for():
-    code = "import sys, frf_ipz.plotting.registry; sys.exit('matplotlib.pyplot' in sys.modules)"
+def test_every_picture_of_the_report_has_a_name_on_the_command_line(folder):
+    run = read_contents(Results(folder))
+    sections = [build(run) for build in SECTIONS]
+    shown = [picture.name for picture in pictures_of([section for section in sections if section is not None])]
+    assert set(shown) - {"flexibility"} == {
+        picture.name for name in PICTURES if name != "flexibility" for picture in run_pictures(run, name)
+    }
+    assert len(set(shown)) == len(shown)
+
+
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("frf_ipz.plotting", "matplotlib"),
+        ("frf_ipz.plotting.registry", "matplotlib"),
+        ("frf_ipz.report.page", "matplotlib"),
+        ("frf_ipz.plotting.plots", "matplotlib.pyplot"),
+        ("frf_ipz.plotting.plots", "plotly"),
+    ],
+)
+def test_descriptions_and_the_report_need_no_matplotlib_and_drawing_no_window(module, heavy):
+    code = f"import sys, {module}; sys.exit('{heavy}' in sys.modules)"
     with warnings.catch_warnings():
         assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_functions_are_shown_to_those_who_look_for_them():
+    code = (
+        "import sys, frf_ipz; names = dir(frf_ipz.plotting); "
+        "sys.exit('matplotlib' in sys.modules or not {'plot_frfs', 'plot_fit', 'draw_pictures'} <= set(names))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.result import Ambiguity
-from frf_ipz.report.contents import read_contents
-from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, typeset, verdict_of
-from frf_ipz.report.picture import Picture
-from frf_ipz.report.section import Table
+from frf_ipz.plotting.structure import finding_nodes, mismatch_nodes
+from frf_ipz.report.findings import card_texts, typeset, verdict_of
+from frf_ipz.report.section import Figure, Table
 from frf_ipz.report.sections.diagnosis import build
 from frf_ipz.report.sections.overview import build as overview
+from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.runs.summary import diagnosis_lines
 from synthetic_run import synthetic_folder
@@ -22,12 +22,12 @@ def run():
     return read_contents(Results(synthetic_folder(diagnosed=True)))
 
 
-def block(run, kind, name):
-    return next(
-        item
-        for item in build(run).blocks
-        if isinstance(item, kind) and name in {getattr(item, "name", ""), getattr(item, "caption", "")}
-    )
+def figure(run, name):
+    return next(block for block in build(run).blocks if isinstance(block, Figure) and block.picture.name == name)
+
+
+def table(run, caption):
+    return next(block for block in build(run).blocks if isinstance(block, Table) and block.caption == caption)
 
 
 def test_findings_are_the_verdict(run):
@@ -68,11 +68,12 @@ def test_the_location_of_an_unexplained_mismatch_is_stated_and_marked(run):
     assert verdict_of(diagnosis)[1] == sentence
     assert sentence in build(replace(run, diagnosis=diagnosis)).notes
     assert list(mismatch_nodes(diagnosis, run.frfs)) == [4]
-    drawn = next(item for item in overview(replace(run, diagnosis=diagnosis)).blocks if isinstance(item, Picture))
-    (ring,) = [trace for trace in drawn.traces if trace["name"] == "location of the mismatch"]
+    blocks = overview(replace(run, diagnosis=diagnosis)).blocks
+    drawn = next(block.picture for block in blocks if isinstance(block, Figure))
+    (ring,) = [layer for layer in drawn.layers if layer.name == "location of the mismatch"]
     assert "(node 4)" in drawn.alt
     at = run.geometry.coordinates_m[run.geometry.nodes == 4, 0]
-    np.testing.assert_array_equal(ring["x"], at)
+    np.testing.assert_array_equal(ring.x, at)
 
 
 @pytest.mark.parametrize(("verdict", "location"), [("explained", {"nodes": [4]}), ("unexplained", {})])
@@ -88,28 +89,29 @@ def test_elements_are_marked_at_all_their_nodes(run):
 
 
 def test_the_map_holds_misfits_before_and_after(run):
-    before, after = block(run, Picture, "mismatch").traces
-    assert before["z"].shape == (len(run.labels), 3)
-    assert 10 ** before["z"][1, 0] == pytest.approx(15.0, rel=1e-12)
-    assert (after["z"] == 0).all()
+    before, after = figure(run, "mismatch").picture.layers
+    assert before.values.shape == (len(run.labels), 3)
+    assert before.values[1, 0] == pytest.approx(15.0, rel=1e-12)
+    assert (after.values == 1).all()
 
 
 def test_models_that_hold_no_force_law_are_not_said_to_hold_it(run):
-    linear = block(run, Picture, "mismatch")
+    linear = figure(run, "mismatch").picture
     assert "as it is and with findings" in linear.alt
-    law = block(replace(run, diagnosis=replace(run.diagnosis, linearised_law="a spring")), Picture, "mismatch")
-    assert len(linear.traces) == 2
-    assert len(law.traces) == 1
+    law = figure(replace(run, diagnosis=replace(run.diagnosis, linearised_law="a spring")), "mismatch").picture
+    assert len(linear.layers) == 2
+    assert len(law.layers) == 1
     assert "the force law explains" in law.note
     assert "the force law explains" not in linear.note
 
 
 def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
     worse = replace(run.diagnosis.alternatives[0], log_evidence_gain=-5e7)
-    bars = block(replace(run, diagnosis=replace(run.diagnosis, alternatives=(worse,))), Picture, "ranking").traces[0]
-    assert bars["text"][-1] == "worse than without"
-    assert min(bars["x"]) >= 0
-    assert bars["text"][0].startswith("p = ")
+    diagnosis = replace(run.diagnosis, alternatives=(worse,))
+    (bars,) = figure(replace(run, diagnosis=diagnosis), "ranking").picture.layers
+    assert bars.texts[-1] == "worse than without"
+    assert min(bars.sizes) >= 0
+    assert bars.texts[0].startswith("p = ")
 
 
 def test_numbers_of_a_few_digits_are_written_out(run):
@@ -119,15 +121,15 @@ def test_numbers_of_a_few_digits_are_written_out(run):
 
 
 def test_findings_come_before_alternatives(run):
-    table = block(run, Table, "Findings and alternatives")
-    assert [row[0] for row in table.rows] == ["added mass", "sensor gain", "local stiffness"]
-    assert "mass_kg = 0.0123 ± 4e-4" in table.rows[0]
+    findings = table(run, "Findings and alternatives")
+    assert [row[0] for row in findings.rows] == ["added mass", "sensor gain", "local stiffness"]
+    assert "mass_kg = 0.0123 ± 4e-4" in findings.rows[0]
 
 
 def test_proof_on_held_out_data_is_in_percent(run):
-    picture = block(run, Picture, "proof")
-    assert picture.traces[1]["y"].tolist() == pytest.approx([43.0, 22.0, 2.0])
-    assert picture.table.rows[2][2] == "2 %"
+    proof = figure(run, "proof")
+    assert proof.picture.layers[1].sizes.tolist() == pytest.approx([43.0, 22.0, 2.0])
+    assert proof.table.rows[2][2] == "2 %"
 
 
 def test_what_cannot_be_distinguished_is_a_note_with_its_remedy(run):
@@ -145,6 +147,6 @@ def test_three_indistinguishable_effects_are_a_list():
 
 
 def test_checks_that_could_not_be_made_are_only_in_the_table(run):
-    picture = block(run, Picture, "data-checks")
-    assert picture.traces[0]["y"] == ["homogeneity"]
-    assert [row[0] for row in picture.table.rows] == ["homogeneity", "reciprocity"]
+    checks = figure(run, "data-checks")
+    assert checks.picture.layers[0].y == ["homogeneity"]
+    assert [row[0] for row in checks.table.rows] == ["homogeneity", "reciprocity"]

@@ -8,9 +8,9 @@ import pytest
 from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
-from frf_ipz.report.contents import read_contents
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import run_values, write_report
+from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.page import SHOW, page_sections

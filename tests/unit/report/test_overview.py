@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.plotting.wording import number
 from frf_ipz.prediction.agreement import compare_frfs
-from frf_ipz.report.contents import read_contents
 from frf_ipz.report.sections.overview import build, verdict
-from frf_ipz.report.wording import number
+from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.report.contents import read_contents
 from frf_ipz.report.sections.state_space import build
+from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder
 

@@ -1,6 +1,5 @@
 """What the page is made of: the report's sections, forms where something can be changed, and the user's choices."""
 
-import numpy as np
 import pytest
 
 from frf_ipz.fe.reduction.options import ReduceOptions
@@ -8,9 +7,9 @@ from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.prediction.options import PredictOptions
-from frf_ipz.report.contents import read_contents
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.section import pictures_of
+from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.marks import with_choices, with_retained
@@ -98,16 +97,16 @@ def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
 def test_choices_and_handles_are_drawn_into_the_diagram(run):
     diagram = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "stabilisation")
     marked = with_choices(diagram, run.fit, CHOICES.fit)
-    names = {trace["name"]: trace for trace in marked.traces}
-    assert sorted(set(names["pinned"]["x"][np.isfinite(names["pinned"]["x"])])) == [20.0, 33.0]
-    assert names["pinned"]["text"][::3] == ["pinned", "pinned: seen by eye"]
-    assert names["rejected"]["text"][0] == "rejected: mains"
-    assert [(shape["x0"], shape["x1"]) for shape in marked.layout["shapes"]] == [(49.0, 51.0)]
-    handles = names["handles of the modes"]
-    assert list(handles["x"]) == list(run.fit.model.natural_frequency_hz[: run.fit.n_modes])
-    low, high = marked.layout["yaxis"]["range"]
-    assert all(low < place < diagram.layout["yaxis"]["range"][0] for place in handles["y"])
-    assert high == diagram.layout["yaxis"]["range"][1]
+    layers = {layer.name: layer for layer in marked.layers}
+    assert layers["pinned"].x.tolist() == [20.0, 33.0]
+    assert layers["pinned"].texts == ["pinned", "pinned: seen by eye"]
+    assert layers["rejected"].texts == ["rejected: mains"]
+    assert (layers["left out"].low, layers["left out"].high) == (49.0, 51.0)
+    handles = layers["handles of the modes"]
+    assert list(handles.x) == list(run.fit.model.natural_frequency_hz[: run.fit.n_modes])
+    (low, high), (before, same_high) = marked.panels[0].y.limits, diagram.panels[0].y.limits
+    assert all(low < height < before for height in handles.y)
+    assert high == same_high
     assert "2 pinned, 1 rejected, 1 range left out" in marked.note
 
 
@@ -120,10 +119,10 @@ def test_without_a_pipeline_file_there_is_the_report_alone(run):
 def test_nodes_that_the_model_is_reduced_to_are_ringed(run):
     drawing = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "structure")
     ringed = with_retained(drawing, run.geometry, run.reduced.dofs)
-    rings = ringed.traces[-1]
-    nodes = next(trace for trace in drawing.traces if trace["name"] == "nodes")
-    for dof, x in zip(run.reduced.dofs, rings["x"], strict=True):
-        assert x == nodes["x"][nodes["text"].index(f"node {dof.node}")]
-    assert list(rings["text"]) == [dof.name for dof in run.reduced.dofs]
-    names = [trace["name"] for trace in next(picture for picture in pictures_of(page_sections(run, CHOICES))).traces]
+    rings = ringed.layers[-1]
+    nodes = next(layer for layer in drawing.layers if layer.name == "nodes")
+    for dof, x in zip(run.reduced.dofs, rings.x, strict=True):
+        assert x == nodes.x[nodes.texts.index(f"node {dof.node}")]
+    assert list(rings.texts) == [dof.name for dof in run.reduced.dofs]
+    names = [layer.name for layer in pictures_of(page_sections(run, CHOICES))[0].layers]
     assert "retained in the reduction" in names

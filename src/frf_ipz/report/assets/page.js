@@ -55,7 +55,7 @@
     const base = {
       paper_bgcolor: paper, plot_bgcolor: paper, font: { family: "system-ui, sans-serif", size: 12.5, color: ink },
       margin: { l: 74, r: 44, t: 12, b: 46 }, modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: muted, activecolor: ink }, hovermode: "closest", dragmode: "zoom", autosize: true,
-      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11.5 } },
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11.5 }, tracegroupgap: 0 },
       hoverlabel: { bgcolor: paper, bordercolor: muted, font: { color: ink, size: 12 }, namelength: -1 },
     };
     const full = { ...base, ...layout };
@@ -97,11 +97,14 @@
     }
   }
 
+  // Names are escaped for plotly, which takes some tags in them for markup.
+  const plain = (text) => text.replace(/&lt;/g, "<").replace(/&gt;/g, ">").replace(/&amp;/g, "&");
+
   // The entries of a legend are drawn by plotly for a mouse only: make them buttons for the keyboard too.
   function openLegend(plot) {
     plot.querySelectorAll(".legend .traces").forEach((entry) => {
       const { trace } = entry.__data__[0];
-      const state = { tabindex: 0, role: "button", "aria-label": trace.name, "aria-pressed": trace.visible === true };
+      const state = { tabindex: 0, role: "button", "aria-label": plain(trace.name), "aria-pressed": trace.visible === true };
       Object.entries(state).forEach(([key, value]) => entry.setAttribute(key, value));
       entry.onkeydown = (event) => {
         if (event.key !== "Enter" && event.key !== " ") return;

@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.prediction.agreement import compare_frfs
-from frf_ipz.report.findings import card_texts, finding_nodes, mismatch_nodes, verdict_of
-from frf_ipz.report.reference import measured_at
-from frf_ipz.report.section import Card, Headline, Section
-from frf_ipz.report.structure_drawing import Marks, draw_structure
-from frf_ipz.report.wording import counted, listed, number, percent, small_percent
+from frf_ipz.prediction.reference import measured_at
+from frf_ipz.report.findings import card_texts, verdict_of
+from frf_ipz.report.section import Card, Headline, Section, run_figures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.plotting.targets import Target
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.updating.targets import Target
 
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
@@ -39,16 +38,6 @@ def build(run: RunContents) -> Section:
     """
     sentence, addition = verdict(run)
     headline = Headline(sentence=sentence, addition=addition, cards=tuple(_cards(run)))
-    frfs = run.frfs
-    marks = Marks(
-        sensors=() if frfs is None else frfs.output_dofs,
-        inputs=() if frfs is None else frfs.input_dofs,
-        points=run.points,
-        missing=finding_nodes(run.diagnosis, frfs),
-        mismatch=mismatch_nodes(run.diagnosis, frfs),
-        across="Masses in a row" if run.is_lumped else "Position, m",
-    )
-    drawing = draw_structure(run.geometry, marks)
     notes: tuple[str, ...] = ()
     if run.stale:
         notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale), 10)}.",)
@@ -56,7 +45,7 @@ def build(run: RunContents) -> Section:
         anchor="overview",
         title="Overview",
         lead="",
-        blocks=(headline, *([] if drawing is None else [drawing])),
+        blocks=(headline, *run_figures(run, "structure")),
         notes=notes,
     )
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from frf_ipz.plotting.wording import number
 from frf_ipz.report.section import Listing, Section, Table
-from frf_ipz.report.wording import number
 
 if TYPE_CHECKING:
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
 
 SHOWN_DIGITS = 16  # of a digest; all stand in run.json
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.plotting.wording import counted, number
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.section import Section, Table
-from frf_ipz.report.wording import counted, number
 
 if TYPE_CHECKING:
     from frf_ipz.export.state_space import StateSpaceModel
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
 
 MOST_POLES = 40
 AT_REST = 1e-6  # of the highest frequency: a double pole at 0 is found to about the root of machine precision

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eigh
 
-from frf_ipz.plotting.targets import Target
-from frf_ipz.report.along_structure import LEAST_EIGENVALUE, picture_of_parts, pictures_of_flexibility
-from frf_ipz.report.picture import Axis, Picture, Trace, line, markers, panels
-from frf_ipz.report.section import Section, Table
-from frf_ipz.report.wording import counted, number, percent, small_percent
+from frf_ipz.plotting.wording import counted, number, percent, small_percent
+from frf_ipz.report.section import Section, Table, run_figures
 from frf_ipz.updating.along_structure import notable_changes
+from frf_ipz.updating.targets import Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
 
-    from frf_ipz.report.contents import RunContents
+    from frf_ipz.runs.contents import RunContents
     from frf_ipz.updating.updated_model import UpdatedModel
 
 SCALE = "std: "  # how columns of the history begin that say how wide a part of the prior is
-MOST_MODES = 30
 MOST_PARTS = 5  # named one by one
-FEW_STEPS = 20  # iterations that are each named on the axis
-MOST_NAMES = 30  # of targets written under the axis
 
 
 def build(run: RunContents) -> Section | None:
@@ -45,19 +39,19 @@ def build(run: RunContents) -> Section | None:
     updated = run.updated
     if updated is None:
         return None
-    rows = run.targets()
-    pictures = [_targets(rows)] if rows else []
-    pictures += [_convergence(updated)] if len(updated.history) > 1 else []
-    parts = run.parts
-    pictures += [picture_of_parts(parts)] if len(parts) else pictures_of_flexibility(run, updated)
-    pictures.append(_of_modes(updated))
+    rows, parts = run.targets(), run.parts
+    tables = {"targets": _target_table(rows)} if rows else {}
+    tables |= {"convergence": _iteration_table(updated)} if len(updated.history) else {}
+    tables |= {"change": _part_table(parts)} if len(parts) else {}
+    change = "change" if len(parts) else "flexibility"
+    figures = run_figures(run, "targets", "convergence", change, "modal-change", tables=tables)
     lead = f"Method {updated.method}: {updated.status.value}. {counted(len(updated.history), 'iteration')}."
     reduced = run.reduced
     return Section(
         anchor="updating",
         title="Updating",
         lead=lead,
-        blocks=tuple(pictures),
+        blocks=tuple(figures),
         notes=(*[f"Cannot be met: {text}" for text in updated.unmet], *_notable(parts), *updated.warnings),
         choices=(*(() if reduced is None else reduced.choices), *_regularisation(updated)),
     )
@@ -68,40 +62,6 @@ def _notable(parts: pd.DataFrame) -> list[str]:
     n_unnamed = len(changes) - MOST_PARTS
     rest = [f"and {counted(n_unnamed, 'further part')} of the structure"] if n_unnamed > 0 else []
     return [*changes[:MOST_PARTS], *rest]
-
-
-def _targets(rows: Sequence[Target]) -> Picture:
-    x = np.arange(1, len(rows) + 1)
-    traces: list[Trace] = []
-    texts = [f"{row.name} at {number(row.measured_hz, 6)} Hz" for row in rows]
-    for name, colour, symbol, values in (
-        ("before", "@nominal", "circle-open", [row.before for row in rows]),
-        ("after", "@updated", "circle", [row.after for row in rows]),
-    ):
-        errors = 100 * np.abs(np.array(values))
-        hover = "%{text}: %{y:.4g} % off"
-        traces.append(markers(x, np.maximum(errors, 1e-6), name, colour, symbol=symbol, text=texts, hover=hover))
-    step = -(-len(rows) // MOST_NAMES)
-    axis = {
-        "title": {"text": "Target"},
-        "tickvals": x[::step].tolist(),
-        "ticktext": [_short(row) for row in rows[::step]],
-    }
-    axis["tickangle"] = -40
-    return Picture(
-        name="targets",
-        title="Frequency errors of the targets, before and after",
-        alt=f"Relative frequency errors of {counted(len(rows), 'target')} on a logarithmic axis: largest before "
-        f"{percent(max(abs(row.before) for row in rows), 2)}, after {percent(max(abs(row.after) for row in rows), 2)}.",
-        traces=tuple(traces),
-        layout=panels(axis, Axis(title="Error of the frequency, %", scale="log")),
-        table=_target_table(rows),
-        height_px=400,
-    )
-
-
-def _short(row: Target) -> str:
-    return f"{row.kind} {number(row.measured_hz)} Hz"
 
 
 def _target_table(rows: Sequence[Target]) -> Table:
@@ -122,36 +82,23 @@ def _target_table(rows: Sequence[Target]) -> Table:
     return Table(caption="Targets of the update", columns=columns, rows=cells, file="pairs.parquet")
 
 
-def _convergence(updated: UpdatedModel) -> Picture:
-    history = updated.history
-    place = np.arange(1, len(history) + 1)
-    misfit = history["misfit"].to_numpy(float)
-    phases = history["phase"].astype(str).to_numpy()
-    traces = []
-    for rank, phase in enumerate(dict.fromkeys(phases)):
-        here = phases == phase
-        style: dict[str, Any] = {"hover": "iteration %{x}: %{y:.4g}", "mode": "lines+markers"}
-        style["marker"] = {"symbol": ["circle", "square", "diamond"][rank % 3], "size": 6}
-        traces.append(line(place[here], misfit[here], phase, f"@c{rank}", **style))
-    scale = "log" if np.all(misfit > 0) else "linear"
-    steps = {"dtick": 1} if len(history) <= FEW_STEPS else {}
-    return Picture(
-        name="convergence",
-        title="Convergence",
-        alt=f"Misfit over {counted(len(history), 'iteration')}: from {number(misfit[0])} to {number(misfit[-1])}.",
-        traces=tuple(traces),
-        layout=panels({"title": {"text": "Iteration"}, **steps}, Axis(title="Misfit of the targets", scale=scale)),
-        table=Table(
-            caption="Iterations",
-            columns=("phase", "iteration", "misfit", "step"),
-            rows=[
-                [str(row["phase"]), number(row["iteration"]), number(row["misfit"]), number(row["step"])]
-                for row in history[["phase", "iteration", "misfit", "step"]].to_dict("records")
-            ],
-            file="parameters.parquet",
-        ),
-        height_px=320,
-    )
+def _iteration_table(updated: UpdatedModel) -> Table:
+    rows = [
+        [str(row["phase"]), number(row["iteration"]), number(row["misfit"]), number(row["step"])]
+        for row in updated.history[["phase", "iteration", "misfit", "step"]].to_dict("records")
+    ]
+    columns = ("phase", "iteration", "misfit", "step")
+    return Table(caption="Iterations", columns=columns, rows=rows, file="parameters.parquet")
+
+
+def _part_table(parts: pd.DataFrame) -> Table:
+    columns = ("stiffness_ratio", "stiffness_ratio_low", "stiffness_ratio_high")
+    values = (100 * (parts[name].to_numpy(float) - 1) for name in columns)
+    rows = [
+        [name, *[f"{value:+.3g} %" for value in row]]
+        for name, *row in zip(parts["name"].astype(str), *values, strict=True)
+    ]
+    return Table(caption="Change of stiffness", columns=("part", "change", "low", "high"), rows=rows)
 
 
 def _regularisation(updated: UpdatedModel) -> list[str]:
@@ -168,28 +115,3 @@ def _regularisation(updated: UpdatedModel) -> list[str]:
                 f"regularisation of the {phase} by likelihood and discrepancy principle, standard deviations: {values}"
             )
     return texts
-
-
-def _of_modes(updated: UpdatedModel) -> Picture:
-    values, shapes = eigh(updated.nominal.stiffness, updated.nominal.mass)
-    flexible = values > LEAST_EIGENVALUE * values[-1]
-    values, shapes = values[flexible][:MOST_MODES], shapes[:, flexible][:, :MOST_MODES]
-    change = np.einsum("ik,ij,jk->k", shapes, updated.model.stiffness - updated.nominal.stiffness, shapes) / values
-    hertz = np.sqrt(values) / (2 * np.pi)
-    names = [f"{number(value)} Hz" for value in hertz]
-    bars: Trace = {
-        "type": "bar",
-        "x": names,
-        "y": 100 * change,
-        "name": "change",
-        "marker": {"color": "@updated"},
-        "hovertemplate": "mode at %{x}: %{y:+.3g} %<extra></extra>",
-    }
-    return Picture(
-        name="modal-change",
-        title="Change of the stiffness that each nominal mode sees",
-        alt="Bars: " + ", ".join(f"{name} {100 * value:+.2g} %" for name, value in zip(names, change, strict=True)),
-        traces=(bars,),
-        layout=panels({"title": {"text": "Nominal mode"}, "type": "category"}, Axis(title="Change of stiffness, %")),
-        height_px=300,
-    )

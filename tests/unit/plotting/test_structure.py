@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from frf_ipz.dofs import parse_dof
-from frf_ipz.report.structure_drawing import Marks, draw_structure
+from frf_ipz.plotting.picture import Labels
+from frf_ipz.plotting.structure import StructureMarks, describe_structure
 from frf_ipz.structure import Geometry
 
-MARKS = Marks(
+MARKS = StructureMarks(
     sensors=(parse_dof("3:+z"),), inputs=(parse_dof("2:-z"),), points=(parse_dof("1:+z"),), missing={2: "added mass"}
 )
 
@@ -22,51 +23,51 @@ def frame():
     )
 
 
-def trace(picture, name):
-    return next(item for item in picture.traces if item["name"] == name)
+def layer(picture, name):
+    return next(layer for layer in picture.layers if layer.name == name)
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("sensor", (1, 2)), ("input", (1, 0)), ("point of interest", (0, 0)), ("support", (0, 0))]
+    ("name", "position"), [("sensor", (1, 2)), ("input", (1, 0)), ("point of interest", (0, 0)), ("support", (0, 0))]
 )
-def test_marks_stand_at_their_nodes(frame, name, place):
-    mark = trace(draw_structure(frame, MARKS), name)
-    assert (mark["x"][0], mark["y"][0]) == place
+def test_marks_stand_at_their_nodes(frame, name, position):
+    mark = layer(describe_structure(frame, MARKS), name)
+    assert (mark.x[0], mark.y[0]) == position
 
 
 def test_what_is_missing_is_ringed_and_named(frame):
-    mark = trace(draw_structure(frame, MARKS), "missing in the model")
-    assert (mark["x"][0], mark["y"][0]) == (1, 0)
-    assert mark["text"] == ["added mass"]
+    mark = layer(describe_structure(frame, MARKS), "missing in the model")
+    assert (mark.x[0], mark.y[0]) == (1, 0)
+    assert mark.texts == ["added mass"]
 
 
 def test_lines_join_the_nodes_they_name(frame):
-    body = trace(draw_structure(frame, MARKS), "structure")
-    np.testing.assert_array_equal(body["x"], [0, 1, np.nan, 1, 1, np.nan])
-    np.testing.assert_array_equal(body["y"], [0, 0, np.nan, 0, 2, np.nan])
+    body = layer(describe_structure(frame, MARKS), "structure")
+    np.testing.assert_array_equal(body.x, [0, 1, np.nan, 1, 1, np.nan])
+    np.testing.assert_array_equal(body.y, [0, 0, np.nan, 0, 2, np.nan])
 
 
 def test_a_beam_is_drawn_as_a_line_with_its_positions(frame):
     beam = Geometry(
         nodes=frame.nodes, coordinates_m=np.eye(3) * 0 + [[0, 0, 0], [0.5, 0, 0], [1.5, 0, 0]], lines=frame.lines
     )
-    picture = draw_structure(beam, MARKS)
-    assert picture.layout["xaxis"]["title"]["text"] == "Position, m"
-    assert trace(picture, "sensor")["x"][0] == 1.5
+    picture = describe_structure(beam, MARKS)
+    assert picture.x.title == "Position, m"
+    assert layer(picture, "sensor").x[0] == 1.5
 
 
 def test_without_a_model_nodes_stand_in_a_row():
-    picture = draw_structure(None, MARKS)
-    assert trace(picture, "sensor")["x"][0] == 3
+    picture = describe_structure(None, MARKS)
+    assert layer(picture, "sensor").x[0] == 3
     assert "by their numbers" in picture.note
 
 
 def test_without_anything_nothing_is_drawn():
-    assert draw_structure(None, Marks()) is None
+    assert describe_structure(None, StructureMarks()) is None
 
 
 def test_the_drawing_is_described_in_words(frame):
-    alt = draw_structure(frame, MARKS).alt
+    alt = describe_structure(frame, MARKS).alt
     for words in ("3 nodes", "node 1 clamped", "sensors at 3:+z", "inputs at 2:-z", "added mass at node 2"):
         assert words in alt
 
@@ -85,10 +86,8 @@ def test_labels_that_would_cover_each_other_are_written_side_by_side(nodes, labe
     beam = Geometry(
         nodes=np.arange(1, 101), coordinates_m=along, lines=np.stack([np.arange(1, 100), np.arange(2, 101)], 1)
     )
-    picture = draw_structure(beam, Marks(sensors=tuple(parse_dof(f"{node}:+z") for node in nodes)))
-    words = next(item for item in picture.traces if item["mode"] == "text")
-    assert list(words["text"]) == labels
+    picture = describe_structure(beam, StructureMarks(sensors=tuple(parse_dof(f"{node}:+z") for node in nodes)))
+    words = next(layer for layer in picture.layers if isinstance(layer, Labels))
+    assert list(words.texts) == labels
     joined = [node for node in nodes if str(node) in labels[-1]]
-    np.testing.assert_allclose(
-        words["x"][-1], (along[nodes[-1] - 1, 0] + along[joined[0] - 1, 0]) / 2, rtol=1e-12, atol=0
-    )
+    np.testing.assert_allclose(words.x[-1], (along[nodes[-1] - 1, 0] + along[joined[0] - 1, 0]) / 2, rtol=1e-12, atol=0)

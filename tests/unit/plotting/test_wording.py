@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.report.wording import counted, listed, number, percent, small_percent, with_error
+from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent, with_error
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,55 @@
-"""Arrays and pictures as JSON: every array once for the whole page, as single-precision bytes in base64."""
+"""What the page's script draws from: pictures as JSON, every array once for the whole page.
+
+Arrays are single-precision bytes in base64.
+"""
 
 from __future__ import annotations
 
 import base64
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.plotting.picture import frequency_axis
+from frf_ipz.report.plotly_drawing import draw_picture
+from frf_ipz.report.section import pictures_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.report.section import Section
+    from frf_ipz.runs.contents import RunContents
+
 LEAST_PACKED = 24  # shorter arrays are written as numbers
 DIGITS = 8  # of numbers that are written: single precision, as the packed ones
+
+
+def page_data(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
+    """Give what the page's script draws from.
+
+    Parameters
+    ----------
+    run : RunContents
+        What the run holds.
+    sections : sequence of Section
+        With the pictures.
+
+    Returns
+    -------
+    dict
+        What JSON can hold.
+    """
+    packer = Packer()
+    pictures = {picture.name: packer.pack(draw_picture(picture)) for picture in pictures_of(sections)}
+    frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
+    return {
+        "pictures": pictures,
+        "hiddenFrfs": run.hidden_frfs,
+        "frequencyScale": frequency_axis(*run.band_hz).scale,
+        "lowestHz": min([1.0, *frequencies]),
+        "arrays": packer.arrays,
+    }
 
 
 @dataclass(kw_only=True, eq=False)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from frf_ipz.dofs import Dof
+from frf_ipz.prediction.reference import measured_at
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.report.reference import measured_at
 from synthetic_run import synthetic_folder
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.fe.response import model_frfs
-from frf_ipz.plotting.targets import Target, target_rows
 from frf_ipz.structure import Geometry
+from frf_ipz.updating.targets import Target, target_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

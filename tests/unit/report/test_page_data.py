@@ -4,7 +4,7 @@ import base64
 
 import numpy as np
 
-from frf_ipz.report.packing import Packer
+from frf_ipz.report.page_data import Packer
 
 SINGLE = 2e-7  # relative rounding of single precision
 

@@ -1,0 +1,520 @@
+"""Pictures on the page: a description as traces and a layout for plotly.js.
+
+Colours are names (``@measured``, ``@updated/0.2`` with an opacity) that the page turns into colours of the light or the
+dark theme. Of long curves the page gets what a screen can show: peaks and notches stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import singledispatch
+from string import Formatter
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.plotting.curves import N_COLOURS
+from frf_ipz.plotting.picture import (
+    Areas,
+    Axis,
+    Band,
+    Bars,
+    Colour,
+    HeatMap,
+    Labels,
+    Layer,
+    Line,
+    Panel,
+    Picture,
+    Points,
+    Role,
+    Span,
+    VerticalLines,
+    joined_segments,
+    legend_layers,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Trace: TypeAlias = "dict[str, Any]"
+
+GAP = 0.06  # of the height, between panels
+GAP_BESIDE = 0.08  # of the width
+POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 100 FRFs below 10 MB
+BINS = (150, 1200)  # of one curve: the fewest that still look like it, and as many as a screen has columns
+LOGARITHMIC = 0.35  # of the bins are spread evenly over the logarithm of the frequency, the others over the frequency
+MOST_CELLS = 240  # of a map in which the numbers are written
+BESIDE_NAMES_PX = {"x": 30, "y": 10}  # from names of categories to the title of their axis
+BLUE_TO_ORANGE = [[0.0, "#0072b2"], [0.5, "#f2f2f2"], [1.0, "#d55e00"]]
+SYMBOLS = {"cross": "x", "tick": "line-ns"}
+THIN_SYMBOLS = {"cross": "x-thin"}
+SIDES = {"above": "top", "below": "bottom"}
+FIELDS = {"x": "x", "y": "y", "text": "text", "value": "customdata"}
+ALWAYS_CLEAR = {"marker": {"opacity": 1.0}}  # points outside a range that is chosen stay as clear as they were
+
+
+def draw_picture(picture: Picture) -> dict[str, Any]:
+    """Draw a picture for plotly.js.
+
+    Parameters
+    ----------
+    picture : Picture
+        The description.
+
+    Returns
+    -------
+    dict
+        ``data``, the traces, with NumPy arrays; and ``layout``, without what the theme of the page adds.
+    """
+    named = {id(layer) for layer in legend_layers(picture)} if picture.has_legend else set()
+    traces: list[Trace] = []
+    for index, panel in enumerate(picture.panels):
+        chosen = _thinned_points(panel)
+        is_beside = panel.x is not None
+        drawn = [(layer, _number("y", 0 if is_beside else index)) for layer in panel.layers]
+        if panel.backdrop is not None:
+            drawn.insert(0, (panel.backdrop, _number("y", len(picture.panels) + index)))
+        for layer, y in drawn:
+            for trace in _draw(_thinned(layer, chosen.get(id(layer))), panel):
+                axes = {"xaxis": _number("x", index if is_beside else 0), "yaxis": y}
+                traces.append(_with_common(trace, layer, named, axes))
+    return {"data": traces, "layout": _layout(picture, has_legend=bool(named))}
+
+
+def thin(x: FloatArray, curves: Sequence[FloatArray], n_bins: int) -> IntArray:
+    """Choose the points to draw: of every bin those with the smallest and the largest value of each curve.
+
+    Bins are narrow at low frequencies too, so that the choice serves linear and logarithmic axes equally well.
+
+    Parameters
+    ----------
+    x : (n_points,) array
+        Ascending: frequencies, times.
+    curves : sequence of (n_points,) array
+        What is drawn, as it is drawn: the logarithm of a magnitude on a logarithmic axis. NaN counts as no value.
+    n_bins : int
+        About twice as many points are kept of each curve.
+
+    Returns
+    -------
+    (n_thinned,) int array
+        Points to draw, ascending; all of them where there are few.
+
+    Examples
+    --------
+    >>> f = np.arange(10_000.0)
+    >>> peak = np.where(f == 7_777, 1.0, 0.0)
+    >>> lines = thin(f, [peak], 100)
+    >>> 7_777 in lines, len(lines) <= 202
+    (True, True)
+    """
+    if len(x) <= 2 * n_bins:
+        return np.arange(len(x))
+    starts = _bin_starts(x, n_bins)
+    points = [np.zeros(1, int)]  # the last point is a bin of its own
+    for curve in curves:
+        points += [_largest_of_bins(curve, starts), _largest_of_bins(-curve, starts)]
+    return np.unique(np.concatenate(points))
+
+
+def _bin_starts(x: FloatArray, n_bins: int) -> IntArray:
+    low, high = x[x > 0][0], x[-1]
+    logarithmic = int(n_bins * LOGARITHMIC)
+    edges = np.concatenate([np.geomspace(low, high, logarithmic), np.linspace(x[0], high, n_bins - logarithmic)])
+    starts = np.unique(np.searchsorted(x, np.sort(edges)))
+    return np.unique(np.concatenate([[0], starts[starts < len(x)]]))
+
+
+def _largest_of_bins(curve: FloatArray, starts: IntArray) -> IntArray:
+    values = np.where(np.isfinite(curve), curve, -np.inf)
+    largest = np.maximum.reduceat(values, starts)
+    widths = np.diff(np.append(starts, len(curve)))
+    hits = np.flatnonzero(values == np.repeat(largest, widths))
+    bins = np.searchsorted(starts, hits, side="right") - 1
+    return hits[np.unique(bins, return_index=True)[1]]
+
+
+def _thinned_points(panel: Panel) -> dict[int, IntArray]:
+    """Choose the points of each long curve of a panel; curves of one FRF that share their x are thinned together."""
+    groups: dict[tuple[int, int | None], list[Line | Points | Band]] = {}
+    for layer in (*panel.layers, *([] if panel.backdrop is None else [panel.backdrop])):
+        if isinstance(layer, Line | Points | Band) and isinstance(layer.x, np.ndarray):
+            groups.setdefault((id(layer.x), layer.frf), []).append(layer)
+    groups = {key: layers for key, layers in groups.items() if _is_a_curve(layers)}
+    chosen: dict[int, IntArray] = {}
+    for layers in groups.values():
+        curves = _curves_of(layers, is_logarithmic=panel.y.scale == "log" or layers == [panel.backdrop])
+        n_bins = int(np.clip(POINTS // (2 * len(groups) * len(curves)), *BINS))
+        points = thin(np.asarray(layers[0].x, float), curves, n_bins)
+        chosen |= {id(layer): points for layer in layers}
+    return chosen
+
+
+def _is_a_curve(layers: Sequence[Layer]) -> bool:
+    """Tell whether some layers hold a curve, all over one ascending x of which some is positive."""
+    curves = [layer for layer in layers if isinstance(layer, Line | Band)]
+    return any(len(curve.x) > 2 * BINS[0] and (np.diff(curve.x) > 0).all() and curve.x[-1] > 0 for curve in curves)
+
+
+def _curves_of(layers: Sequence[Layer], *, is_logarithmic: bool) -> list[FloatArray]:
+    values = [np.asarray(layer.y, float) for layer in layers if isinstance(layer, Line | Points)]
+    if not values:
+        values = [side for layer in layers if isinstance(layer, Band) for side in (layer.low, layer.high)]
+    if not is_logarithmic:
+        return values
+    return [np.log10(np.maximum(curve, np.finfo(float).tiny)) for curve in values]
+
+
+def _thinned(layer: Layer, points: IntArray | None) -> Layer:
+    if points is None or len(points) == len(getattr(layer, "x", points)):
+        return layer
+    names = ("x", "y", "low", "high", "deviation", "values", "texts")
+    parts = {name: getattr(layer, name, None) for name in names}
+    full = {name: part for name, part in parts.items() if part is not None and len(part)}
+    return replace(layer, **{name: _at(part, points) for name, part in full.items()})
+
+
+def _at(part: Any, points: IntArray) -> Any:  # noqa: ANN401  an array, or a list of names
+    return part[points] if isinstance(part, np.ndarray) else [part[point] for point in points]
+
+
+def _with_common(trace: Trace, layer: Layer, named: set[int], axes: dict[str, str]) -> Trace:
+    """Add what all traces have."""
+    common: Trace = {"name": _text(layer.name), **{key: name for key, name in axes.items() if name not in {"x", "y"}}}
+    is_second = trace.pop("is_second", False)
+    if is_second or id(layer) not in named:
+        common["showlegend"] = False
+    if layer.frf is not None:
+        common["meta"] = {"frf": layer.frf}
+    group = layer.group or (layer.name if isinstance(layer, Band) else "")
+    if group:
+        common["legendgroup"] = group
+    if not layer.is_shown:
+        common["visible"] = "legendonly"
+    return {**trace, **common}
+
+
+def _number(name: str, index: int) -> str:
+    return name if index == 0 else f"{name}{index + 1}"
+
+
+def _text(text: str) -> str:
+    """Text that plotly shows as it stands: it takes some tags and entities in it for markup."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\n", "<br>")
+
+
+def _texts(texts: Sequence[str]) -> list[str]:
+    return [_text(text) for text in texts]
+
+
+def _colour(colour: Colour, opacity: float = 1.0) -> str:
+    name = str(colour) if isinstance(colour, Role) else f"c{colour % N_COLOURS}"
+    return f"@{name}" if opacity == 1.0 else f"@{name}/{opacity:g}"
+
+
+def colour_name(number: int) -> str:
+    """Name the colour of the n-th curve.
+
+    Parameters
+    ----------
+    number : int
+        From 0.
+
+    Returns
+    -------
+    str
+        As the page's script takes it.
+    """
+    return _colour(number)
+
+
+def _hover(pattern: str, *, with_name: bool = True) -> Trace:
+    """Turn a hover pattern into plotly's."""
+    if not pattern:
+        return {"hoverinfo": "skip"}
+    parts = []
+    for literal, name, spec, _ in Formatter().parse(pattern):
+        parts.append(_text(literal).replace("%{", "%&#123;"))
+        if name is not None:
+            parts.append(f"%{{{FIELDS[name]}{':' if spec else ''}{spec}}}")
+    extra = "%{fullData.name}" if with_name else ""
+    return {"hovertemplate": f"{''.join(parts)}<extra>{extra}</extra>"}
+
+
+def _symbol(symbol: str, *, is_filled: bool) -> str:
+    if symbol == "tick":
+        return "line-ns-open"
+    if is_filled:
+        return SYMBOLS.get(symbol, symbol)
+    return THIN_SYMBOLS.get(symbol, f"{symbol}-open")
+
+
+def _side(side: str) -> str:
+    """Turn ``above left`` into ``top left``."""
+    height, _, across = side.partition(" ")
+    return f"{SIDES[height]} {across or 'center'}"
+
+
+@singledispatch
+def _draw(layer: Layer, panel: Panel) -> list[Trace]:
+    """Draw a layer."""
+    raise TypeError(f"{type(layer).__name__} cannot be drawn on the panel '{panel.y.title}'")
+
+
+@_draw.register(Line)
+def _(layer: Line, panel: Panel) -> list[Trace]:
+    del panel
+    colour = _colour(layer.colour, layer.opacity)
+    trace: Trace = {
+        "type": "scatter",
+        "mode": "lines+markers" if layer.symbol else "lines",
+        "x": layer.x,
+        "y": layer.y,
+        "line": {"color": colour, "width": layer.width, "dash": layer.dash},
+        **_hover(layer.hover),
+    }
+    if layer.symbol:
+        trace["marker"] = {"symbol": _symbol(layer.symbol, is_filled=True), "size": layer.size, "color": colour}
+    if len(layer.texts):
+        trace["text"] = _texts(layer.texts)
+    if layer.deviation is not None:
+        trace["error_y"] = {"type": "data", "array": layer.deviation, "thickness": 1.2, "width": 3}
+    return [trace]
+
+
+@_draw.register(Band)
+def _(layer: Band, panel: Panel) -> list[Trace]:
+    del panel
+    colour = _colour(layer.colour, layer.opacity)
+    bare = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": layer.x,
+        "line": {"width": 0, "color": colour},
+        "hoverinfo": "skip",
+    }
+    return [
+        {**bare, "y": layer.low, "is_second": True},
+        {**bare, "y": layer.high, "fill": "tonexty", "fillcolor": colour},
+    ]
+
+
+@_draw.register(Points)
+def _(layer: Points, panel: Panel) -> list[Trace]:
+    del panel
+    colour, symbol = _colour(layer.colour), _symbol(layer.symbol, is_filled=layer.is_filled)
+    marker: Trace = {"color": colour, "size": layer.size, "symbol": symbol}
+    if not layer.is_filled or layer.symbol == "tick":
+        marker["line"] = {"width": 1.8, "color": colour}
+    trace: Trace = {
+        "type": "scatter",
+        "mode": "markers+text" if layer.labels else "markers",
+        "x": _positions(layer.x),
+        "y": _positions(layer.y),
+        "marker": marker,
+        **({} if layer.opacity == 1.0 else {"opacity": layer.opacity}),
+        "unselected": ALWAYS_CLEAR,
+        **_hover(layer.hover),
+    }
+    if len(layer.texts):
+        trace["text"] = _texts(layer.texts)
+    if layer.labels:
+        trace |= {"textposition": _side(layer.labels), "textfont": {"color": colour, "size": 12.5}}
+    if layer.values is not None:
+        trace["customdata"] = layer.values
+        trace["marker"] = _shades(layer.values, layer) if layer.scale_title else marker
+    return [trace]
+
+
+def _positions(values: FloatArray | Sequence[str]) -> Any:  # noqa: ANN401  an array, or names
+    return values if isinstance(values, np.ndarray) else _texts([str(value) for value in values])
+
+
+def _shades(values: FloatArray, layer: Points) -> Trace:
+    largest = max(float(np.abs(values).max(initial=0.0)), np.finfo(float).tiny)
+    return {
+        "color": values,
+        "cmin": -largest,
+        "cmax": largest,
+        "colorscale": BLUE_TO_ORANGE,
+        "size": layer.size,
+        "colorbar": {"title": {"text": _text(layer.scale_title)}, "x": 0, "xanchor": "right", "thickness": 14},
+        "line": {"width": 0.8, "color": _colour(Role.MUTED)},
+    }
+
+
+@_draw.register(Labels)
+def _(layer: Labels, panel: Panel) -> list[Trace]:
+    del panel
+    font = {"color": _colour(layer.colour), "size": 12.5}
+    words = {"text": _texts(layer.texts), "textposition": _side(layer.side), "textfont": font}
+    return [{"type": "scatter", "mode": "text", "x": layer.x, "y": layer.y, "hoverinfo": "skip", **words}]
+
+
+@_draw.register(Areas)
+def _(layer: Areas, panel: Panel) -> list[Trace]:
+    del panel
+    x, y = (np.pad(part, ((0, 0), (0, 1)), constant_values=np.nan).ravel() for part in (layer.x, layer.y))
+    fill = {"fill": "toself", "fillcolor": _colour(layer.colour, layer.opacity)}
+    line = {"width": 1, "color": _colour(layer.colour)}
+    return [{"type": "scatter", "mode": "lines", "x": x, "y": y, "line": line, "hoverinfo": "skip", **fill}]
+
+
+@_draw.register(VerticalLines)
+def _(layer: VerticalLines, panel: Panel) -> list[Trace]:
+    low, high = panel.y.limits or (0.0, 1.0)
+    x, y = joined_segments(*(np.stack([layer.x, np.full(len(layer.x), end)], 1) for end in (low, high)))
+    line = {"width": layer.width, "dash": layer.dash, "color": _colour(layer.colour, layer.opacity)}
+    trace: Trace = {"type": "scatter", "mode": "lines", "x": x, "y": y, "line": line, **_hover(layer.hover)}
+    if len(layer.texts):
+        trace["text"] = [_text(text) for text in layer.texts for _ in range(3)]  # of both ends, and of the gap
+    return [trace]
+
+
+@_draw.register(Span)
+def _(layer: Span, panel: Panel) -> list[Trace]:
+    del layer, panel
+    return []  # a shape of the layout
+
+
+@_draw.register(Bars)
+def _(layer: Bars, panel: Panel) -> list[Trace]:
+    del panel
+    names, sizes = _texts(layer.labels), layer.sizes
+    colours = [_colour(colour, 0.7 if colour is Role.MUTED else 1.0) for colour in layer.colours]
+    trace: Trace = {
+        "type": "bar",
+        "orientation": "h" if layer.is_horizontal else "v",
+        "x": sizes if layer.is_horizontal else names,
+        "y": names if layer.is_horizontal else sizes,
+        "marker": {
+            "color": colours or _colour(layer.colour, layer.opacity),
+            "pattern": {"shape": "/" if layer.is_hatched else ""},
+        },
+        **_hover(layer.hover, with_name=layer.in_legend),
+    }
+    if len(layer.texts):
+        trace |= {"text": _texts(layer.texts), "textposition": "auto", "insidetextfont": {"color": "@paper"}}
+    if layer.values is not None:
+        trace["customdata"] = layer.values
+    return [trace]
+
+
+@_draw.register(HeatMap)
+def _(layer: HeatMap, panel: Panel) -> list[Trace]:
+    del panel
+    top = float(np.log10(layer.highest))
+    decades = np.arange(0.0, int(top) + 1)
+    is_written = layer.values.size <= MOST_CELLS
+    return [
+        {
+            "type": "heatmap",
+            "x": _texts(layer.columns),
+            "y": _texts(layer.rows),
+            "z": np.log10(np.maximum(layer.values, 1e-3)),
+            "text": [_texts(row) for row in layer.texts],
+            "texttemplate": "%{text}" if is_written else "",
+            "zmin": 0,
+            "zmax": top,
+            "colorscale": "Cividis",
+            "showscale": not is_written,
+            "colorbar": {
+                "title": {"text": _text(layer.scale_title)},
+                "tickvals": decades,
+                "ticktext": [f"{10**decade:g}" for decade in decades],
+                "thickness": 14,
+            },
+            **_hover(layer.hover, with_name=False),
+        }
+    ]
+
+
+def _layout(picture: Picture, *, has_legend: bool) -> dict[str, Any]:
+    layout: dict[str, Any] = {"showlegend": has_legend}
+    is_beside = picture.panels[0].x is not None
+    domains = _domains([panel.share for panel in picture.panels], GAP_BESIDE if is_beside else GAP)
+    for index, (panel, (start, end)) in enumerate(zip(picture.panels, domains, strict=True)):
+        y = _number("yaxis", index)
+        if panel.x is not None:
+            anchor = {"anchor": "y", "domain": [start, end]}
+            layout[_number("xaxis", index)] = {**_axis(panel.x, "x", panel), **anchor}
+            layout["yaxis"] = _axis(panel.y, "y", panel)
+        else:
+            layout[y] = {**_axis(panel.y, "y", panel), "domain": [1 - end, 1 - start]}
+        if panel.backdrop is not None:
+            layout[_number("yaxis", len(picture.panels) + index)] = {
+                "overlaying": _number("y", index),
+                "side": "right",
+                "type": "log",
+                "showgrid": False,
+                "showticklabels": False,
+                "ticks": "",
+            }
+    if not is_beside:
+        layout["xaxis"] = {
+            **_axis(picture.x, "x", picture.panels[0]),
+            "anchor": _number("y", len(picture.panels) - 1),
+        }
+    shapes = [_shade(layer) for layer in picture.layers if isinstance(layer, Span)]
+    return {**layout, "shapes": shapes} if shapes else layout
+
+
+def _domains(shares: Sequence[float], gap: float) -> list[tuple[float, float]]:
+    """Give the ends of each panel, 0 to 1, in the order of the panels."""
+    free = 1 - gap * (len(shares) - 1)
+    sizes = free * np.array(shares) / sum(shares)
+    starts = np.concatenate([[0.0], np.cumsum(sizes + gap)[:-1]])
+    return [(float(start), float(min(start + size, 1.0))) for start, size in zip(starts, sizes, strict=True)]
+
+
+def _axis(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
+    drawn: dict[str, Any] = {"title": {"text": _text(axis.title)}}
+    if not axis.is_frequency:  # the page switches those between linear and logarithmic
+        drawn["type"] = axis.scale
+    is_logarithm = axis.scale == "log" and not axis.is_frequency
+    if axis.limits is not None:
+        drawn["range"] = [float(np.log10(end)) if is_logarithm else float(end) for end in axis.limits]
+    if is_logarithm and (side == "y" or axis.tick_step is not None):
+        drawn["exponentformat"] = "power"
+    if axis.ticks is not None:
+        drawn |= {"tickvals": list(axis.ticks), "ticktext": _texts(axis.tick_labels)}
+    if axis.tick_step is not None:
+        drawn |= {"dtick": axis.tick_step, "tick0": 0}
+    if axis.tick_angle:
+        drawn["tickangle"] = axis.tick_angle
+    if axis.is_reversed:
+        drawn["autorange"] = "reversed"
+    return drawn | _frame(axis, side, panel)
+
+
+def _frame(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
+    """Lines of an axis."""
+    frame: dict[str, Any] = {"fixedrange": True} if axis.is_fixed else {}
+    if axis.is_bare:
+        frame |= {"showgrid": False, "zeroline": False, "showline": False, "ticks": "", "showticklabels": False}
+    elif side == "x" and panel.y.is_bare:
+        frame |= {"showgrid": False, "zeroline": False}
+    elif axis.has_zero_line:
+        frame["zeroline"] = True
+    if side == "y" and panel.is_to_scale:
+        frame["scaleanchor"] = "x"
+    if any(isinstance(layer, HeatMap) for layer in panel.layers):
+        frame |= {"title": {"text": _text(axis.title), "standoff": BESIDE_NAMES_PX[side]}, "ticklabelstandoff": 4}
+    return frame
+
+
+def _shade(span: Span) -> dict[str, Any]:
+    return {
+        "type": "rect",
+        "xref": "x",
+        "yref": "paper",
+        "x0": span.low,
+        "x1": span.high,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": _colour(span.colour, span.opacity),
+        "line": {"width": 0},
+        "layer": "below",
+    }
