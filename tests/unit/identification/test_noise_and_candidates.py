@@ -23,9 +23,8 @@ def test_noise_under_a_sharp_peak():
     level = np.where(LINES_HZ > 500, 3.0, 1.0)
     variance = rough_variance((peak + level * white(len(S), 1))[:, None])[:, 0]
     for part in (slice(100, 1800), slice(2300, 4000)):
-        assert np.median(variance[part]) == pytest.approx(
-            2 * level[part][0] ** 2, rel=0.15
-        )  # of 40 blocks with 20 % each
+        # of 40 blocks with 20 % each
+        assert np.median(variance[part]) == pytest.approx(2 * level[part][0] ** 2, rel=0.15)
 
 
 def test_noise_that_follows_the_response():

@@ -32,9 +32,8 @@ def frequencies(fit):
 def test_demo_campaign_has_its_four_modes_and_no_other():
     fit = fit_modes(frfs_of(DEMO), FitOptions(band_hz=(10.0, 700.0)))
     assert fit.n_modes == 4
-    np.testing.assert_allclose(
-        fit.model.damping_ratio[:4], DEMO_DAMPING, rtol=0.005, atol=0
-    )  # two are given as rounded
+    # two are given as rounded
+    np.testing.assert_allclose(fit.model.damping_ratio[:4], DEMO_DAMPING, rtol=0.005, atol=0)
     assert fit.noise_from == "recordings"
     assert fit.warnings == ()
     assert list(fit.modes["quality"]) == ["good"] * 4

@@ -75,9 +75,8 @@ def test_zeros_come_with_their_spread():
     prediction = predict_frfs(updated(model, spread(model, 0.004)), POINTS, LABELS, LINES)
     assert prediction.zeros.identifiable.all()
     assert len(prediction.zeros.values) > 2
-    assert_allclose(
-        prediction.zero_std[:, 1], 0.002 * np.abs(prediction.zeros.values), rtol=0.35
-    )  # of a hundred members
+    # of a hundred members
+    assert_allclose(prediction.zero_std[:, 1], 0.002 * np.abs(prediction.zeros.values), rtol=0.35)
     s = prediction.zeros.values
     for index, value in enumerate(s):
         frf_label = prediction.labels[prediction.zeros.frf[index]]
