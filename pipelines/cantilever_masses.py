@@ -97,18 +97,18 @@ def read_frf(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def build(common: Common, layout: np.ndarray, *, exact: bool = False) -> tuple[frf_ipz.State, dict]:
-    """Model of a layout, and the nodes of its pieces, of the blow and of the sensor.
+    """Model of a layout, and the nodes of its pieces, of the impact and of the sensor.
 
-    With `exact` each mass is shared by the two nodes beside it, so that frequencies follow its place smoothly.
+    With `exact` each mass is shared by the two nodes beside it, so that frequencies follow its position smoothly.
     """
     length = FREE_LENGTH_M + common.in_clamp_m
     beam_kg = 7850.0 * WIDTH_M * 4.75e-3 * FREE_LENGTH_M
-    locations = [(x + common.to_middle_m + common.in_clamp_m) / length * ELEMENTS for x in layout]
+    positions = [(x + common.to_middle_m + common.in_clamp_m) / length * ELEMENTS for x in layout]
     sensor = (SENSOR_M + common.in_clamp_m) / length * ELEMENTS
     text = BEAM.format(length=length, elements=ELEMENTS, modulus=common.modulus_pa, width=WIDTH_M)
-    for location, part in (*((location, common.piece) for location in locations), (sensor, common.sensor)):
-        left = min(int(location), ELEMENTS - 1) if exact else round(location)
-        for node, share in ((left, 1 - (location - left)), (left + 1, location - left)) if exact else ((left, 1.0),):
+    for position, part in (*((position, common.piece) for position in positions), (sensor, common.sensor)):
+        left = min(int(position), ELEMENTS - 1) if exact else round(position)
+        for node, share in ((left, 1 - (position - left)), (left + 1, position - left)) if exact else ((left, 1.0),):
             text += f"[[beam.point_mass]]\nnode = {node + 1}\nmass_kg = {max(share, 0) * part * beam_kg}\n"
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "model.toml"
@@ -116,7 +116,7 @@ def build(common: Common, layout: np.ndarray, *, exact: bool = False) -> tuple[f
         model = frf_ipz.read_model(path)
     struck = (STRUCK_M + common.in_clamp_m) / length * ELEMENTS
     nodes = {
-        "pieces": [1 + round(location) for location in locations],
+        "pieces": [1 + round(position) for position in positions],
         "struck": 1 + round(struck),
         "sensor": 1 + round(sensor),
     }
@@ -156,9 +156,9 @@ def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
     frequency, values = read_frf(path)
     out, struck = (frf_ipz.parse_dof(f"{nodes[name]}:+z") for name in ("sensor", "struck"))
     label = frf_ipz.FrfLabel(out, struck, frf_ipz.FrfQuantity.ACCELERANCE, "accelerometer", "hammer")
-    nuisance = np.full((len(frequency), 1), np.nan)
+    unknown = np.full((len(frequency), 1), np.nan)
     frfs = frf_ipz.FrfSet(
-        frequency_hz=frequency, values=values[:, None], labels=(label,), variance=nuisance, coherence=nuisance,
+        frequency_hz=frequency, values=values[:, None], labels=(label,), variance=unknown, coherence=unknown,
         averages=np.zeros(1, int), unknown_scale="common",
     )  # fmt: skip
     return frf_ipz.State(
@@ -196,7 +196,7 @@ def compare_all(folder: Path, step: int) -> tuple[pd.DataFrame, pd.DataFrame, Co
                     "verdict": found.diagnosis.verdict,
                     "what": first.statement if first else "",
                     "misfit": found.diagnosis.numbers["null_misfit"],
-                    "pull": found.diagnosis.numbers["null_nuisance_chi2"],
+                    "nuisance_chi2": found.diagnosis.numbers["null_nuisance_chi2"],
                 }
             )
             together += [{"state": name, "layout": one + 1, **row} for row in weigh(found, models[one][1]["pieces"])]

@@ -87,7 +87,7 @@ def main(folder: Path, out: Path) -> None:
     model = frf_ipz.read_model(folder / "model.toml")
     frfs = replace(frf_ipz.estimate_frfs(test, options=frf_ipz.IngestOptions()).frfs, unknown_scale=case.scale)
     frfs = with_drift(frfs.select_lines(frfs.in_band(case.band_hz)), case.drift)
-    kept = [location for location, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
+    kept = [index for index, label in enumerate(frfs.labels) if label.output_dof.node != case.left_out]
     fits, problem = find_components(frfs.select_frfs(kept), model, case)
     for fit in (fits[0], fits[-1]):
         print(where_it_is(problem, fit).to_string(float_format="{:.2f}".format))
