@@ -30,10 +30,10 @@ def compare(run: frf_ipz.Results) -> pd.DataFrame:
     """Agreement with the FRFs kept aside: nominal, with measured poles on nominal shapes, updated."""
     prediction, nominal = run.prediction, run.updated_model.nominal
     s = 2j * np.pi * prediction.frequency_hz
-    shifted = frf_ipz.with_measured_poles(nominal, run.pairs)
+    shifted = frf_ipz.shift_to_measured_poles(run.pairs, nominal)
     models = {
         "before updating": prediction.nominal,
-        "measured poles, nominal shapes": frf_ipz.model_frfs(shifted, prediction.labels, s),
+        "measured poles, nominal shapes": frf_ipz.compute_frfs(shifted, prediction.labels, s),
         "after updating": prediction.values,
     }
     truth = true_frfs(prediction.labels, prediction.frequency_hz)

@@ -96,7 +96,7 @@ def read_frf(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return frequency[inside], values[inside]
 
 
-def build(common: Common, layout: np.ndarray, *, exact: bool = False) -> tuple[frf_ipz.State, dict]:
+def build(common: Common, layout: np.ndarray, *, exact: bool = False) -> tuple[frf_ipz.MachineState, dict]:
     """Model of a layout, and the nodes of its pieces, of the impact and of the sensor.
 
     With `exact` each mass is shared by the two nodes beside it, so that frequencies follow its position smoothly.
@@ -152,7 +152,7 @@ def calibrate(folder: Path, layouts: np.ndarray, chosen: list[int]) -> Common:
     return Common(*(start * np.exp(fit.x * spread)))
 
 
-def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
+def state_of(path: Path, model: frf_ipz.MachineState, nodes: dict) -> frf_ipz.MachineState:
     frequency, values = read_frf(path)
     out, struck = (frf_ipz.parse_dof(f"{nodes[name]}:+z") for name in ("sensor", "struck"))
     label = frf_ipz.FrfLabel(out, struck, frf_ipz.FrfQuantity.ACCELERANCE, "accelerometer", "hammer")
@@ -161,7 +161,7 @@ def state_of(path: Path, model: frf_ipz.State, nodes: dict) -> frf_ipz.State:
         frequency_hz=frequency, values=values[:, None], labels=(label,), variance=unknown, coherence=unknown,
         averages=np.zeros(1, int), unknown_scale="common",
     )  # fmt: skip
-    return frf_ipz.State(
+    return frf_ipz.MachineState(
         model=model, observed=Observations(kind="frf", records=(), band_hz=BAND_HZ, frfs=frfs, exclude_hz=SUPPORT_HZ)
     )
 

@@ -22,8 +22,8 @@ import pandas as pd
 from scipy.linalg import block_diag, solve_continuous_are
 
 import frf_ipz
-from frf_ipz.export.state_space import to_ensemble
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.updated_model import UpdatedModel
 
 HERE = Path(__file__).parent
@@ -55,12 +55,12 @@ class Plant(NamedTuple):
 def main(out: Path) -> None:
     run = frf_ipz.run_pipeline(HERE / "poi_controller.toml", out, until="pair")
     fit, updated = run.fit, update(run)
-    real, members = true_plant(), plants_of_ensemble(updated, fit.labels)
+    real, members = true_plant(), plants_of_ensemble(updated, fit)
     nominal = replace(updated, model=updated.nominal)
     designs = {
-        "updated model": (plant_of(updated, fit.labels, POINT), members),
-        "nominal model": (plant_of(nominal, fit.labels, POINT), []),
-        "sensor only": (plant_of(updated, fit.labels, SENSOR), members),
+        "updated model": (plant_of(updated, fit, POINT), members),
+        "nominal model": (plant_of(nominal, fit, POINT), []),
+        "sensor only": (plant_of(updated, fit, SENSOR), members),
     }
     rows = {name: judge(strongest(*design), design[0], real) for name, design in designs.items()}
     print(pd.DataFrame(rows).T.to_string(float_format="{:.3g}".format))
@@ -68,25 +68,28 @@ def main(out: Path) -> None:
 
 def update(run: frf_ipz.Results) -> UpdatedModel:
     """Update with parts, masses and the sensor's own mass: the demo's accelerometer is not in its model."""
-    fit, reduced, pairs = (run.load(stage) for stage in ("fit", "reduce", "pair"))
+    fit, reduced, pairs = run.fit, run.reduced_model, run.pairs
     full = frf_ipz.read_model(HERE.parent / "data" / "raw" / "cantilever" / "model.toml")
-    basis = structural_basis(full, reduced, mass=True, sensors=[frf_ipz.parse_dof(SENSOR)])
-    return frf_ipz.update_model(reduced, fit, pairs, basis=basis)
+    basis = make_structural_basis(full, reduced, mass=True, sensors=[frf_ipz.parse_dof(SENSOR)])
+    return frf_ipz.update_model(fit, reduced, pairs=pairs, basis=basis)
 
 
-def plant_of(updated: UpdatedModel, labels: tuple[frf_ipz.FrfLabel, ...], quiet: str) -> Plant:
+def plant_of(updated: UpdatedModel, fit: frf_ipz.ModalFit, quiet: str) -> Plant:
     """Take the plant out of two exports of one model: sensors as they measure, and velocities."""
     points = (frf_ipz.parse_dof(POINT),)
-    measured = frf_ipz.to_state_space(updated, labels, points)
-    velocities = frf_ipz.to_state_space(updated, labels, points, frf_ipz.ExportOptions(outputs="velocity"))
+    measured = make_state_space(fit, updated, points=points)
+    velocities = make_state_space(fit, updated, points=points, options=frf_ipz.ExportOptions(outputs="velocity"))
     return with_filter(measured, velocities, quiet)
 
 
-def plants_of_ensemble(updated: UpdatedModel, labels: tuple[frf_ipz.FrfLabel, ...]) -> list[Plant]:
+def plants_of_ensemble(updated: UpdatedModel, fit: frf_ipz.ModalFit) -> list[Plant]:
     """Do the same with members of the posterior."""
     both = (
-        to_ensemble(
-            updated, labels, (frf_ipz.parse_dof(POINT),), frf_ipz.ExportOptions(outputs=kind, ensemble=ENSEMBLE)
+        make_state_space_ensemble(
+            fit,
+            updated,
+            points=(frf_ipz.parse_dof(POINT),),
+            options=frf_ipz.ExportOptions(outputs=kind, ensemble=ENSEMBLE),
         )
         for kind in ("measured", "velocity")
     )

@@ -18,7 +18,7 @@ import pandas as pd
 
 import frf_ipz
 from frf_ipz.arrays import ComplexArray
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 
 
 def main(test: Path, model: Path, band_hz: tuple[float, float], side: str, nodes: list[int]) -> None:
@@ -37,19 +37,19 @@ def leave_out(frfs: frf_ipz.FrfSet, full: object, band_hz: tuple[float, float], 
     places = range(len(frfs.labels))
     out = [place for place in places if _node(frfs.labels[place], side) == node]
     rest = frfs.select_frfs([place for place in places if place not in out])
-    fit = frf_ipz.fit_modes(rest, frf_ipz.FitOptions(band_hz=band_hz))
+    fit = frf_ipz.fit_modes(rest, options=frf_ipz.FitOptions(band_hz=band_hz))
     ends = {"actuators": frfs.input_dofs, "sensors": frfs.output_dofs}
-    reduced = frf_ipz.reduce_model(full, frf_ipz.ReduceOptions(), points=(), band_hz=fit.band_hz, **ends)
-    pairs = frf_ipz.pair(fit, reduced)
-    updated = frf_ipz.update_model(reduced, fit, pairs, basis=structural_basis(full, reduced))
+    reduced = frf_ipz.reduce_to_dofs(full, options=frf_ipz.ReduceOptions(), points=(), band_hz=fit.band_hz, **ends)
+    pairs = frf_ipz.pair_roots(fit, reduced)
+    updated = frf_ipz.update_model(fit, reduced, pairs=pairs, basis=make_structural_basis(full, reduced))
     left_out = frfs.select_frfs(out).select_lines(frfs.in_band(band_hz))
     models = {
         "nominal": reduced,
-        "measured poles, nominal shapes": frf_ipz.with_measured_poles(reduced, pairs),
+        "measured poles, nominal shapes": frf_ipz.shift_to_measured_poles(pairs, reduced),
         "updated": updated.model,
     }
     rows = {
-        name: judge(left_out.values, frf_ipz.model_frfs(each, left_out.labels, left_out.s))
+        name: judge(left_out.values, frf_ipz.compute_frfs(each, left_out.labels, left_out.s))
         for name, each in models.items()
     }
     return pd.DataFrame(rows).T.assign(status=updated.status.name, targets=len(pairs.targets))

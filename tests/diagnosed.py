@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.observations import Observations
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.model_file import read_model
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.quantities import FrfQuantity
 
@@ -96,7 +96,7 @@ def measured(model, names=None, *, seed=0, factors=None, n_lines=1400, band_hz=B
     """FRFs of a model with noise; factors multiply them, as a measuring chain does."""
     names = names or labels()
     frequency = np.linspace(*band_hz, n_lines)
-    exact = model_frfs(model, names, 2j * np.pi * frequency) * (1.0 if factors is None else factors(frequency))
+    exact = compute_frfs(model, names, 2j * np.pi * frequency) * (1.0 if factors is None else factors(frequency))
     scale = noise * np.median(np.abs(exact), axis=0)
     drawn = np.random.default_rng(seed).standard_normal((2, *exact.shape))
     return FrfSet(

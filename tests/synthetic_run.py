@@ -13,17 +13,18 @@ import pandas as pd
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.diagnosis.result import Ambiguity, Curves, DataCheck, Diagnosis, Estimate, Finding, LawInTime, Misfit
 from frf_ipz.dofs import Dof
-from frf_ipz.export.state_space import to_state_space
+from frf_ipz.export.state_space import make_state_space
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
-from frf_ipz.pairing.pair import pair
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.random_structures import draw_beam, draw_stiffness_errors, scale_stiffness
 from frf_testbench.updating.synthetic_fit import TrueModes, choose_band, list_labels, simulate_fit
+from measured_labels import measured
 
 NOISE = 0.002
 SEED = 3
@@ -75,17 +76,17 @@ def synthetic_results():
     fit = simulate_fit(truth, labels, band, noise=NOISE, rng=rng)
     recordings = recordings_of(truth, labels, band, rng)
     fit = with_tables(replace(fit, used_lines=recordings.frfs.in_band(band)), recordings.frfs)
-    reduced = reduce_model(
+    reduced = reduce_to_dofs(
         nominal,
-        ReduceOptions(),
+        options=ReduceOptions(),
         actuators=input_dofs,
         sensors=sensors,
         points=points,
         band_hz=band,
         default_damping_ratio=0.003,
     )
-    pairs = pair(fit, reduced)
-    updated = replace(update_model(reduced, fit, pairs), parts=parts_of(nominal))
+    pairs = pair_roots(fit, reduced)
+    updated = replace(update_model(fit, reduced, pairs=pairs), parts=parts_of(nominal))
     lines = recordings.frfs.frequency_hz[fit.used_lines]
     return {
         "ingest": recordings,
@@ -93,8 +94,8 @@ def synthetic_results():
         "reduce": reduced,
         "pair": pairs,
         "update": updated,
-        "predict": predict_frfs(updated, points, labels, lines),
-        "export": to_state_space(updated, labels, points),
+        "predict": predict_frfs(measured(labels), updated, points=points, frequency_hz=lines),
+        "export": make_state_space(measured(labels), updated, points=points),
         "model": nominal,
         "reference": reference_of(truth, points, input_dofs, lines),
     }

@@ -6,7 +6,7 @@ The one container that leaves ingest, and the only measured data that fitting, p
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -56,6 +56,22 @@ class FrfLabel:
     def sign(self) -> int:
         """Product of the signs of sensor and excitation: the model's FRF times this is the measured one."""
         return self.output_dof.sign * self.input_dof.sign
+
+
+class Measured(Protocol):
+    """What says which FRFs were measured, and where: a `FrfSet`, or the `ModalFit` of one."""
+
+    @property
+    def labels(self) -> tuple[FrfLabel, ...]:
+        """What each FRF connects."""
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Frequency lines, (n_lines,) array, Hz."""
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency, Hz."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,6 +221,11 @@ class FrfSet:
     def n_lines(self) -> int:
         """Number of frequency lines."""
         return len(self.frequency_hz)
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency line, Hz."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
 
     @property
     def n_frfs(self) -> int:

@@ -14,7 +14,7 @@ from brick_plate import plate_matrices
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.structure import Geometry, StructuralModel
 
 ELEMENT_M, THICKNESS_M, LAYERS = 5e-3, 6e-3, 3
@@ -75,5 +75,7 @@ def test_default_against_plain_eigsh(benchmark):
 def test_reduction_of_a_plate(benchmark):
     model = plate(*PLATES["1.5e4"])
     ends = {"actuators": [Dof(1, "z")], "sensors": [Dof(31, "z"), Dof(700, "z")], "points": [Dof(900, "z")]}
-    found = benchmark.pedantic(lambda: reduce_model(model, ReduceOptions(), band_hz=(100.0, 3000.0), **ends), rounds=1)
+    found = benchmark.pedantic(
+        lambda: reduce_to_dofs(model, options=ReduceOptions(), band_hz=(100.0, 3000.0), **ends), rounds=1
+    )
     assert len(found.dofs) > 10

@@ -79,7 +79,7 @@ def test_against_sdypy(benchmark, truth_sets, name):
     lines = measured_lines(frfs, options)
     poles = cpu_seconds(lambda: find_start_poles(frfs, lines))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    whole = cpu_seconds(lambda: fit_modes(frfs, options))
+    whole = cpu_seconds(lambda: fit_modes(frfs, options=options))
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     benchmark.extra_info.update(
         peer_cpu_s=peer, peer_chosen_cpu_s=chosen, poles_cpu_s=poles, whole_cpu_s=whole, memory_mb=memory
@@ -111,7 +111,7 @@ def test_against_auto_fit(benchmark, truth_sets):
         fitting.VectorFitting(network).auto_fit(enforce_dc=False)
     peer = time.process_time() - start
     frfs = of_bench(truth)
-    ours = cpu_seconds(lambda: fit_modes(frfs, FitOptions()))
+    ours = cpu_seconds(lambda: fit_modes(frfs, options=FitOptions()))
     benchmark.extra_info.update(peer_cpu_s=peer, ours_cpu_s=ours)
     print(f"\nset b: whole fit {ours:.3f} s, scikit-rf's auto_fit {peer:.2f} s of CPU: {peer / ours:.0f} times faster")
     benchmark.pedantic(lambda: None, rounds=1)

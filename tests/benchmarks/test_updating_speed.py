@@ -11,7 +11,7 @@ from scipy.linalg import lapack
 
 from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.paper_cases import build_section_4
 from frf_testbench.updating.study import make_update_case
@@ -38,10 +38,12 @@ def order_12():
 
 def test_minimal_change(benchmark):
     case = order_12()
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
     update = {
-        "with its ensemble of 200": lambda: update_model(case.reduced_model, case.fit, case.pairs, basis=basis),
-        "alone": lambda: update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(ensemble=0), basis=basis),
+        "with its ensemble of 200": lambda: update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis),
+        "alone": lambda: update_model(
+            case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(ensemble=0), basis=basis
+        ),
     }
     found = {name: cpu_us(work, 5) / 1e3 for name, work in update.items()}
     print("\n" + ", ".join(f"{name} {ms:.1f} ms" for name, ms in found.items()) + f" (at most {UPDATE_MS} ms)")

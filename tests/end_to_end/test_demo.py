@@ -75,7 +75,7 @@ def test_the_model_file_holds_matrices_and_dofs(run):
 
 def test_the_state_space_reproduces_the_prediction(run):
     prediction = run.prediction
-    system = frf_ipz.load_state_space(run.path / "statespace.json")
+    system = frf_ipz.read_state_space(run.path / "statespace.json")
     label = prediction.labels[0]
     output = next(index for index, name in enumerate(system.output_labels) if str(label.output_dof) in name)
     struck = next(index for index, name in enumerate(system.input_labels) if str(label.input_dof) in name)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.cli import main as command
-from frf_ipz.export.state_space_files import load_ensemble, load_state_space, read_weights
+from frf_ipz.export.state_space_files import read_ensemble, read_state_space, read_uncertainty_weights
 from frf_ipz.report.findings import typeset
 from frf_ipz.runs.results import open_results
 from small_campaign import write_campaign
@@ -60,8 +60,11 @@ def test_the_ensemble_is_written_when_it_is_asked_for_and_goes_with_its_option(p
     try:
         pipeline.write_text(text + "[export]\nensemble = 4\n")
         stage(monkeypatch, "export", pipeline, out)
-        members, weights = load_ensemble(out / "statespace_ensemble.mat"), read_weights(out / "uncertainty.json")
-        model = load_state_space(out / "statespace.mat")
+        members, weights = (
+            read_ensemble(out / "statespace_ensemble.mat"),
+            read_uncertainty_weights(out / "uncertainty.json"),
+        )
+        model = read_state_space(out / "statespace.mat")
         assert len(members) == 4
         s = 2j * np.pi * weights.frequency_hz
         spread = np.abs(np.array([member(s)[0, 0] for member in members]) / model(s)[0, 0] - 1)
@@ -86,7 +89,7 @@ def test_a_delay_that_was_fitted_is_in_the_state_space_when_asked_for(tmp_path, 
     text = pipeline.read_text().replace("[fit]", "[fit]\ndelay = true")
     pipeline.write_text(text + "[export]\npade_order = 1\n")
     stage(monkeypatch, "export", pipeline, tmp_path / "out")
-    model = load_state_space(tmp_path / "out" / "statespace.json")
+    model = read_state_space(tmp_path / "out" / "statespace.json")
     row = model.state_labels.index("delay of 21:+z 1")
     assert abs(-2 / model.A[row, row] - DELAY) < LATE
 

@@ -24,7 +24,7 @@ TABLE_5 = (
 
 
 def updated(case, options):
-    return update_model(case.reduced_model, case.fit, case.pairs, options)
+    return update_model(case.fit, case.reduced_model, pairs=case.pairs, options=options)
 
 
 @pytest.fixture(scope="module")

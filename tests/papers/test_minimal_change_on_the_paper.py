@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from frf_ipz.prediction.agreement import with_measured_poles
+from frf_ipz.prediction.agreement import shift_to_measured_poles
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.paper_cases import build_section_4, build_section_5
@@ -23,8 +23,8 @@ PRINTED = 1e-4  # of the targets of table 5, which have three digits and contrad
 @pytest.fixture(scope="module", params=["any stiffness", "elements"])
 def update(request):
     case = build_section_4()
-    basis = structural_basis(case.full_model, case.reduced_model) if request.param == "elements" else None
-    return case, update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(), basis=basis)
+    basis = make_structural_basis(case.full_model, case.reduced_model) if request.param == "elements" else None
+    return case, update_model(case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(), basis=basis)
 
 
 def test_it_converges_in_five_iterations(update):
@@ -69,7 +69,7 @@ def test_it_beats_the_trivial_answer_in_db_and_zeros_and_so_does_the_table():
 
 def test_the_trivial_answer_has_the_measured_poles():
     case = build_section_4()
-    trivial = with_measured_poles(case.reduced_model, case.pairs)
+    trivial = shift_to_measured_poles(case.pairs, case.reduced_model)
     values = np.linalg.eigvals(np.linalg.solve(trivial.mass, trivial.stiffness)).real
     assert_allclose(np.sqrt(np.sort(values)[:4]), np.abs(case.targets[:4]), rtol=1e-9)
 
@@ -77,6 +77,6 @@ def test_the_trivial_answer_has_the_measured_poles():
 @pytest.mark.parametrize("excited", ["88:z", "89:z"])
 def test_it_meets_the_targets_of_section_5(excited):
     case = build_section_5(excited)
-    updated = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions())
+    updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions())
     assert updated.status is UpdateStatus.CONVERGED
     assert_allclose(updated.after.imag, case.targets.imag, rtol=PRINTED)

@@ -15,8 +15,8 @@ from fe_models import beam
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.kinds.beam import BeamSection
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
-from frf_ipz.fe.response import model_frfs, model_poles
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
+from frf_ipz.fe.response import compute_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.quantities import FrfQuantity
@@ -47,7 +47,7 @@ def properties(number):
 def reduced(model, dofs, residual, actuator, sensor, point, band_hz):
     options = ReduceOptions(modes=5, dofs=tuple(dofs), residual_flexibility=(residual,))
     ends = {"actuators": [parse_dof(actuator)], "sensors": [parse_dof(sensor)], "points": [parse_dof(point)]}
-    return reduce_model(model, options, band_hz=band_hz, **ends)
+    return reduce_to_dofs(model, options=options, band_hz=band_hz, **ends)
 
 
 def zeros(model, output, excited):
@@ -102,7 +102,7 @@ def test_the_changed_beam_of_section_4_has_the_experimental_poles():
 def test_reduced_frf_of_section_4_is_that_of_the_whole_beam(section_4, pinned_sliding):
     label = FrfLabel(parse_dof("7:z"), parse_dof("3:z"), FrfQuantity.RECEPTANCE)
     s = 1j * np.linspace(40.0, 5000.0, 800)
-    whole, few = (model_frfs(model, [label], s) for model in (pinned_sliding, section_4))
+    whole, few = (compute_frfs(model, [label], s) for model in (pinned_sliding, section_4))
     assert np.linalg.norm(few - whole) < 1e-3 * np.linalg.norm(whole)
 
 
@@ -117,9 +117,9 @@ def test_poles_and_zeros_of_section_5(section_5):
 def test_reduced_poles_and_zeros_of_section_5_are_those_of_the_whole_beam(cantilever, section_5):
     assert_allclose(model_poles(section_5)[:5], model_poles(cantilever)[:5], rtol=1e-9)
     dofs = [f"{node}:z" for node in (9, 29, 49, 69, 89, 101)]
-    whole = reduce_model(
+    whole = reduce_to_dofs(
         cantilever,
-        ReduceOptions(modes=40),
+        options=ReduceOptions(modes=40),
         actuators=[parse_dof("89:z")],
         sensors=[parse_dof("101:z")],
         points=[parse_dof(dof) for dof in dofs],

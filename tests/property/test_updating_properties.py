@@ -5,12 +5,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from frf_ipz.export.state_space import to_control, to_state_space
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.export.state_space import make_state_space, to_control
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.study import make_update_case
@@ -22,8 +22,10 @@ ROUNDING = 1e-9  # of the largest value
 
 def updated(seed, *, parts, mass=False):
     case = make_update_case(seed)
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model, mass=mass) if parts else None
-    return case, update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(ensemble=5), basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model, mass=mass) if parts else None
+    return case, update_model(
+        case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(ensemble=5), basis=basis
+    )
 
 
 @EXAMPLES
@@ -48,9 +50,9 @@ def test_an_update_is_reciprocal_and_its_export_the_same_model(seed):
     first = case.labels[0]
     back = FrfLabel(first.input_dof, first.output_dof, first.quantity)
     s = 2j * np.pi * np.linspace(*case.fit.band_hz, 20)
-    forward, updated_again = model_frfs(update.model, [first, back], s).T
+    forward, updated_again = compute_frfs(update.model, [first, back], s).T
     assert np.abs(forward - updated_again).max() < ROUNDING * np.abs(forward).max()
-    exported = to_control(to_state_space(update, case.labels, case.structure.points))(s)
+    exported = to_control(make_state_space(case, update, points=case.structure.points))(s)
     row = exported.reshape(-1, exported.shape[-1])[0]
     assert np.abs(row - forward).max() < 1e-6 * np.abs(forward).max()
 
@@ -70,5 +72,5 @@ def test_units_do_not_matter(seed, factor):
         expanded_dofs=model.expanded_dofs,
         n_modes=model.n_modes,
     )
-    updated_again = update_model(in_other_units, case.fit, case.pairs, UpdateOptions(ensemble=0))
+    updated_again = update_model(case.fit, in_other_units, pairs=case.pairs, options=UpdateOptions(ensemble=0))
     assert_allclose(updated_again.after, update.after, rtol=1e-6)

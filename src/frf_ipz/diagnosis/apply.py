@@ -27,17 +27,17 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 
-def apply_to_model(
-    model: StructuralModel, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None
+def correct_model(
+    diagnosis: Diagnosis, fe_model: StructuralModel, *, effects: Mapping[str, Effect] | None = None
 ) -> StructuralModel:
     """Put the findings into the model.
 
     Parameters
     ----------
-    model : StructuralModel
-        The nominal model that was diagnosed.
     diagnosis : Diagnosis
-        Of it.
+        What the model lacks.
+    fe_model : StructuralModel
+        The nominal model that was diagnosed.
     effects : mapping of str to Effect, optional
         Those that were searched for; the shipped ones where it is left out. Needed for users' own effects.
 
@@ -46,18 +46,18 @@ def apply_to_model(
     StructuralModel
         The model with what it lacked; the same model where findings are in the measuring chain only, or none.
     """
-    return prepare_correction(model, diagnosis, effects)([finding.values for finding in diagnosis.findings])
+    return prepare_correction(diagnosis, fe_model, effects)([finding.values for finding in diagnosis.findings])
 
 
 def prepare_correction(
-    model: StructuralModel, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None
+    diagnosis: Diagnosis, model: StructuralModel, effects: Mapping[str, Effect] | None = None
 ) -> Callable[[Sequence[Sequence[float]]], StructuralModel]:
     """Prepare to put the findings into the model, for any values of their parameters.
 
     Parameters
     ----------
-    model, diagnosis, effects
-        As for `apply_to_model`.
+    diagnosis, model, effects
+        As for `correct_model`.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def _model_context(model: StructuralModel, curves: Curves) -> ModelContext:
     )
 
 
-def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effect] | None = None) -> FrfSet:
+def correct_frfs(frfs: FrfSet, diagnosis: Diagnosis, *, effects: Mapping[str, Effect] | None = None) -> FrfSet:
     """Take the findings in the measuring chain out of FRFs.
 
     Parameters
@@ -123,7 +123,7 @@ def apply_to_frfs(frfs: FrfSet, diagnosis: Diagnosis, effects: Mapping[str, Effe
     diagnosis : Diagnosis
         Of them.
     effects : mapping of str to Effect, optional
-        As for `apply_to_model`.
+        As for `correct_model`.
 
     Returns
     -------

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from frf_ipz.diagnosis.effect_selection import select_effects
+from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
 from frf_ipz.diagnosis.measured.preprocessing.residual_motion import remove_residual_motion
-from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
+from frf_ipz.diagnosis.observations import Observations, observe
+from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Ambiguity, Diagnosis
 from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 from frf_ipz.diagnosis.verdict.decision import (
@@ -49,22 +50,26 @@ from frf_ipz.diagnosis.verdict.out_of_catalogue import (
 )
 from frf_ipz.diagnosis.verdict.proof import prove
 from frf_ipz.diagnosis.verdict.unnamed_force import describe_unnamed_force, find_unnamed_force
+from frf_ipz.frf import FrfSet
+from frf_ipz.ingest.campaign import VibrationTest
+from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.evidence.fit import Data
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.linearity import Linearity
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
-    from frf_ipz.diagnosis.observations import Observations
-    from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.result import DataCheck, Finding
     from frf_ipz.diagnosis.verdict.decision import Decision
     from frf_ipz.diagnosis.verdict.findings import RankedEffect
     from frf_ipz.diagnosis.verdict.proof import Proof
+    from frf_ipz.identification.options import FitOptions
+    from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
@@ -75,25 +80,37 @@ MAX_ALTERNATIVES = 6
 
 
 def diagnose(
-    model: StructuralModel,
-    observations: Observations,
-    options: DiagnoseOptions,
+    data: VibrationTest | FrfSet | Observations,
+    fe_model: StructuralModel,
     *,
-    folder: Path = Path(),
+    frfs: FrfSet | None = None,
+    options: DiagnoseOptions | None = None,
+    effects: Sequence[Effect | Law] = (),
+    ingest: IngestOptions | None = None,
+    fit: FitOptions | None = None,
+    folder: str | Path = ".",
     progress: Progress = silent,
 ) -> Diagnosis:
     """Find out whether something is missing from a nominal model, what, where, and how much.
 
     Parameters
     ----------
-    model : StructuralModel
+    data : VibrationTest, FrfSet or Observations
+        What was measured. Only recordings show what depends on the level of excitation.
+    fe_model : StructuralModel
         The nominal model, with damping.
-    observations : Observations
-        What was measured.
-    options : DiagnoseOptions
+    frfs : FrfSet, optional
+        FRFs of the test, where they have been estimated already.
+    options : DiagnoseOptions, optional
         Tolerances, and what may be missing.
-    folder : Path
-        Where paths of users' own effects start.
+    effects : sequence of Effect or Law
+        Effects and force laws of your own that are looked for too.
+    ingest : IngestOptions, optional
+        How the recordings of a test are used.
+    fit : FitOptions, optional
+        Says which band to analyse, and which parts of it not; without a band, the one that carries signal is taken.
+    folder : str or Path
+        Where paths of users' own effects in `options` start.
     progress : Progress
         Receives the progress.
 
@@ -106,24 +123,49 @@ def diagnose(
     ------
     InputError
         If the model lacks a DOF that was measured, or an effect is not known.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> test = frf_ipz.read_test("data/raw/cantilever/test.toml")  # doctest: +SKIP
+    >>> model = frf_ipz.read_model("data/raw/cantilever/model.toml")  # doctest: +SKIP
+    >>> frf_ipz.diagnose(test, model).verdict  # doctest: +SKIP
+    'unexplained'
     """
+    observations = _as_observations(data, frfs, ingest, fit)
+    catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=Path(folder), own=tuple(effects))
     with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
-        return _diagnose(model, observations, options, folder, progress)
+        return _diagnose(fe_model, observations, catalogue, progress)
+
+
+def _as_observations(
+    data: VibrationTest | FrfSet | Observations,
+    frfs: FrfSet | None,
+    ingest: IngestOptions | None,
+    fit: FitOptions | None,
+) -> Observations:
+    if isinstance(data, Observations):
+        return data
+    test = VibrationTest.from_frfs(data) if isinstance(data, FrfSet) else data
+    known = estimate_frfs(test, options=ingest).frfs if frfs is None else frfs
+    return observe(test, frfs=known, ingest=ingest, fit=fit)
 
 
 def _diagnose(
-    model: StructuralModel, observations: Observations, options: DiagnoseOptions, folder: Path, progress: Progress
+    model: StructuralModel, observations: Observations, catalogue: EffectCatalogue, progress: Progress
 ) -> Diagnosis:
+    options = catalogue.options
     progress(0.0, "comparing weak and strong records")
     observations, linearity = _clean_and_assess(observations)
     scale = "none" if observations.frfs is None else observations.frfs.unknown_scale
     progress(0.05, "measuring transfer functions")
     source = split_data(observations)
-    effects = _select_identifiable(select_effects(options, folder), scale)
+    effects = _select_identifiable(catalogue.effects(), scale)
     pose_with = partial(pose_problem, model, source, observations.band_hz, effects=effects, free_gains=scale)
     problem = pose_with(options)
     data_checks = run_data_checks(source, linearity)
-    excess = linearity.score / linearity.limit if linearity and select_laws(options, folder) else 0.0
+    laws = catalogue.laws()
+    excess = linearity.score / linearity.limit if linearity and laws else 0.0
     is_clearly_nonlinear = excess > CLEARLY_NONLINEAR
     problem, decision, shortfall = _decide(
         problem, pose_with, options, progress, is_clearly_nonlinear=is_clearly_nonlinear
@@ -138,14 +180,14 @@ def _diagnose(
     )
     if excess <= 1:
         return linear
-    laws_of = partial(search_laws, options=options, folder=folder, progress=_late_progress(progress))
-    laws = laws_of(model, observations, linearity=linearity)
+    laws_of = partial(search_laws, options=options, laws=laws, progress=_late_progress(progress))
+    law_search = laws_of(model, observations, linearity=linearity)
     if is_clearly_nonlinear or not effects or decision.verdict == UNEXPLAINED:
         pose_with_observations = partial(_pose_with_observations, model, options, effects, scale)
         return _diagnose_nonlinear(
-            linear, problem, pose_with_observations, decision, model, observations, laws, laws_of
+            linear, problem, pose_with_observations, decision, model, observations, law_search, laws_of
         )
-    return _prefer_proven_law(linear, laws)
+    return _prefer_proven_law(linear, law_search)
 
 
 def _decide(

@@ -13,13 +13,13 @@ from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.records import read_records
 from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
     from frf_ipz.ingest import records as recorded
     from frf_ipz.ingest.campaign import VibrationTest
-    from frf_ipz.ingest.options import IngestOptions
 
 BLOCK = 128  # samples
 
@@ -224,7 +224,7 @@ def _transform(record: ObservedRecord, s: ComplexArray) -> tuple[ComplexArray, C
 
 
 def observe(
-    test: VibrationTest, options: IngestOptions, frfs: FrfSet, *, fit: FitOptions | None = None
+    test: VibrationTest, *, frfs: FrfSet, ingest: IngestOptions | None = None, fit: FitOptions | None = None
 ) -> Observations:
     """Gather what a diagnosis works with.
 
@@ -232,10 +232,10 @@ def observe(
     ----------
     test : VibrationTest
         The test.
-    options : IngestOptions
-        How its recordings are used.
     frfs : FrfSet
         The FRFs that were estimated from it, or elsewhere.
+    ingest : IngestOptions, optional
+        How its recordings are used.
     fit : FitOptions, optional
         Says which band to analyse, and which parts of it not; without a band, the one that carries signal is
         taken.
@@ -256,7 +256,7 @@ def observe(
     if test.kind != "frf" and frfs.unknown_scale == "none":
         records = tuple(
             _select_sensors(record, test)
-            for record in read_records(test, options)
+            for record in read_records(test, ingest or IngestOptions())
             if set(record.labels) & set(test.labels)
         )
     kind = test.kind if records else "frf"

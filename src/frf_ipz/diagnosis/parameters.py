@@ -28,22 +28,23 @@ RIGID = 1e-9  # of the largest squared frequency: below it a mode is one of a ri
 PRIOR = 0.1  # standard deviation of a value, relative: an update refines a diagnosis, and does not begin anew
 
 
-def diagnosed_basis(
-    nominal: StructuralModel,
+def make_diagnosed_basis(
     diagnosis: Diagnosis,
-    reduced: ReducedModel,
+    fe_model: StructuralModel,
+    reduced_model: ReducedModel,
+    *,
     effects: Mapping[str, Effect] | None = None,
 ) -> ParameterBasis:
     """Take the parameters of a diagnosis as those of an update.
 
     Parameters
     ----------
-    nominal : StructuralModel
-        The model that was diagnosed.
     diagnosis : Diagnosis
-        What it lacks.
-    reduced : ReducedModel
-        Of the model with what it lacked, as `apply_to_model` gives it.
+        What the FE model lacks.
+    fe_model : StructuralModel
+        The model that was diagnosed.
+    reduced_model : ReducedModel
+        Of the model with what it lacked, as `correct_model` gives it.
     effects : mapping of str to Effect, optional
         Those that were searched for; the shipped ones where it is left out.
 
@@ -57,11 +58,11 @@ def diagnosed_basis(
     InputError
         If no finding is in the structure.
     """
-    moving, corrected = [], prepare_correction(nominal, diagnosis, effects)
+    moving, corrected = [], prepare_correction(diagnosis, fe_model, effects)
     for number, finding in enumerate(diagnosis.findings):
         for index, name in enumerate(_value_names(finding)):
             low, high = (corrected(_scaled_values(diagnosis, number, index, factor)) for factor in (1 - STEP, 1 + STEP))
-            slope = _reduce_difference(low, high, reduced) / (2 * STEP)
+            slope = _reduce_difference(low, high, reduced_model) / (2 * STEP)
             if np.abs(slope).max() > 0:
                 moving.append((f"{finding.effect} {name}", slope))
     if not moving:

@@ -11,26 +11,24 @@ from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 from frf_ipz.updating.position_uncertainty import PositionUncertainty
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.frf import FrfLabel
+    from frf_ipz.frf import Measured
     from frf_ipz.structure import ReducedModel, StructuralModel
 
 
 def propagate_position_tolerance(
-    model: StructuralModel, reduced: ReducedModel, labels: Sequence[FrfLabel], tolerance_m_per_m: float
+    measured: Measured, reduced_model: ReducedModel, *, fe_model: StructuralModel, tolerance_m_per_m: float
 ) -> tuple[PositionUncertainty, ...]:
     """Propagate a tolerance of positions into rows of the reduced model.
 
     Parameters
     ----------
-    model : StructuralModel
-        The FE model.
-    reduced : ReducedModel
-        Made from it.
-    labels : sequence of FrfLabel
+    measured : ModalFit or FrfSet
         What was measured.
+    reduced_model : ReducedModel
+        Made from the FE model.
+    fe_model : StructuralModel
+        The FE model.
     tolerance_m_per_m : float
         Half width of the tolerance, over the size of the structure along an axis.
 
@@ -39,16 +37,18 @@ def propagate_position_tolerance(
     tuple of PositionUncertainty
         Of each sensor and each excited point along each axis; none for lumped models, whose masses have no positions.
     """
-    spans = measure_extents(model)
-    ends = dict.fromkeys(end for label in labels for end in ((label.output_dof, True), (label.input_dof, False)))
+    spans = measure_extents(fe_model)
+    ends = dict.fromkeys(
+        end for label in measured.labels for end in ((label.output_dof, True), (label.input_dof, False))
+    )
     return tuple(
         PositionUncertainty(
             dof=dof,
             is_output=is_output,
-            row=tolerance_m_per_m * UNIFORM_STD * spans[axis] * _reduce_row(model, reduced, row),
+            row=tolerance_m_per_m * UNIFORM_STD * spans[axis] * _reduce_row(fe_model, reduced_model, row),
         )
         for dof, is_output in ends
-        for axis, row in make_shift_rows(model, dof).items()
+        for axis, row in make_shift_rows(fe_model, dof).items()
     )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, require_shape
+from frf_ipz.dofs import as_dof
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
 from frf_ipz.export.realization import condense_high_modes, discretise, modal_form, to_first_order, with_delays
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     import control
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.frf import FrfLabel
+    from frf_ipz.frf import Measured
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -78,23 +79,23 @@ def matrix_shapes(names: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     return {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
 
 
-def to_state_space(
-    updated: UpdatedModel,
-    labels: Sequence[FrfLabel],
-    points: Sequence[Dof],
-    options: ExportOptions | None = None,
+def make_state_space(
+    measured: Measured,
+    updated_model: UpdatedModel,
     *,
+    points: Sequence[Dof | str] = (),
+    options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> StateSpaceModel:
     """Turn an updated model into a state space.
 
     Parameters
     ----------
-    updated : UpdatedModel
-        The updated model.
-    labels : sequence of FrfLabel
+    measured : ModalFit or FrfSet
         What was measured: its excited DOFs are the inputs, its sensors the first outputs.
-    points : sequence of Dof
+    updated_model : UpdatedModel
+        The updated model.
+    points : sequence of Dof or str
         Points of interest: the further outputs, in the quantity of the first FRF unless the options say another.
     options : ExportOptions, optional
         Its form.
@@ -113,26 +114,26 @@ def to_state_space(
         of a velocity or an acceleration.
     """
     chosen = options or ExportOptions()
-    return _to_state_space(updated.model, choose_ports(labels, points, chosen, delays_s or {}), chosen)
+    return _to_state_space(updated_model.model, _ports(measured, points, chosen, delays_s), chosen)
 
 
-def to_ensemble(
-    updated: UpdatedModel,
-    labels: Sequence[FrfLabel],
-    points: Sequence[Dof],
-    options: ExportOptions | None = None,
+def make_state_space_ensemble(
+    measured: Measured,
+    updated_model: UpdatedModel,
     *,
+    points: Sequence[Dof | str] = (),
+    options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> tuple[StateSpaceModel, ...]:
     """Turn members of the posterior into state spaces, for robust design.
 
     Parameters
     ----------
-    updated : UpdatedModel
-        The updated model.
-    labels : sequence of FrfLabel
+    measured : ModalFit or FrfSet
         What was measured.
-    points : sequence of Dof
+    updated_model : UpdatedModel
+        The updated model.
+    points : sequence of Dof or str
         Points of interest.
     options : ExportOptions, optional
         Their form; `ensemble` is their number.
@@ -147,15 +148,72 @@ def to_ensemble(
     Raises
     ------
     InputError
-        As for `to_state_space`.
+        As for `make_state_space`.
     """
     chosen = options or ExportOptions()
-    ports = choose_ports(labels, points, chosen, delays_s or {})
-    members = updated.ensemble[: chosen.ensemble]
+    ports = _ports(measured, points, chosen, delays_s)
+    members = updated_model.ensemble[: chosen.ensemble]
     return tuple(
-        _to_state_space(replace(updated.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
+        _to_state_space(replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
         for mass, damping, stiffness in members
     )
+
+
+def to_state_space(
+    measured: Measured,
+    updated_model: UpdatedModel,
+    *,
+    points: Sequence[Dof | str] = (),
+    options: ExportOptions | None = None,
+    delays_s: Mapping[str, float] | None = None,
+) -> control.StateSpace:
+    """Turn an updated model into a state space of python-control.
+
+    Parameters
+    ----------
+    measured, updated_model, points, options, delays_s
+        As for `make_state_space`.
+
+    Returns
+    -------
+    control.StateSpace
+        With the names of inputs, outputs and states; SI units.
+
+    Raises
+    ------
+    InputError
+        As for `make_state_space`.
+    """
+    return to_control(make_state_space(measured, updated_model, points=points, options=options, delays_s=delays_s))
+
+
+def to_state_space_ensemble(
+    measured: Measured,
+    updated_model: UpdatedModel,
+    *,
+    points: Sequence[Dof | str] = (),
+    options: ExportOptions | None = None,
+    delays_s: Mapping[str, float] | None = None,
+) -> list[control.StateSpace]:
+    """Turn members of the posterior into state spaces of python-control, for robust design.
+
+    Parameters
+    ----------
+    measured, updated_model, points, options, delays_s
+        As for `make_state_space_ensemble`.
+
+    Returns
+    -------
+    list of control.StateSpace
+        With the names of inputs, outputs and states.
+
+    Raises
+    ------
+    InputError
+        As for `make_state_space`.
+    """
+    members = make_state_space_ensemble(measured, updated_model, points=points, options=options, delays_s=delays_s)
+    return [to_control(member) for member in members]
 
 
 def to_control(model: StateSpaceModel) -> control.StateSpace:
@@ -208,3 +266,9 @@ def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -
         input_units=ports.input_units,
         output_units=tuple(output.unit for output in outputs),
     )
+
+
+def _ports(
+    measured: Measured, points: Sequence[Dof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
+) -> Ports:
+    return choose_ports(measured.labels, [as_dof(point) for point in points], options, delays_s or {})

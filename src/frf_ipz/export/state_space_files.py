@@ -30,7 +30,7 @@ SUFFIXES = (".json", ".mat")
 UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
 
 
-def save_state_space(model: StateSpaceModel, path: Path) -> None:
+def write_state_space(model: StateSpaceModel, path: Path) -> None:
     """Write a state space as JSON or for MATLAB.
 
     Parameters
@@ -55,8 +55,8 @@ def save_state_space(model: StateSpaceModel, path: Path) -> None:
         savemat(path, {**values, **_names_for_matlab(model)})
 
 
-def read_state_space(path: Path) -> StateSpaceModel:
-    """Read what `save_state_space` wrote.
+def read_state_space_arrays(path: Path) -> StateSpaceModel:
+    """Read what `write_state_space` wrote.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def read_state_space(path: Path) -> StateSpaceModel:
     return StateSpaceModel(**fields)
 
 
-def load_state_space(path: Path) -> control.StateSpace:
+def read_state_space(path: Path) -> control.StateSpace:
     """Read a state space for python-control.
 
     Parameters
@@ -104,10 +104,10 @@ def load_state_space(path: Path) -> control.StateSpace:
     InputError
         If the file is no such state space.
     """
-    return to_control(read_state_space(path))
+    return to_control(read_state_space_arrays(path))
 
 
-def save_reduced_model(model: ReducedModel, path: Path) -> None:
+def write_reduced_model(model: ReducedModel, path: Path) -> None:
     """Write the matrices of a reduced model.
 
     Parameters
@@ -127,13 +127,13 @@ def save_reduced_model(model: ReducedModel, path: Path) -> None:
         np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
 
 
-def save_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
-    """Write members of the posterior for MATLAB and for `load_ensemble`.
+def write_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
+    """Write members of the posterior for MATLAB and for `read_ensemble`.
 
     Parameters
     ----------
     models : sequence of StateSpaceModel
-        As from `to_ensemble`: inputs, outputs and states have the same names in all.
+        As from `make_state_space_ensemble`: inputs, outputs and states have the same names in all.
     path : Path
         A ``.mat`` file. ``A``, ``B``, ``C``, ``D`` have the members on a third axis, as model arrays of MATLAB have;
         names, units and ``dt`` are as in the file of one state space.
@@ -154,8 +154,8 @@ def save_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
     savemat(path, {**values, **_names_for_matlab(models[0]), "dt": models[0].dt})
 
 
-def read_ensemble(path: Path) -> tuple[StateSpaceModel, ...]:
-    """Read what `save_ensemble` wrote.
+def read_ensemble_arrays(path: Path) -> tuple[StateSpaceModel, ...]:
+    """Read what `write_ensemble` wrote.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def read_ensemble(path: Path) -> tuple[StateSpaceModel, ...]:
         ) from error
 
 
-def load_ensemble(path: Path) -> list[control.StateSpace]:
+def read_ensemble(path: Path) -> list[control.StateSpace]:
     """Read members of the posterior for python-control.
 
     Parameters
@@ -208,10 +208,10 @@ def load_ensemble(path: Path) -> list[control.StateSpace]:
     InputError
         If the file is no such ensemble.
     """
-    return [to_control(model) for model in read_ensemble(path)]
+    return [to_control(model) for model in read_ensemble_arrays(path)]
 
 
-def save_weights(weights: UncertaintyWeights, path: Path) -> None:
+def write_uncertainty_weights(weights: UncertaintyWeights, path: Path) -> None:
     """Write the multiplicative uncertainty of every output as JSON.
 
     Parameters
@@ -231,8 +231,8 @@ def save_weights(weights: UncertaintyWeights, path: Path) -> None:
     path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
 
 
-def read_weights(path: Path) -> UncertaintyWeights:
-    """Read what `save_weights` wrote.
+def read_uncertainty_weights(path: Path) -> UncertaintyWeights:
+    """Read what `write_uncertainty_weights` wrote.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.dofs import as_dof
 from frf_ipz.errors import InputError
 from frf_ipz.prediction.ensemble import ModelEnsemble
 
@@ -23,9 +24,11 @@ if TYPE_CHECKING:
     import control
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.frf import FrfLabel
+    from frf_ipz.frf import Measured
     from frf_ipz.updating.updated_model import UpdatedModel
 
+WEIGHT_LINES = 400  # of the band, at equal ratios, on which the error of an output is bounded
+WIDEST = 1e4  # ratio of the ends of the band on which it is, where the band begins at 0
 QUANTILE = 0.95  # of the members
 SMALLEST = 1e-6  # relative error below which a bound would only follow rounding
 BOUND = 1.0 + 1e-9  # so that the bound holds despite rounding
@@ -67,39 +70,48 @@ class UncertaintyWeights:
         return tuple(control.tf(above, below) for above, below in zip(self.numerators, self.denominators, strict=True))
 
 
-def uncertainty_weights(
-    updated: UpdatedModel, labels: Sequence[FrfLabel], points: Sequence[Dof], frequency_hz: FloatArray
+def estimate_uncertainty_weights(
+    measured: Measured,
+    updated_model: UpdatedModel,
+    *,
+    points: Sequence[Dof | str] = (),
+    frequency_hz: FloatArray | None = None,
 ) -> UncertaintyWeights:
     """Bound the relative error of the members of the posterior, for every sensor and point of interest.
 
     Parameters
     ----------
-    updated : UpdatedModel
-        With an ensemble.
-    labels : sequence of FrfLabel
+    measured : ModalFit or FrfSet
         What was measured: its excited DOFs are the inputs, its sensors the first outputs.
-    points : sequence of Dof
+    updated_model : UpdatedModel
+        With an ensemble.
+    points : sequence of Dof or str
         Points of interest.
-    frequency_hz : (n_lines,) array
-        Frequencies at which the bound has to hold, above 0, Hz.
+    frequency_hz : (n_lines,) array, optional
+        Frequencies at which the bound has to hold, above 0, Hz; `WEIGHT_LINES` of the band at equal ratios where they
+        are left out.
 
     Returns
     -------
     UncertaintyWeights
-        In the order of the outputs of `to_state_space`; the quantity of an output does not matter to a relative error.
+        In the order of the outputs of `make_state_space`; the quantity of an output does not matter to relative errors.
 
     Raises
     ------
     InputError
         If the method of updating has drawn no ensemble.
     """
+    labels, updated = measured.labels, updated_model
+    if frequency_hz is None:
+        low, high = measured.band_hz
+        frequency_hz = np.geomspace(max(low, high / WIDEST), high, WEIGHT_LINES)
     if not len(updated.ensemble):
         raise InputError(
             f"the update by '{updated.method}' has no ensemble, so its uncertainty is unknown; use [update] "
             "method = 'minimal-change' with ensemble = 200"
         )
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *points]))
+    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *(as_dof(point) for point in points)]))
     inputs = tuple(dict.fromkeys(label.input_dof for label in labels))
     errors = np.stack([_relative_error(updated, output, inputs, s) for output in outputs], axis=1)
     weights = [_bound(np.asarray(frequency_hz, float), error) for error in errors.T]

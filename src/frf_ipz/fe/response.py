@@ -34,7 +34,7 @@ NO_STIFFNESS = 64.0  # roundings of the largest omega^2, times the condition of 
 REAL_POLE = 1e-12  # of the modulus: imaginary part of a pole that is real
 
 
-def model_frfs(model: StructuralModel | ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
+def compute_frfs(model: StructuralModel | ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
     """Evaluate FRFs of a model.
 
     Parameters

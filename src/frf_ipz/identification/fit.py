@@ -20,6 +20,7 @@ from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
 from frf_ipz.identification.measured_lines import measured_lines, with_misfit_noise
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.results.gains import find_channel_gains
 from frf_ipz.identification.results.measured_model import measured_model, residue_covariance
 from frf_ipz.identification.results.tables import misfit_table, mode_table
@@ -42,19 +43,18 @@ from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
-    from frf_ipz.identification.options import FitOptions
 
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
 
-def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent) -> ModalFit:
+def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Progress = silent) -> ModalFit:
     """Fit poles, residues and zeros to measured FRFs.
 
     Parameters
     ----------
     frfs : FrfSet
         Measured FRFs; with their variance where it is known.
-    options : FitOptions
+    options : FitOptions, optional
         Band, pinned and rejected poles, kind of modes.
     progress : Progress
         Reports how far the fit is.
@@ -70,17 +70,28 @@ def fit_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent)
         If too few lines remain to be fitted.
     NumericalError
         If no mode is found.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> lines = np.arange(1, 200.0, 0.1)
+    >>> s, pole = 2j * np.pi * lines, 2 * np.pi * 80 * (-0.01 + 1j)
+    >>> accelerance = s**2 * (1 / (s - pole) - 1 / (s - pole.conj())) / 2j
+    >>> frfs = frf_ipz.FrfSet.from_arrays(lines, accelerance[:, None, None], outputs=["1:+x"], inputs=["1:+x"])
+    >>> frf_ipz.fit_modes(frfs).model.natural_frequency_hz.round(3)
+    array([80.004])
     """
-    fitted = find_modes(frfs, options, progress=progress)
+    chosen = options or FitOptions()
+    fitted = find_modes(frfs, chosen, progress=progress)
     halves = None
     if fitted.noise_from == "misfit":
         progress(0.7, "fitting each half of the lines")
-        halves = fit_halves(frfs, fitted, options)
+        halves = fit_halves(frfs, fitted, chosen)
     progress(0.9, "finding zeros and errors")
-    return _as_modal_fit(frfs, fitted, options, halves)
+    return _as_modal_fit(frfs, fitted, chosen, halves)
 
 
-def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> ModalFit:
+def fit_residues(frfs: FrfSet, *, poles: ComplexArray, options: FitOptions | None = None) -> ModalFit:
     """Fit residues and zeros to measured FRFs, with given poles.
 
     Parameters
@@ -89,7 +100,7 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
         Measured FRFs: one is enough.
     poles : (n_poles,) complex array
         rad/s, imaginary part > 0; they are held and count as exact.
-    options : FitOptions
+    options : FitOptions, optional
         Band and lines to leave out, kind of modes.
 
     Returns
@@ -103,6 +114,7 @@ def fit_residues(frfs: FrfSet, poles: ComplexArray, options: FitOptions) -> Moda
     InputError
         If too few lines remain to be fitted.
     """
+    options = options or FitOptions()
     lines = measured_lines(frfs, options)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     real_modes = options.modes == "real"
@@ -161,6 +173,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         labels=frfs.labels,
         band_hz=lines.band_hz,
         used_lines=lines.used,
+        frequency_hz=frfs.frequency_hz[lines.used],
         zeros=zeros.zeros,
         covariance=_root_covariance(errors, zeros, modes),
         residue_covariance=residue_covariance(errors, lines.powers, modes),

@@ -30,6 +30,8 @@ class ModalFit:
         The band that was fitted.
     used_lines : (n_lines,) bool array
         Lines of the FrfSet that were fitted.
+    frequency_hz : (n_used,) array
+        These lines, Hz.
     zeros : ZeroSet
         Zeros of every FRF, in the band and near it.
     covariance : (2 n, 2 n) array, or RootCovariance
@@ -64,6 +66,7 @@ class ModalFit:
     labels: tuple[FrfLabel, ...]
     band_hz: tuple[float, float]
     used_lines: BoolArray
+    frequency_hz: FloatArray
     zeros: ZeroSet
     covariance: FloatArray | RootCovariance
     residue_covariance: FloatArray

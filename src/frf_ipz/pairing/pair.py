@@ -29,14 +29,14 @@ CANCELLING = 3.0  # standard deviations of distance below which a zero and a pol
 NO_ROOT = complex(np.nan, np.nan)
 
 
-def pair(fit: ModalFit, model: ReducedModel) -> Pairs:
+def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     """Assign measured poles and zeros to those of the model, one to one.
 
     Parameters
     ----------
     fit : ModalFit
         Poles, residues and zeros as measured.
-    model : ReducedModel
+    reduced_model : ReducedModel
         The reduced model.
 
     Returns
@@ -44,12 +44,12 @@ def pair(fit: ModalFit, model: ReducedModel) -> Pairs:
     Pairs
         Every measured pole and zero and every one that the model has in the band, each with a verdict and its reason.
     """
-    poles = model_poles(model, fit.labels)
+    poles = model_poles(reduced_model, fit.labels)
     pole_pairing = pair_poles(fit, poles)
     rows = _pole_rows(fit, poles, pole_pairing)
     paired_poles = _paired_logs(rows)
     for frf in range(len(fit.labels)):
-        zeros = model_zeros(model, fit.labels[frf])
+        zeros = model_zeros(reduced_model, fit.labels[frf])
         zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
         rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles)
     return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))

@@ -22,6 +22,8 @@ from frf_ipz.runs.results import open_results
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
     from frf_ipz.export.options import ExportOptions
@@ -50,6 +52,8 @@ class Campaign:
         Points of interest, such as ``["49:+z"]``.
     name : str
         What it is called.
+    effects : sequence of Effect or Law
+        Effects and force laws of your own that a diagnosis looks for too.
     reference : FrfSet, optional
         FRFs at points of interest that were kept aside: the prediction is judged by them and does not use them.
     ingest, fit, diagnose, reduce, update, export : options, optional
@@ -81,6 +85,7 @@ class Campaign:
     _: KW_ONLY
     points: Sequence[Dof | str] = ()
     name: str = "campaign"
+    effects: Sequence[Effect | Law] = ()
     reference: FrfSet | None = None
     ingest: IngestOptions | None = None
     fit: FitOptions | None = None
@@ -156,6 +161,7 @@ class Campaign:
             test=test,
             fe_model=None if self.fe_model is None else complete_model(self.fe_model, test, points),
             points=points,
+            effects=tuple(self.effects),
             digests=digests,
             measurement_names=(*map(str, test.files), MEASUREMENT),
             model_names=() if self.fe_model is None else (MODEL,),

@@ -19,6 +19,8 @@ from frf_ipz.runs.digests import digest_file
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.pipeline.config import Pipeline
@@ -45,6 +47,8 @@ class PipelineInputs:
         The FE model with the sensors' known masses; None where the run ends with the fit.
     points : tuple of Dof
         Points of interest.
+    effects : tuple of Effect or Law
+        Effects and force laws of the user's that are looked for too.
     digests : mapping of str to str
         Digest of everything that the user handed in, by its name.
     measurement_names, model_names : tuple of str
@@ -62,6 +66,7 @@ class PipelineInputs:
     test: VibrationTest
     fe_model: StructuralModel | None = None
     points: tuple[Dof, ...] = ()
+    effects: tuple[Effect | Law, ...] = ()
     digests: Mapping[str, str] = field(default_factory=dict)
     measurement_names: tuple[str, ...] = ()
     model_names: tuple[str, ...] = ()

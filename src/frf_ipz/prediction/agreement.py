@@ -98,21 +98,22 @@ def compare_frfs(first: ComplexArray, second: ComplexArray) -> Agreement:
         )
 
 
-def with_measured_poles(nominal: ReducedModel, pairs: Pairs) -> ReducedModel:
+def shift_to_measured_poles(pairs: Pairs, reduced_model: ReducedModel) -> ReducedModel:
     """Give the nominal model the measured poles with its own mode shapes: the agreement that an update has to beat.
 
     Parameters
     ----------
-    nominal : ReducedModel
-        Before updating.
     pairs : Pairs
         Measured poles with their counterparts.
+    reduced_model : ReducedModel
+        Before updating.
 
     Returns
     -------
     ReducedModel
         With measured frequencies and damping ratios, and the nominal shapes.
     """
+    nominal = reduced_model
     squares, shapes = eigh(nominal.stiffness, nominal.mass)
     frequency = np.sqrt(np.maximum(squares, 0.0))
     rates = np.einsum("ik,ij,jk->k", shapes, nominal.damping, shapes)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.dofs import Dof, as_dof
 from frf_ipz.errors import InputError
-from frf_ipz.fe.response import model_frfs
-from frf_ipz.frf import FrfLabel
+from frf_ipz.fe.response import compute_frfs
+from frf_ipz.frf import FrfLabel, Measured
 from frf_ipz.prediction.advice import explain_wide_band, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.prediction import Prediction
@@ -22,7 +23,6 @@ from frf_ipz.prediction.zeros import predicted_zeros
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -30,20 +30,24 @@ BAND = (0.05, 0.95)
 
 
 def predict_frfs(
-    updated: UpdatedModel, points: Sequence[Dof], labels: Sequence[FrfLabel], frequency_hz: FloatArray
+    measured: Measured,
+    updated_model: UpdatedModel,
+    *,
+    points: Sequence[Dof | str],
+    frequency_hz: FloatArray | None = None,
 ) -> Prediction:
     """Predict FRFs from every excited DOF of the test to points of interest.
 
     Parameters
     ----------
-    updated : UpdatedModel
-        The updated model.
-    points : sequence of Dof
-        Points of interest: any DOF of the reduced model's expansion, retained or not. Signs count.
-    labels : sequence of FrfLabel
+    measured : ModalFit or FrfSet
         What was measured: its excited DOFs are used, and the quantity of its first FRF.
-    frequency_hz : (n_lines,) array
-        Lines, Hz.
+    updated_model : UpdatedModel
+        The updated model.
+    points : sequence of Dof or str
+        Points of interest: any DOF of the reduced model's expansion, retained or not. Signs count.
+    frequency_hz : (n_lines,) array, optional
+        Lines, Hz; those that were fitted or measured where they are left out.
 
     Returns
     -------
@@ -55,11 +59,13 @@ def predict_frfs(
     InputError
         If nothing was measured, or the model does not know a point.
     """
+    labels, updated = measured.labels, updated_model
+    frequency_hz = np.asarray(measured.frequency_hz if frequency_hz is None else frequency_hz, float)
     if not labels:
         raise InputError("a prediction needs at least one measured FRF: its label says where the structure is excited")
     input_dofs = tuple(dict.fromkeys(label.input_dof for label in labels))
-    predicted = tuple(FrfLabel(point, dof, labels[0].quantity) for point in points for dof in input_dofs)
-    s = 2j * np.pi * np.asarray(frequency_hz, float)
+    predicted = tuple(FrfLabel(as_dof(point), dof, labels[0].quantity) for point in points for dof in input_dofs)
+    s: ComplexArray = np.asarray(2j * np.pi * frequency_hz)
     band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())
     ensemble = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
@@ -70,7 +76,7 @@ def predict_frfs(
         for band in wide_bands(frequency_hz, low, high)
     )
     return Prediction(
-        frequency_hz=np.asarray(frequency_hz, float),
+        frequency_hz=frequency_hz,
         labels=predicted,
         values=_evaluate(updated.model, predicted, s),
         nominal=_evaluate(updated.nominal, predicted, s),
@@ -84,7 +90,7 @@ def predict_frfs(
 
 def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
     """FRFs of a model, (n_lines, n_frfs); there may be no point of interest."""
-    return model_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
+    return compute_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
 
 
 def _magnitude_bands(

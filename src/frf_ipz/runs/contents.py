@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.structure import Geometry
 from frf_ipz.updating.targets import Target, target_rows
 
@@ -138,7 +138,7 @@ class RunContents:
         frfs = self.frfs
         if frfs is None:
             return np.zeros((0, 0), complex)
-        return model_frfs(model, frfs.labels, frfs.s[self.used_lines()])
+        return compute_frfs(model, frfs.labels, frfs.s[self.used_lines()])
 
     def targets(self) -> list[Target]:
         """Targets of the update.

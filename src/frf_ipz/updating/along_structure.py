@@ -14,7 +14,7 @@ import pandas as pd
 from frf_ipz.arrays import FloatArray
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.gaussian import solve_step
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,7 +58,7 @@ def change_along_structure(updated: UpdatedModel, fe_model: StructuralModel) -> 
     """
     if len(updated.parts):
         return updated.parts
-    basis = structural_basis(fe_model, updated.nominal)
+    basis = make_structural_basis(fe_model, updated.nominal)
     if not basis.regions:
         return pd.DataFrame(columns=COLUMNS)
     changes = _relative_changes(updated.nominal, np.concatenate([basis.stiffness, [_stiffness_change(updated)]]))

@@ -180,7 +180,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
     )
 
 
-def structural_basis(
+def make_structural_basis(
     fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof] = ()
 ) -> ParameterBasis:
     """Factors on the parts of the FE model, masses of sensors, and generic changes that parts cannot express.

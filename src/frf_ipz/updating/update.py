@@ -12,9 +12,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Protocol, cast
 
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.progress import silent
 from frf_ipz.updating import methods
 from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.progress import Progress
-    from frf_ipz.structure import ReducedModel
+    from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.position_uncertainty import PositionUncertainty
     from frf_ipz.updating.updated_model import UpdatedModel
@@ -51,31 +53,36 @@ class Method(Protocol):
 
 
 def update_model(
-    model: ReducedModel,
     fit: ModalFit,
-    pairs: Pairs,
-    options: UpdateOptions | None = None,
+    reduced_model: ReducedModel,
     *,
+    pairs: Pairs | None = None,
+    fe_model: StructuralModel | None = None,
+    options: UpdateOptions | None = None,
     basis: ParameterBasis | None = None,
-    misplacements: tuple[PositionUncertainty, ...] = (),
+    position_uncertainty: tuple[PositionUncertainty, ...] = (),
     progress: Progress = silent,
 ) -> UpdatedModel:
     """Update a reduced model to the measured poles and zeros.
 
     Parameters
     ----------
-    model : ReducedModel
-        The nominal model.
     fit : ModalFit
         Poles and zeros as measured, with their covariance.
-    pairs : Pairs
-        Measured poles and zeros with their counterparts; only the paired ones become targets.
+    reduced_model : ReducedModel
+        The nominal model.
+    pairs : Pairs, optional
+        Measured poles and zeros with their counterparts; only the paired ones become targets. They are paired here
+        where they are left out.
+    fe_model : StructuralModel, optional
+        The FE model that was reduced: the stiffness of its parts may then change. Without it and without `basis` the
+        method uses its own generic parameters.
     options : UpdateOptions, optional
         Method and its settings.
     basis : ParameterBasis, optional
-        What may change, and how likely: the parts of the FE model (`updating.parameters.structural_basis`) or what a
-        diagnosis has chosen. Without it the method uses its own generic parameters.
-    misplacements : tuple of PositionUncertainty
+        What may change, and how likely: from `make_structural_basis`, or what a diagnosis has chosen
+        (`make_diagnosed_basis`).
+    position_uncertainty : tuple of PositionUncertainty
         Uncertainty of the positions of sensors and excitation: zeros weigh less by it.
     progress : Progress
         Reports how far the work is.
@@ -97,8 +104,10 @@ def update_model(
     if chosen.method not in available:
         raise InputError(f"[update] method: there is no '{chosen.method}'; {did_you_mean(chosen.method, available)}")
     module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
-    problem = make_problem(model, fit, pairs, basis)
-    problem = replace(problem, covariance=with_position_uncertainty(problem, misplacements))
+    if basis is None and fe_model is not None:
+        basis = make_structural_basis(fe_model, reduced_model, mass=chosen.mass)
+    problem = make_problem(reduced_model, fit, pairs or pair_roots(fit, reduced_model), basis)
+    problem = replace(problem, covariance=with_position_uncertainty(problem, position_uncertainty))
     return cast("Method", module).update(problem, chosen, progress)
 
 

@@ -80,7 +80,7 @@ def evaluate_nominal_model(case: Path, prediction: pd.DataFrame) -> pd.DataFrame
     frfs = []
     for (output, source, quantity), rows in prediction.groupby(["output_dof", "input_dof", "quantity"], sort=False):
         label = FrfLabel(frf_ipz.parse_dof(str(output)), frf_ipz.parse_dof(str(source)), frf_ipz.FrfQuantity(quantity))
-        H = frf_ipz.model_frfs(model, [label], 2j * np.pi * rows["frequency_hz"].to_numpy())[:, 0]
+        H = frf_ipz.compute_frfs(model, [label], 2j * np.pi * rows["frequency_hz"].to_numpy())[:, 0]
         frfs.append(rows.assign(real=H.real, imag=H.imag))
     return pd.concat(frfs)
 

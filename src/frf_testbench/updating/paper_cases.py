@@ -18,7 +18,7 @@ from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, BeamSection, build_beam
 from frf_ipz.fe.model_options import DampingSection, ModelSection
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.fe.response import model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
@@ -167,9 +167,9 @@ def _reduce(
     point: str,
     band_hz: tuple[float, float],
 ) -> ReducedModel:
-    return reduce_model(
+    return reduce_to_dofs(
         model,
-        ReduceOptions(modes=5, dofs=dofs, residual_flexibility=(residual,)),
+        options=ReduceOptions(modes=5, dofs=dofs, residual_flexibility=(residual,)),
         actuators=[parse_dof(actuator)],
         sensors=[parse_dof(sensor)],
         points=[parse_dof(point)],

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.fe.response import model_frfs
-from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
+from frf_ipz.fe.response import compute_frfs
+from frf_ipz.prediction.agreement import compare_frfs, shift_to_measured_poles
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel
 from frf_testbench.updating.paper_cases import (
@@ -53,7 +53,7 @@ def compare_section_4() -> pd.DataFrame:
     """Tabulate one row a method: how it ended and how good the point of interest is."""
     case = build_section_4()
     rows = {"nominal": judge_model(case, case.reduced_model)}
-    rows["measured poles, nominal shapes"] = judge_model(case, with_measured_poles(case.reduced_model, case.pairs))
+    rows["measured poles, nominal shapes"] = judge_model(case, shift_to_measured_poles(case.pairs, case.reduced_model))
     for name, options, by_element in (
         ("ipz, delta 1e-5", published_options(4, 1e-5), False),
         ("ipz, delta 1e-1", published_options(4, 1e-1), False),
@@ -61,8 +61,8 @@ def compare_section_4() -> pd.DataFrame:
         ("minimal-change, elements", UpdateOptions(), True),
     ):
         start = process_time()
-        basis = structural_basis(case.full_model, case.reduced_model) if by_element else None
-        updated = update_model(case.reduced_model, case.fit, case.pairs, options, basis=basis)
+        basis = make_structural_basis(case.full_model, case.reduced_model) if by_element else None
+        updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=options, basis=basis)
         rows[name] = judge_model(case, updated.model, updated) | {"cpu_s": process_time() - start}
     return pd.DataFrame(rows).T
 
@@ -72,7 +72,7 @@ def judge_model(case: PaperCase, model: ReducedModel, updated: UpdatedModel | No
     if case.true_modes is None:
         raise ValueError("the truth of this example is not known: only section 4 has one")
     s = np.asarray(1j * BAND_RAD_S, np.complex128)
-    agreement = compare_frfs(case.true_modes.receptance(s, case.point)[:, None], model_frfs(model, [case.point], s))
+    agreement = compare_frfs(case.true_modes.receptance(s, case.point)[:, None], compute_frfs(model, [case.point], s))
     true_zeros = case.true_modes.zeros(case.point)
     is_antiresonance = np.abs(true_zeros.real) < 0.1 * np.abs(true_zeros)
     true_zeros = true_zeros[(true_zeros.imag < BAND_RAD_S[-1]) & is_antiresonance]
@@ -103,7 +103,7 @@ def compare_section_5(struck_dof: str) -> pd.DataFrame:
     columns["numerical here"] = np.array([pair.computed_value.imag for pair in case.pairs.targets]) / (2 * np.pi)
     columns["ipz, paper"] = printed.updated_imag
     for name, options in (("ipz", published_options(5, 1e-3)), ("minimal-change", UpdateOptions())):
-        updated = update_model(case.reduced_model, case.fit, case.pairs, options)
+        updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=options)
         counts = updated.history.groupby("phase", sort=False).iteration.max()
         hertz = updated.after / (2 * np.pi)
         columns[f"{name}, {' + '.join(str(count) for count in counts)} iterations"] = hertz.imag

@@ -17,17 +17,17 @@ import pandas as pd
 
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
-from frf_ipz.pairing.pair import pair
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pairing.pairs import Pairs
-from frf_ipz.prediction.agreement import compare_frfs, with_measured_poles
+from frf_ipz.prediction.agreement import compare_frfs, shift_to_measured_poles
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 from frf_testbench.updating.random_structures import RandomStructure, draw_structure
@@ -78,14 +78,14 @@ def print_study(first: int, count: int) -> None:
 def study_structure(seed: int, *, with_ipz: bool = True) -> pd.DataFrame:
     """Judge one structure: one row a point of interest."""
     case = make_update_case(seed)
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
     start = process_time()
-    updated = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(), basis=basis)
+    updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(), basis=basis)
     cpu_s = process_time() - start
     ipz_update = update_by_ipz(case) if with_ipz else None
     models = {
         "nominal": case.reduced_model,
-        "trivial": with_measured_poles(case.reduced_model, case.pairs),
+        "trivial": shift_to_measured_poles(case.pairs, case.reduced_model),
         "ipz": None if ipz_update is None else ipz_update.model,
         "minimal-change": updated.model,
     }
@@ -110,9 +110,9 @@ def make_update_case(seed: int) -> UpdateCase:
     labels = list_labels(structure.input_dofs, structure.sensors)
     band = choose_band(true_modes, structure.n_modes)
     fit = simulate_fit(true_modes, labels, band, noise=NOISE, rng=np.random.default_rng(seed + 7))
-    reduced_model = reduce_model(
+    reduced_model = reduce_to_dofs(
         structure.nominal_model,
-        ReduceOptions(),
+        options=ReduceOptions(),
         actuators=structure.input_dofs,
         sensors=structure.sensors,
         points=structure.points,
@@ -124,7 +124,7 @@ def make_update_case(seed: int) -> UpdateCase:
         labels=labels,
         fit=fit,
         reduced_model=reduced_model,
-        pairs=pair(fit, reduced_model),
+        pairs=pair_roots(fit, reduced_model),
     )
 
 
@@ -132,10 +132,10 @@ def update_by_ipz(case: UpdateCase) -> UpdatedModel | None:
     """Update as published; None where the method cannot begin."""
     try:
         return update_model(
-            case.reduced_model,
             case.fit,
-            case.pairs,
-            UpdateOptions(method="ipz", max_iterations=IPZ_ITERATIONS),
+            case.reduced_model,
+            pairs=case.pairs,
+            options=UpdateOptions(method="ipz", max_iterations=IPZ_ITERATIONS),
         )
     except FrfIpzError:
         return None
@@ -146,7 +146,7 @@ def judge_points(
 ) -> list[dict[str, float]]:
     """Compare the FRFs from the first input to every point of interest with the truth."""
     lines = np.linspace(*case.fit.band_hz, LINES)
-    predicted = predict_frfs(updated, case.structure.points, case.labels, lines)
+    predicted = predict_frfs(case.fit, updated, points=case.structure.points, frequency_hz=lines)
     rows = []
     for number, label in enumerate(predicted.labels):
         if label.input_dof != case.structure.input_dofs[0]:
@@ -154,7 +154,7 @@ def judge_points(
         s = np.asarray(2j * np.pi * lines, np.complex128)
         truth = case.true_modes.receptance(s, label)[:, None]
         row = {
-            name: np.nan if model is None else float(compare_frfs(truth, model_frfs(model, [label], s)).median_db[0])
+            name: np.nan if model is None else float(compare_frfs(truth, compute_frfs(model, [label], s)).median_db[0])
             for name, model in models.items()
         }
         low, high = predicted.magnitude_low[:, number], predicted.magnitude_high[:, number]

@@ -227,6 +227,7 @@ def make_modal_fit(
         labels=tuple(labels),
         band_hz=(band_hz[0], band_hz[1]),
         used_lines=np.ones(N_LINES, bool),
+        frequency_hz=np.linspace(*band_hz, N_LINES),
         zeros=ZeroSet(
             values=zeros,
             frf=zero_frf,

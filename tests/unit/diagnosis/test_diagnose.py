@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosed import BAND_HZ, beam, labels, measured, observed
-from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
@@ -19,7 +19,7 @@ from frf_ipz.diagnosis.verdict.proof import prove
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.changes import with_point_masses, with_springs
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.runs.codec import load_result, save_result
@@ -39,11 +39,11 @@ def nominal(tmp_path_factory):
 @pytest.fixture(scope="module")
 def with_mass(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
-    return diagnose(nominal, observed(frfs), FEW)
+    return diagnose(observed(frfs), nominal, options=FEW)
 
 
 def test_nothing_missing_is_consistent(nominal):
-    diagnosis = diagnose(nominal, observed(measured(nominal)), FEW)
+    diagnosis = diagnose(observed(measured(nominal)), nominal, options=FEW)
     assert diagnosis.verdict == "consistent"
     assert diagnosis.findings == ()
     assert diagnosis.before.held_out < SEEN
@@ -84,18 +84,18 @@ def test_a_diagnosis_survives_being_stored(with_mass, tmp_path):
 
 
 def test_the_corrected_model_has_the_mass(nominal, with_mass):
-    corrected = apply_to_model(nominal, with_mass)
+    corrected = correct_model(with_mass, nominal)
     unmeasured = (FrfLabel(Dof(4, "z"), Dof(6, "z"), FrfQuantity.ACCELERANCE),)
     s = 2j * np.pi * np.linspace(10.0, 700.0, 300)
-    truth = model_frfs(with_point_masses(nominal, {12: MASS_KG}), unmeasured, s)
-    wrong = [np.linalg.norm(model_frfs(model, unmeasured, s) - truth) for model in (corrected, nominal)]
+    truth = compute_frfs(with_point_masses(nominal, {12: MASS_KG}), unmeasured, s)
+    wrong = [np.linalg.norm(compute_frfs(model, unmeasured, s) - truth) for model in (corrected, nominal)]
     assert wrong[0] < 0.05 * wrong[1]
 
 
 def test_what_no_effect_explains_is_unexplained(nominal):
     changed = with_springs(with_point_masses(nominal, {5: 0.03, 14: 0.04}), {Dof(9, "z"): 3e4})
     diagnosis = diagnose(
-        nominal, observed(measured(changed)), DiagnoseOptions(effects=("damping_level", "global_stiffness"))
+        observed(measured(changed)), nominal, options=DiagnoseOptions(effects=("damping_level", "global_stiffness"))
     )
     assert diagnosis.verdict == "unexplained"
     assert diagnosis.mismatch_hz.size
@@ -113,7 +113,7 @@ def test_a_part_that_makes_worse_what_was_not_fitted_is_left_out(nominal, monkey
     monkeypatch.setattr("frf_ipz.diagnosis.diagnose.prove", with_worse_parts)
     changed = with_springs(nominal, {Dof(9, "z"): 3e5})
     diagnosis = diagnose(
-        nominal, observed(measured(changed)), DiagnoseOptions(effects=("sensor_misplaced", "time_delay"))
+        observed(measured(changed)), nominal, options=DiagnoseOptions(effects=("sensor_misplaced", "time_delay"))
     )
     assert diagnosis.verdict == "unexplained"
     assert diagnosis.findings == ()
@@ -126,22 +126,22 @@ def test_excluded_parts_of_the_band_are_not_analysed(nominal):
         return 1 + 3.0 * (np.abs(frequency_hz - 100.0) < 2.0)[:, None]
 
     observations = observed(measured(nominal, factors=hum))
-    assert diagnose(nominal, observations, FEW).verdict != "consistent"
-    diagnosis = diagnose(nominal, replace(observations, exclude_hz=((97.0, 103.0),)), FEW)
+    assert diagnose(observations, nominal, options=FEW).verdict != "consistent"
+    diagnosis = diagnose(replace(observations, exclude_hz=((97.0, 103.0),)), nominal, options=FEW)
     assert diagnosis.verdict == "consistent"
     assert not ((diagnosis.mismatch_hz > 97.0) & (diagnosis.mismatch_hz < 103.0)).any()
     with pytest.raises(InputError, match="exclude_hz"):
-        diagnose(nominal, replace(observations, exclude_hz=((1.0, 1000.0),)), FEW)
+        diagnose(replace(observations, exclude_hz=((1.0, 1000.0),)), nominal, options=FEW)
 
 
 def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):
     frfs = measured(nominal, factors=lambda f: np.array([1.0, -1.2]) + 0 * f[:, None])
-    diagnosis = diagnose(nominal, observed(frfs), FEW)
+    diagnosis = diagnose(observed(frfs), nominal, options=FEW)
     (finding,) = diagnosis.findings
     assert (finding.effect, dict(finding.location)) == ("sensor_gain", {"channels": ["acc_2"]})
     assert finding.parameters["gain_ratio"].value == pytest.approx(-1.2, rel=SEEN)
-    assert apply_to_model(nominal, diagnosis) is nominal
-    right = apply_to_frfs(frfs, diagnosis)
+    assert correct_model(diagnosis, nominal) is nominal
+    right = correct_frfs(frfs, diagnosis)
     assert np.allclose(right.values[:, 0], frfs.values[:, 0], rtol=0, atol=0)
     assert np.allclose(right.values[:, 1] * -1.2, frfs.values[:, 1], rtol=SEEN, atol=0)
     assert np.allclose(right.variance[:, 1] * 1.44, frfs.variance[:, 1], rtol=2 * SEEN, atol=0)
@@ -151,7 +151,7 @@ def test_a_line_that_a_highpass_does_not_show_stays_as_it_is(nominal, with_mass)
     frfs = measured(nominal)
     from_zero = replace(frfs, frequency_hz=frfs.frequency_hz - frfs.frequency_hz[0])
     highpass = Finding(effect="sensor_dynamics", key=("acc_2", "highpass"), values=(20.0,))
-    right = apply_to_frfs(from_zero, replace(with_mass, findings=(highpass,)))
+    right = correct_frfs(from_zero, replace(with_mass, findings=(highpass,)))
     s = from_zero.s[1:]
     assert np.array_equal(right.values[0], from_zero.values[0])
     assert np.allclose(right.values[1:, 1], from_zero.values[1:, 1] * (s + 40 * np.pi) / s, rtol=1e-9, atol=0)
@@ -160,7 +160,7 @@ def test_a_line_that_a_highpass_does_not_show_stays_as_it_is(nominal, with_mass)
 def test_gains_that_nobody_knows_are_not_diagnosed(nominal):
     frfs = measured(nominal, factors=lambda f: np.array([3.0, 0.2]) + 0 * f[:, None])
     free = replace(frfs, unknown_scale="per_channel")
-    assert diagnose(nominal, observed(free), FEW).verdict == "consistent"
+    assert diagnose(observed(free), nominal, options=FEW).verdict == "consistent"
 
 
 def test_noise_is_not_taken_for_a_gain(nominal):
@@ -179,7 +179,7 @@ def test_noise_is_not_taken_for_a_gain(nominal):
 
 def test_an_unknown_effect_is_refused(nominal):
     with pytest.raises(InputError, match="added_mass"):
-        diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=("aded_mass",)))
+        diagnose(observed(measured(nominal)), nominal, options=DiagnoseOptions(effects=("aded_mass",)))
 
 
 def test_a_sensor_that_the_model_lacks_is_refused(nominal):
@@ -187,19 +187,19 @@ def test_a_sensor_that_the_model_lacks_is_refused(nominal):
     elsewhere = tuple(FrfLabel(Dof(99, "z"), label.input_dof, label.quantity) for label in frfs.labels[:1])
     bad = replace(frfs.select_frfs([0]), labels=elsewhere)
     with pytest.raises(InputError, match="99"):
-        diagnose(nominal, observed(bad), FEW)
+        diagnose(observed(bad), nominal, options=FEW)
 
 
 def test_too_few_lines_are_refused(nominal):
     with pytest.raises(InputError, match="lines"):
-        diagnose(nominal, observed(measured(nominal, n_lines=10)), FEW)
+        diagnose(observed(measured(nominal, n_lines=10)), nominal, options=FEW)
 
 
 def test_a_users_own_effect_is_found(nominal, tmp_path):
     (tmp_path / "mine.py").write_text(OWN, encoding="utf-8")
     frfs = measured(with_springs(nominal, {Dof(14, "z"): 2e4}), labels())
     options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:Cord",))
-    diagnosis = diagnose(nominal, observed(frfs), options, folder=tmp_path)
+    diagnosis = diagnose(observed(frfs), nominal, options=options, folder=tmp_path)
     assert (diagnosis.verdict, diagnosis.findings[0].effect) == ("explained", "cord")
     assert diagnosis.findings[0].parameters["pull_N_m"].value == pytest.approx(2e4, rel=SEEN)
 

@@ -30,7 +30,7 @@ def test_a_finding_says_how_closely_it_is_located(tmp_path):
     """A beam clamped at both ends and measured in its middle has no left and right."""
     nominal = beam(tmp_path, elements=24, right="clamped")
     frfs = measured(with_point_masses(nominal, {6: ADDED_KG}), labels(outputs=("13:+z",), inputs=("13:+z",)))
-    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    diagnosis = diagnose(observed(frfs), nominal, options=DiagnoseOptions(effects=("added_mass",)))
     (finding,) = diagnosis.findings
     assert {6, 20} <= {location["nodes"][0] for location in finding.location_set}
     assert finding.statement.endswith(describe_location_set(finding.location_set))

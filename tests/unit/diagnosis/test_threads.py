@@ -24,6 +24,6 @@ def test_a_diagnosis_uses_one_thread_and_gives_the_others_back(monkeypatch):
     with threadpool_limits(limits=2, user_api="blas"):
         before = threads()
         with pytest.raises(KeyboardInterrupt):
-            stage.diagnose(None, nothing, DiagnoseOptions())
+            stage.diagnose(nothing, None, options=DiagnoseOptions())
         assert threads() == before
     assert set(used) == {1}

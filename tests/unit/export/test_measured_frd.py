@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from chains import label
 from frf_ipz.errors import InputError
-from frf_ipz.export.measured_frd import measured_frd
+from frf_ipz.export.frequency_response_data import to_frd
 from frf_ipz.frf import FrfSet
 
 LABELS = (label(2, 1), label(-4, 1), label(2, 3))
@@ -30,7 +30,7 @@ def frfs():
 
 def test_rows_are_sensors_columns_excited_dofs_and_unmeasured_pairs_nan():
     measured = frfs()
-    data = measured_frd(measured)
+    data = to_frd(measured)
     assert data.output_labels == ["2:+x", "4:-x"]
     assert data.input_labels == ["1:+x", "3:+x"]
     assert np.array_equal(data.frdata[0, 0], measured.values[:, 0])
@@ -42,4 +42,4 @@ def test_rows_are_sensors_columns_excited_dofs_and_unmeasured_pairs_nan():
 
 def test_an_exponential_window_is_refused():
     with pytest.raises(InputError, match="exponential window"):
-        measured_frd(replace(frfs(), window_decay_1_s=3.0))
+        to_frd(replace(frfs(), window_decay_1_s=3.0))

@@ -13,9 +13,9 @@ from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.reduction import reduce as reduction
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
-from frf_ipz.fe.response import model_frfs, model_poles
+from frf_ipz.fe.response import compute_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 
@@ -39,9 +39,9 @@ def reduce(
     band_hz=BAND,
     **options_of_reduction,
 ):
-    return reduce_model(
+    return reduce_to_dofs(
         model,
-        options or ReduceOptions(),
+        options=options or ReduceOptions(),
         actuators=dofs(*actuators),
         sensors=dofs(*sensors),
         points=dofs(*points),
@@ -52,7 +52,7 @@ def reduce(
 
 def frfs(model, pairs, s):
     labels = [FrfLabel(parse_dof(out), parse_dof(excited), FrfQuantity.RECEPTANCE) for out, excited in pairs]
-    return model_frfs(model, labels, s)
+    return compute_frfs(model, labels, s)
 
 
 @pytest.fixture(scope="module", params=["clamped", "free"])

@@ -10,7 +10,7 @@ from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe import response
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.fe.response import model_frfs, model_poles
+from frf_ipz.fe.response import compute_frfs, model_poles
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.structure import ReducedModel
@@ -74,23 +74,23 @@ LABELS = [label("21:z", "9:z"), label("4:-z", "9:z"), label("9:+z", "21:-z"), la
 @pytest.mark.parametrize("left", ["clamped", "free"])
 def test_modal_sums_agree_with_direct_solves(left):
     model = beam(left=left, elements=20, modal_ratio=0.01)
-    require_same(model_frfs(model, LABELS, S), direct(model, LABELS, S, modal_damping_matrix(model)))
+    require_same(compute_frfs(model, LABELS, S), direct(model, LABELS, S, modal_damping_matrix(model)))
 
 
 def test_quantities_and_signs_are_those_of_the_labels():
     model = beam(left="clamped", modal_ratio=0.01)
     labels = [label("21:z", "9:z", quantity) for quantity in FrfQuantity]
-    receptance, mobility, accelerance = model_frfs(model, labels, S).T
+    receptance, mobility, accelerance = compute_frfs(model, labels, S).T
     assert_allclose(mobility, S * receptance, rtol=1e-14)
     assert_allclose(accelerance, S**2 * receptance, rtol=1e-14)
-    flipped = model_frfs(model, [label("21:-z", "9:z"), label("21:-z", "9:-z")], S)
+    flipped = compute_frfs(model, [label("21:-z", "9:z"), label("21:-z", "9:-z")], S)
     assert_allclose(flipped, np.stack([-receptance, receptance], 1), rtol=1e-14)
 
 
 def test_dampers_couple_the_modes(tmp_path):
     model = read_text_model(tmp_path, CHAIN)
     labels = [label("3:x", "1:x"), label("2:x", "2:x")]
-    require_same(model_frfs(model, labels, S), direct(model, labels, S, modal_damping_matrix(model)))
+    require_same(compute_frfs(model, labels, S), direct(model, labels, S, modal_damping_matrix(model)))
 
 
 def test_rayleigh_damping_couples_none(tmp_path):
@@ -99,8 +99,8 @@ def test_rayleigh_damping_couples_none(tmp_path):
     )
     undamped = read_text_model(tmp_path, CHAIN.replace("modal_ratio = 0.01", "rayleigh = { alpha_1_s = 3.0 }"))
     labels = [label("3:x", "1:x")]
-    require_same(model_frfs(model, labels, S), direct(model, labels, S))
-    require_same(model_frfs(undamped, labels, S), direct(undamped, labels, S))
+    require_same(compute_frfs(model, labels, S), direct(model, labels, S))
+    require_same(compute_frfs(undamped, labels, S), direct(undamped, labels, S))
 
 
 def test_damping_that_couples_no_modes_adds_to_the_stated_ratios():
@@ -113,17 +113,17 @@ def test_damping_that_couples_no_modes_adds_to_the_stated_ratios():
         modal_damping=[0.01],
         fixed=plain.fixed,
     )
-    require_same(model_frfs(model, LABELS, S), direct(model, LABELS, S, modal_damping_matrix(model)))
+    require_same(compute_frfs(model, LABELS, S), direct(model, LABELS, S, modal_damping_matrix(model)))
 
 
 def test_a_large_model_keeps_the_static_part_of_modes_left_out(monkeypatch):
     model = beam(left="clamped", elements=20, modal_ratio=1e-6)
-    everything = model_frfs(model, LABELS, S)
+    everything = compute_frfs(model, LABELS, S)
     monkeypatch.setattr(response, "DENSE_ORDER", 10)
     bases = []
     real = response.solve_basis
     monkeypatch.setattr(response, "solve_basis", lambda *args, **how: bases.append(real(*args, **how)) or bases[-1])
-    require_same(model_frfs(model, LABELS, S), everything, tolerance=1e-5)  # (1/3)^10 of the first mode beyond
+    require_same(compute_frfs(model, LABELS, S), everything, tolerance=1e-5)  # (1/3)^10 of the first mode beyond
     assert len(bases[0].eigenvalues) < 10
 
 
@@ -131,10 +131,10 @@ def test_the_series_loads_either_side(monkeypatch):
     model = beam(left="free", elements=20, modal_ratio=1e-6)
     labels = [label(f"{node}:z", "3:z") for node in (1, 5, 9)] + [label("7:z", "3:z")]
     mirrored = [label(str(pair.input_dof), str(pair.output_dof)) for pair in labels]
-    everything = model_frfs(model, labels, S)
+    everything = compute_frfs(model, labels, S)
     monkeypatch.setattr(response, "DENSE_ORDER", 10)
-    require_same(model_frfs(model, labels, S), everything, tolerance=1e-5)
-    require_same(model_frfs(model, mirrored, S), everything, tolerance=1e-5)
+    require_same(compute_frfs(model, labels, S), everything, tolerance=1e-5)
+    require_same(compute_frfs(model, mirrored, S), everything, tolerance=1e-5)
 
 
 def test_coupled_damping_of_a_large_model(monkeypatch):
@@ -145,18 +145,18 @@ def test_coupled_damping_of_a_large_model(monkeypatch):
         model.mass_all, model.stiffness_all, model.all_dofs, damping=dashpot, modal_damping=[0.002], fixed=model.fixed
     )
     exact = direct(plain, LABELS, S, modal_damping_matrix(plain))
-    require_same(model_frfs(plain, LABELS, S), exact)
+    require_same(compute_frfs(plain, LABELS, S), exact)
     monkeypatch.setattr(response, "COUPLED_ORDER", 10)
-    require_same(model_frfs(plain, LABELS, S), exact, tolerance=5e-3)  # the modes beyond are not coupled
+    require_same(compute_frfs(plain, LABELS, S), exact, tolerance=5e-3)  # the modes beyond are not coupled
 
 
 @pytest.mark.parametrize("quantity", list(FrfQuantity))
 def test_at_zero_frequency_the_frf_next_to_it_is_given(quantity):
     held, free = (beam(left=left, modal_ratio=0.01) for left in ("clamped", "free"))
     frequency = np.array([0.0, 5.0])
-    still = model_frfs(held, [label("21:z", "21:z", quantity)], 2j * np.pi * frequency)
+    still = compute_frfs(held, [label("21:z", "21:z", quantity)], 2j * np.pi * frequency)
     assert np.isfinite(still).all()
-    loose = model_frfs(free, [label("21:z", "21:z", quantity)], 2j * np.pi * frequency)
+    loose = compute_frfs(free, [label("21:z", "21:z", quantity)], 2j * np.pi * frequency)
     assert np.isfinite(loose).all()
     if quantity is FrfQuantity.RECEPTANCE:
         beam_stiffness = 3 * 69e9 * 25.33e-3 * 5.1e-3**3 / 12 / 0.4995**3
@@ -184,7 +184,7 @@ def reduced(mass, damping, stiffness):
 def test_a_reduced_model_is_solved_directly_also_where_it_is_not_symmetric():
     mass, damping = np.array([[2.0, 0.3], [0.3, 1.0]]), np.array([[3.0, 1.0], [0.5, 2.0]])
     stiffness = np.array([[5e5, -1e5], [-1.01e5, 2e5]])
-    computed = model_frfs(reduced(mass, damping, stiffness), [label("9:-x", "2:x"), label("1:x", "9:x")], S)
+    computed = compute_frfs(reduced(mass, damping, stiffness), [label("9:-x", "2:x"), label("1:x", "9:x")], S)
     for line, s in enumerate(S):
         inverse = np.linalg.inv(s**2 * mass + s * damping + stiffness)
         assert_allclose(computed[line], [-0.5 * inverse[:, 1].sum(), 0.5 * inverse[0].sum()], rtol=1e-12)
@@ -193,7 +193,7 @@ def test_a_reduced_model_is_solved_directly_also_where_it_is_not_symmetric():
 def test_many_lines_are_solved_in_blocks():
     model = reduced(np.eye(2), 0.1 * np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]))
     s = 1j * np.linspace(0.1, 3.0, 3 * response.LINES_AT_ONCE + 7)
-    computed = model_frfs(model, [label("1:x", "1:x")], s)[:, 0]
+    computed = compute_frfs(model, [label("1:x", "1:x")], s)[:, 0]
     expected = 0.5 / (s**2 + 0.1 * s + 1) + 0.5 / (s**2 + 0.1 * s + 3)
     assert_allclose(computed, expected, rtol=1e-12)
 
@@ -201,9 +201,9 @@ def test_many_lines_are_solved_in_blocks():
 def test_an_unknown_or_held_dof_is_refused():
     model = beam(left="clamped")
     with pytest.raises(InputError, match="no node 99"):
-        model_frfs(model, [label("99:z", "4:z")], S)
+        compute_frfs(model, [label("99:z", "4:z")], S)
     with pytest.raises(InputError, match="held"):
-        model_frfs(model, [label("4:z", "1:z")], S)
+        compute_frfs(model, [label("4:z", "1:z")], S)
 
 
 def test_poles_of_modes_with_damping_ratios():

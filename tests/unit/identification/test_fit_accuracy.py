@@ -36,7 +36,7 @@ def errors_over_seeds(truth, seeds):
     poles = poles_of(truth)
     errors = []
     for seed in seeds:
-        fit = fit_modes(of_bench(truth, seed=FRESH + seed), FitOptions())
+        fit = fit_modes(of_bench(truth, seed=FRESH + seed), options=FitOptions())
         assert count(fit.model.poles[: fit.n_modes], poles) == (len(poles), 0, 0)
         assert fit.noise_from == "recordings"
         errors.append(normalised_errors(fit, poles))
@@ -73,7 +73,7 @@ def test_standard_deviations_are_calibrated(modes):
     truth = random_modes(SPREAD, 0.005)
     errors = []
     for seed in range(2):
-        fit = fit_modes(accelerances(truth, LINES_HZ, seed=seed), FitOptions(modes=modes))
+        fit = fit_modes(accelerances(truth, LINES_HZ, seed=seed), options=FitOptions(modes=modes))
         errors.append(normalised_errors(fit, truth.poles))
     assert rms(errors) == pytest.approx(1.0, abs=FEW_SEEDS)
 
@@ -92,7 +92,7 @@ def test_plate_with_two_close_pairs(truth_sets):
 
 def test_zeros_of_a_plate_are_calibrated(truth_sets):
     truth = truth_sets["b"]()
-    errors = zero_errors(fit_modes(of_bench(truth, seed=FRESH), FitOptions()), truth)
+    errors = zero_errors(fit_modes(of_bench(truth, seed=FRESH), options=FitOptions()), truth)
     assert len(errors) > 200
     assert CALIBRATED[0] < rms(errors[np.abs(errors).max(axis=1) < 6]) < CALIBRATED[1]
     assert np.mean(np.abs(errors).max(axis=1) > 6) < 0.02  # zeros beside another one, to which Newton may run

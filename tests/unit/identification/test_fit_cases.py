@@ -45,7 +45,7 @@ def exact(truth, s):
 )
 def test_kinds_of_modes(frequency_hz, damping):
     truth = random_modes(frequency_hz, damping, seed=SEED)
-    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions())
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), options=FitOptions())
     assert_complete(fit, truth)
 
 
@@ -53,7 +53,7 @@ def test_three_decades_of_residue():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     small = np.where(np.isin(np.arange(len(SPREAD)), [2, 5]), 10**-1.5, 1.0)
     truth = replace(truth, outputs=truth.outputs * small, inputs=truth.inputs * small)
-    fit = fit_modes(accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED), FitOptions())
+    fit = fit_modes(accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED), options=FitOptions())
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
 
@@ -64,7 +64,9 @@ def test_weak_modes_are_found_where_the_noise_lets_them(seed):
     small = np.where(np.isin(np.arange(len(SPREAD)), [2, 5]), 10**-1.5, 1.0)
     truth = replace(truth, outputs=truth.outputs * small, inputs=truth.inputs * small)
     frfs = accelerances(truth, LINES_HZ, noise=0.01, seed=seed)
-    error = np.abs(np.abs(poles_of(fit_modes(frfs, FitOptions())))[:, None] / np.abs(truth.poles) - 1).min(axis=0)
+    error = np.abs(np.abs(poles_of(fit_modes(frfs, options=FitOptions())))[:, None] / np.abs(truth.poles) - 1).min(
+        axis=0
+    )
     s = frfs.s[:, None]
     for weak in (2, 5):
         alone = truth.residues()[weak] / (s - truth.poles[weak]) + truth.residues()[weak].conj() / (
@@ -86,7 +88,9 @@ def test_noise_that_all_frfs_share():
         rng = np.random.default_rng(seed)
         shared = 0.01 * (rng.standard_normal(len(LINES_HZ)) + 1j * rng.standard_normal(len(LINES_HZ)))
         independent = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2)) * rng.standard_normal(values.shape)
-        fit = fit_modes(frf_set(LINES_HZ, values * (1 + shared[:, None]) + independent, labels_of(6, 2)), FitOptions())
+        fit = fit_modes(
+            frf_set(LINES_HZ, values * (1 + shared[:, None]) + independent, labels_of(6, 2)), options=FitOptions()
+        )
         assert_complete(fit, truth)
         errors.append(normalised_errors(fit, truth.poles))
     assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.4  # 2.7 if FRFs were taken for independent
@@ -96,7 +100,9 @@ def test_pink_noise():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     values = exact(truth, 2j * np.pi * LINES_HZ)
     std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0)) * np.sqrt(50 / LINES_HZ)[:, None]
-    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), FitOptions())
+    fit = fit_modes(
+        with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), options=FitOptions()
+    )
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
 
@@ -117,7 +123,7 @@ def holed_frfs():
 def test_lines_of_low_coherence_are_left_out(holed):
     truth, frfs, hole, _ = holed
     coherence = np.where(hole[:, None], 0.1, 0.999) * np.ones(frfs.values.shape)
-    fit = fit_modes(replace(frfs, coherence=coherence), FitOptions())
+    fit = fit_modes(replace(frfs, coherence=coherence), options=FitOptions())
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
     assert not fit.used_lines[hole].any()
@@ -125,7 +131,7 @@ def test_lines_of_low_coherence_are_left_out(holed):
 
 def test_bands_that_the_user_leaves_out(holed):
     truth, frfs, hole, bands = holed
-    fit = fit_modes(frfs, FitOptions(exclude_hz=bands))
+    fit = fit_modes(frfs, options=FitOptions(exclude_hz=bands))
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
     assert not fit.used_lines[hole].any()
@@ -143,7 +149,9 @@ def test_a_record_that_is_cut_off():
     conjugate_half = (1 - np.exp((truth.poles.conj() - s[:, None]) * record)) / (s[:, None] - truth.poles.conj())
     values = (half + conjugate_half @ truth.residues().conj()) * s[:, None] ** 2
     std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
-    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), FitOptions())
+    fit = fit_modes(
+        with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED)), options=FitOptions()
+    )
     assert_complete(fit, truth)
 
 
@@ -157,7 +165,7 @@ def test_a_dead_channel(noise_known):
     )
     dead = np.isin(np.arange(frfs.n_frfs), [2, 3])
     frfs = replace(frfs, values=np.where(dead, noise, frfs.values))
-    fit = fit_modes(frfs if noise_known else frf_set(LINES_HZ, frfs.values, frfs.labels), FitOptions())
+    fit = fit_modes(frfs if noise_known else frf_set(LINES_HZ, frfs.values, frfs.labels), options=FitOptions())
     assert_complete(fit, truth)
     assert not fit.zeros.identifiable[np.isin(fit.zeros.frf, [2, 3])].any()
 
@@ -166,7 +174,7 @@ def test_a_channel_of_zeros_has_no_zeros():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     values = np.where(np.arange(frfs.n_frfs) == 2, 0.0, frfs.values)
-    fit = fit_modes(frf_set(LINES_HZ, values, frfs.labels), FitOptions())
+    fit = fit_modes(frf_set(LINES_HZ, values, frfs.labels), options=FitOptions())
     assert_complete(fit, truth)
     assert 2 not in fit.zeros.frf
 
@@ -174,7 +182,7 @@ def test_a_channel_of_zeros_has_no_zeros():
 def test_noise_that_was_not_measured():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    fit = fit_modes(frf_set(LINES_HZ, frfs.values, frfs.labels), FitOptions())
+    fit = fit_modes(frf_set(LINES_HZ, frfs.values, frfs.labels), options=FitOptions())
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
     assert fit.noise_from == "misfit"
@@ -182,7 +190,7 @@ def test_noise_that_was_not_measured():
 
 def test_a_band_that_does_not_start_at_zero():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
-    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions(band_hz=(300.0, 860.0)))
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), options=FitOptions(band_hz=(300.0, 860.0)))
     inside = replace(truth, frequency_hz=SPREAD[3:8], damping_ratio=truth.damping_ratio[3:8])
     assert_complete(fit, inside)
     assert fit.band_hz == (300.0, 860.0)
@@ -195,7 +203,7 @@ def test_the_model_is_in_the_unit_that_was_measured(quantity):
     values = truth.receptance(s) * s[:, None] ** quantity.power
     std = 1e-5 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
     frfs = with_noise(LINES_HZ, values, labels_of(6, 2, quantity), std, np.random.default_rng(SEED))
-    fit = fit_modes(frfs, FitOptions(band_hz=(20.0, 1000.0)))
+    fit = fit_modes(frfs, options=FitOptions(band_hz=(20.0, 1000.0)))
     used = fit.used_lines
     np.testing.assert_allclose(fit.model(s[used]), values[used], rtol=0, atol=10 * std.max())
     residues = truth.residues() * truth.poles[:, None] ** quantity.power
@@ -210,7 +218,7 @@ def test_an_exponential_window_is_compensated():
     values = exact(truth, s)
     std = 0.01 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
     frfs = with_noise(LINES_HZ, values, labels_of(6, 2), std, np.random.default_rng(SEED))
-    fit = fit_modes(replace(frfs, window_decay_1_s=3.0), FitOptions())
+    fit = fit_modes(replace(frfs, window_decay_1_s=3.0), options=FitOptions())
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
 
@@ -220,7 +228,7 @@ def test_delays_of_channels():
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     delay_s = np.where([label.output_dof.node % 2 for label in frfs.labels], 7.3e-4, -1e-4)
     late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * delay_s))
-    fit = fit_modes(late, FitOptions(delay=True))
+    fit = fit_modes(late, options=FitOptions(delay=True))
     assert_complete(fit, truth)
     np.testing.assert_allclose(fit.model.delay_s, delay_s, rtol=0, atol=5e-7)  # 0.05 % of the shortest period
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
@@ -230,14 +238,14 @@ def test_pinned_and_rejected_poles():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     options = FitOptions(strike=(RejectedPole(hz=430.0, why="the shaker's own resonance"),))
-    fit = fit_modes(frfs, options)
+    fit = fit_modes(frfs, options=options)
     rest = np.delete(SPREAD, 4)
     assert np.abs(np.abs(poles_of(fit)) / 2 / np.pi - 430.0).min() > 8.0
     assert all(np.abs(np.abs(poles_of(fit)) / 2 / np.pi - hz).min() < 1.0 for hz in rest)
     assert "the shaker's own resonance" in set(fit.decisions["reason"])
-    without_pole = fit_modes(frfs, FitOptions(strike=(RejectedPole(hz=250.0, why="a lamp"),)))
+    without_pole = fit_modes(frfs, options=FitOptions(strike=(RejectedPole(hz=250.0, why="a lamp"),)))
     assert list(without_pole.decisions.loc[without_pole.decisions["action"] == "rejected", "reason"]) == ["a lamp"]
-    pinned = fit_modes(frfs, FitOptions(pin_hz=(715.0, PinnedPole(hz=430.0, why="seen by eye"))))
+    pinned = fit_modes(frfs, options=FitOptions(pin_hz=(715.0, PinnedPole(hz=430.0, why="seen by eye"))))
     is_pinned = pinned.decisions["action"] == "pinned"
     assert list(pinned.decisions.loc[is_pinned, "reason"]) == ["the user says that a mode is here", "seen by eye"]
     assert count(poles_of(pinned), truth.poles)[0] == len(SPREAD)
@@ -248,13 +256,13 @@ def test_residues_of_a_single_frf_with_poles_held():
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
     drifted = replace(truth, frequency_hz=SPREAD * (1 + 2e-4))
     last = accelerances(drifted, LINES_HZ, seed=SEED + 1).select_frfs([5])
-    fit = fit_residues(last, truth.poles, FitOptions())
+    fit = fit_residues(last, poles=truth.poles, options=FitOptions())
     np.testing.assert_array_equal(poles_of(fit), truth.poles)
     assert len(fit.warnings) == 1
     assert "off the given poles" in fit.warnings[0]
     assert float(fit.warnings[0].split(";")[0].split()[-1]) == pytest.approx(200, rel=0.05)
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.05
-    steady = fit_residues(frfs.select_frfs([5]), truth.poles, FitOptions())
+    steady = fit_residues(frfs.select_frfs([5]), poles=truth.poles, options=FitOptions())
     assert steady.warnings == ()
     assert np.sqrt(np.mean(steady.misfit["ratio"] ** 2)) < 1.05
 
@@ -269,7 +277,7 @@ def test_drift_between_frfs_is_reported():
         for k, change in enumerate(drift)
     ]
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    fit = fit_modes(replace(frfs, values=np.hstack(columns)), FitOptions())
+    fit = fit_modes(replace(frfs, values=np.hstack(columns)), options=FitOptions())
     assert_complete(fit, truth)
     assert "drifted" in fit.warnings[-1]
     assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(200, rel=0.05)
@@ -278,7 +286,7 @@ def test_drift_between_frfs_is_reported():
 def test_model_error_is_reported():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)
-    fit = fit_modes(replace(frfs, variance=frfs.variance / 4), FitOptions())
+    fit = fit_modes(replace(frfs, variance=frfs.variance / 4), options=FitOptions())
     assert fit.noise_from == "misfit"
     assert "2 times the noise" in fit.warnings[0]
     assert fit.misfit["ratio"].median() == pytest.approx(2.0, rel=0.05)  # over the noise as it was stated
@@ -290,20 +298,20 @@ def test_noise_alone_has_no_modes():
     values = np.zeros((len(LINES_HZ), 4), complex)
     frfs = with_noise(LINES_HZ, values, labels_of(4, 1), 1e-3, rng)
     with pytest.raises(InputError, match="no frequency line carries a signal"):
-        fit_modes(frfs, FitOptions())
+        fit_modes(frfs, options=FitOptions())
     with pytest.raises(NumericalError, match="no mode stands out of the noise"):
-        fit_modes(frfs, FitOptions(band_hz=(10.0, 900.0)))
+        fit_modes(frfs, options=FitOptions(band_hz=(10.0, 900.0)))
 
 
 def test_too_few_lines():
     frfs = accelerances(random_modes(SPREAD, 0.005), LINES_HZ)
     with pytest.raises(InputError, match="usable frequency lines"):
-        fit_modes(frfs, FitOptions(band_hz=(100.0, 102.0)))
+        fit_modes(frfs, options=FitOptions(band_hz=(100.0, 102.0)))
 
 
 def test_tables_of_a_clean_fit():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
-    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), FitOptions())
+    fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), options=FitOptions())
     assert list(fit.modes["quality"]) == ["good"] * len(SPREAD)
     assert (fit.modes["mpc"] > 0.99).all()
     assert len(fit.misfit) == 12 * 8

@@ -11,7 +11,7 @@ from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.identification.fit import fit_modes, fit_residues
 from frf_ipz.identification.options import FitOptions
-from frf_ipz.identification.results.gains import gains_from_shapes
+from frf_ipz.identification.results.gains import estimate_gains
 from frf_ipz.identification.results.shapes import mode_shapes
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -30,7 +30,7 @@ def frequencies(fit):
 
 
 def test_demo_campaign_has_its_four_modes_and_no_other():
-    fit = fit_modes(frfs_of(DEMO), FitOptions(band_hz=(10.0, 700.0)))
+    fit = fit_modes(frfs_of(DEMO), options=FitOptions(band_hz=(10.0, 700.0)))
     assert fit.n_modes == 4
     # two are given as rounded
     np.testing.assert_allclose(fit.model.damping_ratio[:4], DEMO_DAMPING, rtol=0.005, atol=0)
@@ -41,7 +41,7 @@ def test_demo_campaign_has_its_four_modes_and_no_other():
 
 
 def test_demo_campaign_without_a_band():
-    fit = fit_modes(frfs_of(DEMO), FitOptions())
+    fit = fit_modes(frfs_of(DEMO), options=FitOptions())
     assert fit.n_modes == 5  # the fifth lies above the pipeline's band
     damping = np.append(DEMO_DAMPING, 0.0027)
     np.testing.assert_allclose(fit.model.damping_ratio[:5], damping, rtol=0.005, atol=0)
@@ -59,7 +59,7 @@ BEAM_HZ = np.array([111.994, 306.854, 596.368, 974.137])  # looked at in plots o
 
 @pytest.fixture(scope="module")
 def beam_fit(beam):
-    return fit_modes(beam, BEAM_BAND)
+    return fit_modes(beam, options=BEAM_BAND)
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def test_free_beam_weighs_the_same_by_three_of_its_modes(recordings, beam_fit):
 @pytest.mark.slow
 def test_driving_point_of_the_free_beam_is_lower_than_the_others(recordings, beam_fit):
     modes = solve_modes(read_model(recordings / "freefree_beam" / "model.toml"), n_modes=8)
-    table = gains_from_shapes(beam_fit, modes)
+    table = estimate_gains(beam_fit, modes)
     is_driving = np.array([dof[:2] == "99" for dof in table["input_dof"]])
     assert float(table["gain"][is_driving].iloc[0]) == pytest.approx(0.86, abs=0.04)  # two standard deviations
     np.testing.assert_allclose(table["gain"][~is_driving], 1.0, rtol=0, atol=0.05)  # two standard deviations
@@ -88,7 +88,7 @@ def test_driving_point_of_the_free_beam_is_lower_than_the_others(recordings, bea
 @pytest.mark.slow
 def test_free_beam_does_not_determine_gains_by_itself(beam):
     with pytest.raises(InputError, match=r"do not determine the gain of the channel 'input 99:\+z'"):
-        fit_modes(beam, replace(BEAM_BAND, gain=("input 99:+z",)))
+        fit_modes(beam, options=replace(BEAM_BAND, gain=("input 99:+z",)))
 
 
 @pytest.mark.slow
@@ -103,9 +103,9 @@ def test_free_beam_has_four_modes_and_drifts(beam_fit):
 
 @pytest.mark.slow
 def test_ninth_file_of_the_free_beam_with_poles_held(beam):
-    eight = fit_modes(beam.select_frfs(range(8)), BEAM_BAND)
+    eight = fit_modes(beam.select_frfs(range(8)), options=BEAM_BAND)
     assert eight.n_modes == 4
-    ninth = fit_residues(beam.select_frfs([8]), eight.model.poles[:4], BEAM_BAND)
+    ninth = fit_residues(beam.select_frfs([8]), poles=eight.model.poles[:4], options=BEAM_BAND)
     assert "off the given poles" in ninth.warnings[0]
     assert float(ninth.warnings[0].split(";")[0].split()[-1]) == pytest.approx(-50, abs=12)
     assert ninth.misfit["ratio"].median() < 1.2
@@ -114,7 +114,7 @@ def test_ninth_file_of_the_free_beam_with_poles_held(beam):
 
 def test_steel_beam(recordings):
     frfs = frfs_of(recordings / "steel_beam_5x3" / "test.toml")
-    fit = fit_modes(frfs, FitOptions(band_hz=(1.0, 600.0)))
+    fit = fit_modes(frfs, options=FitOptions(band_hz=(1.0, 600.0)))
     peaks = (32.7, 51.9, 93.1, 105.7, 172.4, 183.7, 289.0, 377.3, 437.5, 450.1)  # peaks of the plots
     natural_hz = frequencies(fit)
     assert all(np.abs(natural_hz / hz - 1).min() < 5e-3 for hz in peaks)
@@ -124,7 +124,7 @@ def test_steel_beam(recordings):
 
 def test_raw_impacts_of_a_lightly_damped_structure(recordings):
     frfs = frfs_of(recordings / "raw_hammer" / "test.toml")
-    fit = fit_modes(frfs, FitOptions(band_hz=(500.0, 6500.0)))
+    fit = fit_modes(frfs, options=FitOptions(band_hz=(500.0, 6500.0)))
     peaks = (810.3, 851.6, 900.0, 2640.2, 3007.5, 3035.3, 3669.0, 3689.4, 4127.6, 4163.2, 4391.7, 4421.0, 4470.0)
     natural_hz = frequencies(fit)
     assert all(np.abs(natural_hz / hz - 1).min() < 1e-3 for hz in (*peaks, 5031.0, 5073.8, 5969.6, 6076.7))

@@ -49,7 +49,7 @@ def on_even_lines(frfs, frfs_there):
 
 def halves_of(frfs, options):
     number = np.arange(frfs.n_lines)
-    return [fit_modes(frfs.select_lines(number % 2 == half), options) for half in range(2)]
+    return [fit_modes(frfs.select_lines(number % 2 == half), options=options) for half in range(2)]
 
 
 def partners(first, second):
@@ -75,7 +75,7 @@ def rms(values):
 
 
 def test_modes_of_both_halves_are_confirmed():
-    fit = fit_modes(four_modes(), FitOptions())
+    fit = fit_modes(four_modes(), options=FitOptions())
     assert fit.warnings == ()
     assert list(fit.modes["quality"]) == ["good"] * 4
     assert "unconfirmed" not in set(fit.decisions["action"])
@@ -85,7 +85,7 @@ def test_a_mode_of_one_half_is_unconfirmed():
     truth, extra = random_modes(FOUR, 0.01, seed=SEED), random_modes(np.array([260.0]), 0.01, seed=SEED)
     frfs = four_modes()
     added = 0.3 * accelerances(extra, LINES_HZ, noise=0.0).values
-    fit = fit_modes(replace(frfs, values=frfs.values + np.where(EVEN[:, None], added, 0.0)), FitOptions())
+    fit = fit_modes(replace(frfs, values=frfs.values + np.where(EVEN[:, None], added, 0.0)), options=FitOptions())
     is_poor = np.abs(fit.modes["frequency_hz"] - 260.0) < 2.0
     assert is_poor.sum() == 1
     assert list(fit.modes["quality"]) == np.where(is_poor, "poor", "good").tolist()
@@ -106,7 +106,7 @@ def count_within(fit, truth):
 def test_halves_that_differ_raise_the_standard_deviations():
     relative = 5e-4
     frfs = on_even_lines(four_modes(), four_modes(detuned=relative))
-    fit = fit_modes(frfs, FitOptions())
+    fit = fit_modes(frfs, options=FitOptions())
     assert "each fitted by itself, differ by" in fit.warnings[0]
     std = np.sqrt(pair_blocks(fit.covariance)[:4, 1, 1]) / (2 * np.pi * FOUR)
     half = relative / 2  # what the frequencies of all lines may be off

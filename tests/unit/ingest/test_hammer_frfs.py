@@ -125,7 +125,7 @@ def test_an_impact_at_the_beginning_of_a_file_does_not_shorten_the_lead_of_those
     first, *later = result.records.trigger_s
     assert first < 40 * step_s
     assert min(later) > 0.9 * CELL * step_s
-    records = observe(test, IngestOptions(), result.frfs).records
+    records = observe(test, ingest=IngestOptions(), frfs=result.frfs).records
     assert [record.number for record in records] == [1, 2, 3]
     assert [record.has_predecessor for record in records] == [False, True, True]
     pulses = [record.start_s + record.step_s * np.argmax(record.force) for record in records]

@@ -9,10 +9,10 @@ from scipy.optimize import linear_sum_assignment
 
 from chains import chain, label
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.pairing.model_roots import ModelZeros, model_poles, model_zeros
-from frf_ipz.pairing.pair import pair
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
@@ -59,7 +59,7 @@ def complex_zeros(model, frf_label):
 
 def test_a_model_is_paired_with_itself_throughout():
     model = chain()
-    pairs = pair(measured(model), model)
+    pairs = pair_roots(measured(model), model)
     assert {row.verdict for row in pairs.rows} == {Verdict.PAIRED}
     assert pairs.warnings == ()
     for row in pairs.rows:
@@ -72,7 +72,7 @@ def test_residues_of_the_model_rebuild_its_frf():
     model = chain(damping=0.02)
     fit = measured(model, zeros=False)
     s = 2j * np.pi * np.linspace(2.0, 150.0, 40)
-    assert_allclose(fit.model(s), model_frfs(model, LABELS, s), rtol=1e-9)
+    assert_allclose(fit.model(s), compute_frfs(model, LABELS, s), rtol=1e-9)
 
 
 @pytest.mark.parametrize("quantity", list(FrfQuantity))
@@ -80,7 +80,7 @@ def test_pairing_does_not_depend_on_the_quantity(quantity):
     labels = tuple(replace(frf_label, quantity=quantity) for frf_label in LABELS)
     model = chain()
     stiffer = replace(model, stiffness=1.15 * model.stiffness)
-    pairs = pair(measured(stiffer, labels), model)
+    pairs = pair_roots(measured(stiffer, labels), model)
     assert [row.computed for row in pairs.targets if row.kind == "pole"] == list(range(5))
 
 
@@ -88,7 +88,7 @@ def test_a_common_factor_on_all_frequencies_is_no_obstacle():
     model = chain()
     for factor in (0.7, 0.85, 1.2, 1.4):
         stiffer = replace(model, stiffness=factor * model.stiffness, damping=np.sqrt(factor) * model.damping)
-        pairs = pair(measured(stiffer), model)
+        pairs = pair_roots(measured(stiffer), model)
         assert all(row.verdict is Verdict.PAIRED for row in pairs.rows if row.kind == "pole")
         assert [row.computed for row in pairs.rows if row.kind == "pole"] == list(range(5))
         zeros = [row for row in pairs.rows if row.kind == "zero" and row.measured >= 0]
@@ -102,7 +102,7 @@ def test_shapes_separate_swapped_modes(quantity):
     """Two loops of one stiffness and another mass each: the heavier one has the lower frequency."""
     model = two_loops(1.00, 1.06)
     swapped = two_loops(1.06, 1.00)
-    pairs = pair(measured(swapped, (label(1, 1, quantity), label(2, 2, quantity)), zeros=False), model)
+    pairs = pair_roots(measured(swapped, (label(1, 1, quantity), label(2, 2, quantity)), zeros=False), model)
     assert [(row.measured, row.computed) for row in pairs.targets] == [(0, 1), (1, 0)]
 
 
@@ -115,14 +115,14 @@ def test_a_reversed_polarity_is_found_and_reported():
     model = chain()
     turned = tuple(replace(frf_label, output_dof=replace(frf_label.output_dof, sign=-1)) for frf_label in LABELS)
     fit = measured(model, LABELS)
-    pairs = pair(replace(fit, labels=turned), model)
+    pairs = pair_roots(replace(fit, labels=turned), model)
     assert f"polarity of {turned[0]}, {turned[1]} is opposite" in pairs.warnings[-1]
     assert all(row.verdict is Verdict.PAIRED for row in pairs.rows)
 
 
 def test_a_mode_that_was_not_measured_is_missing_in_the_measurement():
     model = chain()
-    pairs = pair(measured(model, poles=[0, 1, 3, 4], zeros=False), model)
+    pairs = pair_roots(measured(model, poles=[0, 1, 3, 4], zeros=False), model)
     missing = [row for row in pairs.rows if row.kind == "pole" and row.verdict is Verdict.MISSING_IN_MEASUREMENT]
     assert [row.computed for row in missing] == [2]
     assert [row.computed for row in pairs.targets] == [0, 1, 3, 4]
@@ -138,7 +138,7 @@ def test_a_mode_that_the_model_lacks_is_reported_and_is_no_target():
     more = make_modal_fit(
         larger, LABELS, (5.0, 250.0), np.zeros(0, complex), np.zeros(0, int), [], np.eye(12), np.zeros((6, 2, 2, 2))
     )
-    pairs = pair(more, model)
+    pairs = pair_roots(more, model)
     lonely = [row for row in pairs.rows if row.verdict is Verdict.MISSING_IN_MODEL]
     assert [row.measured for row in lonely] == [5]
     assert "200 Hz" in pairs.warnings[0]
@@ -148,7 +148,7 @@ def test_a_mode_that_the_model_lacks_is_reported_and_is_no_target():
 def test_nothing_in_common_is_a_warning_with_what_to_check():
     model = chain()
     far = replace(model, stiffness=1e6 * model.stiffness)
-    pairs = pair(measured(far), model)
+    pairs = pair_roots(measured(far), model)
     assert not [row for row in pairs.targets if row.kind == "pole"]
     assert any("check units" in text for text in pairs.warnings)
 
@@ -159,7 +159,7 @@ def test_a_zero_that_is_not_identifiable_is_no_target():
     known = fit.zeros.identifiable.copy()
     known[0] = False
     reasons = ("too far out", *[""] * (len(known) - 1))
-    pairs = pair(replace(fit, zeros=replace(fit.zeros, identifiable=known, reason=reasons)), model)
+    pairs = pair_roots(replace(fit, zeros=replace(fit.zeros, identifiable=known, reason=reasons)), model)
     row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
     assert row.verdict is Verdict.AMBIGUOUS
     assert "too far out" in row.reason
@@ -170,7 +170,7 @@ def test_a_zero_that_cancels_a_pole_is_no_target():
     fit = measured(model)
     values = fit.zeros.values.copy()
     values[0] = fit.model.poles[1] * (1 + 1e-6)
-    pairs = pair(replace(fit, zeros=replace(fit.zeros, values=values)), model)
+    pairs = pair_roots(replace(fit, zeros=replace(fit.zeros, values=values)), model)
     row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
     assert "cancels the pole" in row.reason
     assert row.verdict is Verdict.AMBIGUOUS
@@ -181,7 +181,7 @@ def test_a_real_zero_is_no_target():
     fit = measured(chain(), zeros=False)
     zeros = ZeroSet(values=values, frf=np.array([0]), kind=("real",), identifiable=np.array([True]), reason=("",))
     with_zero = replace(fit, zeros=zeros, covariance=np.eye(12))
-    row = next(row for row in pair(with_zero, chain()).rows if row.kind == "zero" and row.measured == 0)
+    row = next(row for row in pair_roots(with_zero, chain()).rows if row.kind == "zero" and row.measured == 0)
     assert row.verdict is Verdict.AMBIGUOUS
 
 
@@ -226,7 +226,7 @@ def test_the_slope_at_zeros_is_that_of_the_frf():
     frf_label = FrfLabel(Dof(2, "x"), Dof(2, "x"), FrfQuantity.RECEPTANCE)
     zeros = model_zeros(model, frf_label)
     step = 1e-5j * np.abs(zeros.values)
-    nearby = [model_frfs(model, [frf_label], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
+    nearby = [compute_frfs(model, [frf_label], zeros.values + sign * step)[:, 0].real for sign in (1, -1)]
     assert np.array_equal(np.sign(nearby[0] - nearby[1]), zeros.slope_sign)
 
 
@@ -263,7 +263,7 @@ def test_a_zero_on_a_pole_is_no_obstacle():
 def test_a_rigid_body_is_no_mode_that_could_be_measured():
     model = chain(free=True)
     assert np.abs(model_poles(model, LABELS).values[0]) < 1e-3
-    pairs = pair(measured(model, poles=[1, 2, 3, 4], zeros=False), model)
+    pairs = pair_roots(measured(model, poles=[1, 2, 3, 4], zeros=False), model)
     assert [(row.measured, row.computed) for row in pairs.rows if row.kind == "pole"] == [
         (0, 1),
         (1, 2),

@@ -44,9 +44,9 @@ def test_the_frfs_of_the_others_stay_as_they_were(campaign):
 
 def test_a_diagnosis_sees_records_without_it(campaign):
     test = without_sensors(read_test(campaign / "test.toml"), ["1:+z"])
-    observations = observe(test, OPTIONS, estimate_frfs(test, options=OPTIONS).frfs, fit=BAND)
+    observations = observe(test, ingest=OPTIONS, frfs=estimate_frfs(test, options=OPTIONS).frfs, fit=BAND)
     whole = read_test(campaign / "test.toml")
-    unreduced = observe(whole, OPTIONS, estimate_frfs(whole, options=OPTIONS).frfs, fit=BAND)
+    unreduced = observe(whole, ingest=OPTIONS, frfs=estimate_frfs(whole, options=OPTIONS).frfs, fit=BAND)
     assert [[sensor.channel for sensor in record.sensors] for record in observations.records] == [["acc_2"]] * 3
     assert (observations.records[0].responses[0] == unreduced.records[0].responses[1]).all()
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chains import chain, label
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.prediction.ensemble import ModelEnsemble
 
@@ -27,7 +27,7 @@ def test_receptances_are_those_of_the_matrices(damping):
     output, force = models[0].row(frf_label.output_dof), models[0].row(frf_label.input_dof)
     computed = members(models).receptance(output, force, S)
     for member, model in zip(computed, models, strict=True):
-        expected = model_frfs(model, [frf_label], S)[:, 0]
+        expected = compute_frfs(model, [frf_label], S)[:, 0]
         assert np.abs(member - expected).max() < SAME * np.abs(expected).max()
 
 
@@ -35,7 +35,7 @@ def test_a_body_that_is_free_to_fly_has_no_division_by_zero():
     model = chain(free=True)
     frf_label = label(1, 5)
     computed = members([model]).receptance(model.row(frf_label.output_dof), model.row(frf_label.input_dof), S)[0]
-    expected = model_frfs(model, [frf_label], S)[:, 0]
+    expected = compute_frfs(model, [frf_label], S)[:, 0]
     assert_allclose(computed, expected, rtol=1e-4)  # its rigid-body mode is given a thousandth of the lowest frequency
 
 

@@ -11,11 +11,12 @@ from chains import chain, label
 from chains import updated as as_updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.prediction.advice import WIDE_DB, wide_bands
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
 from frf_testbench.updating.study import make_update_case, study_structure
+from measured_labels import measured
 
 LINES = np.linspace(3.0, 110.0, 400)
 LABELS = (label(2, 1, FrfQuantity.ACCELERANCE), label(-4, -3, FrfQuantity.ACCELERANCE))
@@ -43,7 +44,7 @@ def local_spread(model, count=100):
 
 def test_values_are_those_of_the_model_from_every_excited_dof_to_every_point():
     model = chain(between=True)
-    prediction = predict_frfs(updated(model), POINTS, LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(model), points=POINTS, frequency_hz=LINES)
     assert [str(frf_label) for frf_label in prediction.labels] == [
         "5:-x / 1:+x",
         "5:-x / 3:-x",
@@ -52,17 +53,17 @@ def test_values_are_those_of_the_model_from_every_excited_dof_to_every_point():
     ]
     assert {frf_label.quantity for frf_label in prediction.labels} == {FrfQuantity.ACCELERANCE}
     s = 2j * np.pi * LINES
-    assert_allclose(prediction.values, model_frfs(model, prediction.labels, s), rtol=1e-12)
-    assert_allclose(prediction.nominal, model_frfs(updated(model).nominal, prediction.labels, s), rtol=1e-12)
+    assert_allclose(prediction.values, compute_frfs(model, prediction.labels, s), rtol=1e-12)
+    assert_allclose(prediction.nominal, compute_frfs(updated(model).nominal, prediction.labels, s), rtol=1e-12)
 
 
 def test_bands_are_quantiles_of_the_members():
     model = chain(between=True)
     ensemble = spread(model, 0.02)
-    prediction = predict_frfs(updated(model, ensemble), POINTS, LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(model, ensemble), points=POINTS, frequency_hz=LINES)
     s = 2j * np.pi * LINES
     magnitudes = [
-        np.abs(model_frfs(replace(model, stiffness=k), prediction.labels[:1], s)[:, 0]) for _, _, k in ensemble
+        np.abs(compute_frfs(replace(model, stiffness=k), prediction.labels[:1], s)[:, 0]) for _, _, k in ensemble
     ]
     low, high = np.quantile(magnitudes, [0.05, 0.95], axis=0)
     assert_allclose(prediction.magnitude_low[:, 0], low, rtol=1e-6)
@@ -72,7 +73,7 @@ def test_bands_are_quantiles_of_the_members():
 def test_zeros_come_with_their_spread():
     """A common factor moves every zero by half its relative size."""
     model = chain(between=True)
-    prediction = predict_frfs(updated(model, spread(model, 0.004)), POINTS, LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(model, spread(model, 0.004)), points=POINTS, frequency_hz=LINES)
     assert prediction.zeros.identifiable.all()
     assert len(prediction.zeros.values) > 2
     # of a hundred members
@@ -80,21 +81,21 @@ def test_zeros_come_with_their_spread():
     s = prediction.zeros.values
     for index, value in enumerate(s):
         frf_label = prediction.labels[prediction.zeros.frf[index]]
-        nearby = np.abs(model_frfs(model, [frf_label], np.array([1.05 * value]))[0, 0])
-        assert np.abs(model_frfs(model, [frf_label], np.array([value]))[0, 0]) < 1e-8 * nearby
+        nearby = np.abs(compute_frfs(model, [frf_label], np.array([1.05 * value]))[0, 0])
+        assert np.abs(compute_frfs(model, [frf_label], np.array([value]))[0, 0]) < 1e-8 * nearby
 
 
 def test_a_zero_that_most_members_lack_is_not_identifiable():
     model = chain(between=True)
     different = chain(between=True, seed=9)
     members = [(different.mass, different.damping, 4 * different.stiffness)] * 60 + spread(model, 0.001, 40)
-    prediction = predict_frfs(updated(model, members), POINTS, LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(model, members), points=POINTS, frequency_hz=LINES)
     assert not prediction.zeros.identifiable.all()
     assert any("have no such zero" in reason for reason in prediction.zeros.reason)
 
 
 def test_without_an_ensemble_there_are_no_bands_and_no_warnings():
-    prediction = predict_frfs(updated(chain(between=True)), POINTS, LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(chain(between=True)), points=POINTS, frequency_hz=LINES)
     assert np.isnan(prediction.magnitude_low).all()
     assert np.isnan(prediction.zero_std).all()
     assert prediction.warnings == ()
@@ -102,19 +103,24 @@ def test_without_an_ensemble_there_are_no_bands_and_no_warnings():
 
 
 def test_without_points_there_is_nothing_to_predict():
-    prediction = predict_frfs(updated(chain(), spread(chain(), 0.1)), (), LABELS, LINES)
+    prediction = predict_frfs(measured(LABELS), updated(chain(), spread(chain(), 0.1)), points=(), frequency_hz=LINES)
     assert prediction.values.shape == (400, 0)
     assert len(prediction.zeros.values) == 0
 
 
 def test_narrow_bands_are_no_reason_to_warn():
     model = chain(between=True)
-    assert predict_frfs(updated(model, spread(model, 1e-4)), POINTS, LABELS, LINES).warnings == ()
+    assert (
+        predict_frfs(measured(LABELS), updated(model, spread(model, 1e-4)), points=POINTS, frequency_hz=LINES).warnings
+        == ()
+    )
 
 
 def test_a_wide_band_is_explained_with_advice():
     model = chain(between=True)
-    prediction = predict_frfs(updated(model, local_spread(model)), (Dof(5, "x"),), (label(2, 1),), LINES)
+    prediction = predict_frfs(
+        measured((label(2, 1),)), updated(model, local_spread(model)), points=(Dof(5, "x"),), frequency_hz=LINES
+    )
     assert prediction.warnings
     assert "the 90 % band is up to" in prediction.warnings[0]
     assert "determine" in prediction.warnings[0]
@@ -125,7 +131,9 @@ def test_the_sensor_that_is_advised_narrows_the_band():
     """Measure what was advised: the members that agree with it spread less than all of them."""
     model = chain(between=True)
     members = local_spread(model, 400)
-    prediction = predict_frfs(updated(model, members), (Dof(5, "x"),), (label(2, 1),), LINES)
+    prediction = predict_frfs(
+        measured((label(2, 1),)), updated(model, members), points=(Dof(5, "x"),), frequency_hz=LINES
+    )
     text = next(text for text in prediction.warnings if "would narrow it most" in text)
     words = text.split("; ")[-1].split()
     node = int(words[words.index("at") + 1].split(":")[0])
@@ -146,9 +154,9 @@ def test_wide_bands_are_joined_and_short_ones_omitted():
 
 def test_a_point_that_the_model_does_not_know_is_refused():
     with pytest.raises(InputError, match=r"add it to \[predict\] points"):
-        predict_frfs(updated(chain()), (Dof(77, "x"),), LABELS, LINES)
+        predict_frfs(measured(LABELS), updated(chain()), points=(Dof(77, "x"),), frequency_hz=LINES)
     with pytest.raises(InputError, match="at least one measured FRF"):
-        predict_frfs(updated(chain()), POINTS, (), LINES)
+        predict_frfs(measured(()), updated(chain()), points=POINTS, frequency_hz=LINES)
 
 
 def test_bands_cover_the_truth_on_held_back_structures():
@@ -165,5 +173,5 @@ def test_points_need_not_be_retained():
     case = make_update_case(3)
     expanded = [dof for dof in case.reduced_model.expanded_dofs if dof not in case.reduced_model.dofs]
     model = updated(case.reduced_model)
-    prediction = predict_frfs(model, expanded[:2], case.labels, np.linspace(*case.fit.band_hz, 50))
+    prediction = predict_frfs(case, model, points=expanded[:2], frequency_hz=np.linspace(*case.fit.band_hz, 50))
     assert np.isfinite(prediction.values).all()

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from chains import chain, label
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.quantities import FrfQuantity
@@ -35,7 +35,7 @@ def measured_run(model, nominal):
     """FRFs and a fit that are the model's own, paired with a nominal model."""
     frequency = np.linspace(1.0, 80.0, 80)
     s = 2j * np.pi * frequency
-    frfs = SimpleNamespace(frequency_hz=frequency, s=s, values=model_frfs(model, LABELS, s), labels=LABELS)
+    frfs = SimpleNamespace(frequency_hz=frequency, s=s, values=compute_frfs(model, LABELS, s), labels=LABELS)
     roots, nominal_roots = poles_of(model), poles_of(nominal)
     shapes = np.stack(
         [

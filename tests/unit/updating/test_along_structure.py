@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from frf_ipz.runs.codec import load_result, save_result
 from frf_ipz.updating.along_structure import change_along_structure, notable_changes
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.study import make_update_case
 
@@ -18,8 +18,8 @@ SEEDS = range(800, 810)
 
 
 def updated(case, *, parts=True):
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model) if parts else None
-    return update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model) if parts else None
+    return update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis)
 
 
 def true_ratios(case):

@@ -101,7 +101,7 @@ def test_the_sensor_must_be_retained():
     case = build_section_4()
     model = replace(case.reduced_model, dofs=tuple(Dof(dof.node + 100, "z") for dof in case.reduced_model.dofs))
     with pytest.raises(InputError, match="among \\[reduce\\] dofs"):
-        update_model(model, case.fit, case.pairs, IPZ)
+        update_model(case.fit, model, pairs=case.pairs, options=IPZ)
 
 
 def test_several_frfs_take_turns():
@@ -109,11 +109,15 @@ def test_several_frfs_take_turns():
     assert len(case.labels) == 1
     case = make_update_case(4)
     assert len(case.labels) > 1
-    updated = update_model(case.reduced_model, case.fit, case.pairs, replace(IPZ, beta=0.05, max_iterations=200))
+    updated = update_model(
+        case.fit, case.reduced_model, pairs=case.pairs, options=replace(IPZ, beta=0.05, max_iterations=200)
+    )
     assert updated.history.misfit.iloc[-1] < updated.history.misfit.iloc[0]
     assert any("(FRF 2)" in name for name in updated.history.columns)
     alone = Pairs(rows=tuple(row for row in case.pairs.rows if row.frf <= 0))
-    reference = update_model(case.reduced_model, case.fit, alone, replace(IPZ, beta=0.05, max_iterations=200))
+    reference = update_model(
+        case.fit, case.reduced_model, pairs=alone, options=replace(IPZ, beta=0.05, max_iterations=200)
+    )
     assert (
         np.abs(updated.model.stiffness - reference.model.stiffness).max()
         > 1e-6 * np.abs(reference.model.stiffness).max()
@@ -122,13 +126,13 @@ def test_several_frfs_take_turns():
 
 def test_without_targets_there_is_nothing_to_do():
     case = build_section_4()
-    updated = update_model(case.reduced_model, case.fit, Pairs(rows=()), IPZ)
+    updated = update_model(case.fit, case.reduced_model, pairs=Pairs(rows=()), options=IPZ)
     assert updated.status is UpdateStatus.NOTHING_TO_DO
 
 
 def test_the_limit_of_iterations_is_reported():
     case = build_section_4()
-    updated = update_model(case.reduced_model, case.fit, case.pairs, IPZ)
+    updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=IPZ)
     assert updated.status is UpdateStatus.MAX_ITERATIONS
     assert updated.history.iteration.tolist() == [1, 2, 3, 4, 5]
     assert updated.ensemble.shape == (0, 3, 6, 6)
@@ -137,7 +141,7 @@ def test_the_limit_of_iterations_is_reported():
 def test_a_step_that_is_too_large_diverges_and_returns_the_best():
     case = build_section_4()
     updated = update_model(
-        case.reduced_model, case.fit, case.pairs, replace(IPZ, beta=30.0, alpha=0.0, max_iterations=500)
+        case.fit, case.reduced_model, pairs=case.pairs, options=replace(IPZ, beta=30.0, alpha=0.0, max_iterations=500)
     )
     assert updated.status is UpdateStatus.DIVERGED
     assert np.isfinite(updated.model.stiffness).all()
@@ -147,4 +151,4 @@ def test_methods_are_found_by_their_modules():
     assert method_names() == ("ipz", "minimal-change")
     case = build_section_4()
     with pytest.raises(InputError, match="did you mean 'minimal-change'"):
-        update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(method="minimal"))
+        update_model(case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(method="minimal"))

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from scipy import sparse
 
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.numerics.pencils import damped_poles, undamped_poles
-from frf_ipz.pairing.pair import pair
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, structural_basis
+from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, make_structural_basis
 from frf_ipz.updating.regions import reduced_regions
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
@@ -32,8 +32,8 @@ def case(request):
 
 @pytest.fixture(scope="module")
 def updated(case):
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
-    return update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
+    return update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis)
 
 
 def deviations(case):
@@ -96,8 +96,8 @@ def free_case():
 
 def test_rigid_body_modes_stay():
     case = make_update_case(free_case())
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
-    updated = update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
+    updated = update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis)
     for model in (case.reduced_model, updated.model):
         values = np.abs(undamped_poles(model.mass, model.stiffness).values.real)
         assert np.count_nonzero(values < 1e-6 * np.abs(case.fit.model.poles[0]) ** 2) >= 2
@@ -105,8 +105,8 @@ def test_rigid_body_modes_stay():
 
 def test_the_same_seed_gives_the_same_ensemble_and_another_another():
     case = make_update_case(3)
-    first, second = (update_model(case.reduced_model, case.fit, case.pairs) for _ in range(2))
-    other_seed = update_model(case.reduced_model, case.fit, case.pairs, UpdateOptions(seed=1, ensemble=7))
+    first, second = (update_model(case.fit, case.reduced_model, pairs=case.pairs) for _ in range(2))
+    other_seed = update_model(case.fit, case.reduced_model, pairs=case.pairs, options=UpdateOptions(seed=1, ensemble=7))
     assert np.array_equal(first.ensemble, second.ensemble)
     assert len(other_seed.ensemble) == 7
     assert not np.array_equal(first.ensemble[:7], other_seed.ensemble)
@@ -114,7 +114,7 @@ def test_the_same_seed_gives_the_same_ensemble_and_another_another():
 
 def test_without_targets_the_model_is_unchanged():
     case = make_update_case(3)
-    updated = update_model(case.reduced_model, case.fit, Pairs(rows=()))
+    updated = update_model(case.fit, case.reduced_model, pairs=Pairs(rows=()))
     assert updated.status is UpdateStatus.NOTHING_TO_DO
     assert updated.model is case.reduced_model
     assert updated.warnings
@@ -125,19 +125,19 @@ def test_a_target_that_all_others_contradict_is_excluded_and_reported():
     rows = list(case.pairs.rows)
     index = next(k for k, row in enumerate(rows) if row in case.pairs.targets and row.kind == "pole" and k > 0)
     rows[index] = replace(rows[index], measured_value=1.25 * rows[index].measured_value)
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
-    updated = update_model(case.reduced_model, case.fit, replace(case.pairs, rows=tuple(rows)), basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
+    updated = update_model(case.fit, case.reduced_model, pairs=replace(case.pairs, rows=tuple(rows)), basis=basis)
     assert len(updated.unmet) == 1
     assert "contradict it" in updated.unmet[0]
     assert f"{abs(rows[index].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
-    honest = update_model(case.reduced_model, case.fit, case.pairs, basis=basis)
+    honest = update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis)
     assert not honest.unmet
 
 
 def test_noisier_targets_are_met_less():
     case = make_update_case(11)
     loud = replace(case.fit, covariance=1e4 * case.fit.covariance)
-    near = [update_model(case.reduced_model, fit, case.pairs) for fit in (case.fit, loud)]
+    near = [update_model(fit, case.reduced_model, pairs=case.pairs) for fit in (case.fit, loud)]
     values = np.array([row.measured_value for row in case.pairs.targets])
     error = [np.abs(np.log(np.abs(each.after) / np.abs(values))).max() for each in near]
     assert error[1] > 3 * error[0]
@@ -157,8 +157,8 @@ def test_the_mass_of_a_sensor_is_found():
     fit = simulate_fit(
         TrueModes(real, case.structure.damping), case.labels, case.fit.band_hz, rng=np.random.default_rng(0)
     )
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model, sensors=case.structure.sensors[:1])
-    updated = update_model(case.reduced_model, fit, pair(fit, case.reduced_model), basis=basis)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model, sensors=case.structure.sensors[:1])
+    updated = update_model(fit, case.reduced_model, pairs=pair_roots(fit, case.reduced_model), basis=basis)
     row = case.reduced_model.row(sensor)
     mass = row @ (updated.model.mass - case.reduced_model.mass) @ row / (row @ row) ** 2
     assert_allclose(mass, grams, rtol=0.2)
@@ -193,11 +193,13 @@ def test_parameters_from_a_diagnosis_find_the_truth(method):
     )
     band = choose_band(truth, structure.n_modes)
     ends = {"actuators": structure.input_dofs, "sensors": structure.sensors, "points": structure.points}
-    reduced = reduce_model(structure.nominal_model, ReduceOptions(), band_hz=band, **ends)
+    reduced = reduce_to_dofs(structure.nominal_model, options=ReduceOptions(), band_hz=band, **ends)
     fit = simulate_fit(truth, labels, band, noise=1e-4, rng=np.random.default_rng(0))
-    case = replace(make_update_case(21), reduced_model=reduced, fit=fit, pairs=pair(fit, reduced))
+    case = replace(make_update_case(21), reduced_model=reduced, fit=fit, pairs=pair_roots(fit, reduced))
     options = UpdateOptions(method=method, damping=method == "minimal-change", delta=1e-9, max_iterations=60)
-    updated = update_model(case.reduced_model, case.fit, case.pairs, options, basis=chosen_parameters(case, elements))
+    updated = update_model(
+        case.fit, case.reduced_model, pairs=case.pairs, options=options, basis=chosen_parameters(case, elements)
+    )
     parameter = updated.history[updated.history.phase != "damping"].iloc[-1]["stiffness of the segment"]
     factor = parameter if method == "minimal-change" else np.exp(parameter)
     assert_allclose(factor, 0.8, rtol=0.01)  # the reduction basis is that of the nominal model

@@ -11,7 +11,7 @@ from fe_models import beam
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import ShapeError
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.parameters import (
     GENERIC_STD_ALONE,
@@ -19,7 +19,7 @@ from frf_ipz.updating.parameters import (
     SEGMENT_STD,
     generic_basis,
     join_bases,
-    structural_basis,
+    make_structural_basis,
     unwhiten,
 )
 from frf_ipz.updating.regions import MAX_REGIONS, reduced_regions
@@ -34,7 +34,7 @@ def fe_model():
 
 def reduced(fe_model):
     ends = {"actuators": [Dof(5, "z")], "sensors": [Dof(21, "z")], "points": [Dof(12, "z")]}
-    return reduce_model(fe_model, ReduceOptions(modes=4), band_hz=(10.0, 500.0), **ends)
+    return reduce_to_dofs(fe_model, options=ReduceOptions(modes=4), band_hz=(10.0, 500.0), **ends)
 
 
 def covariance(terms, stds):
@@ -68,7 +68,7 @@ def test_many_parts_are_merged_without_losing_any():
 
 def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(fe_model):
     model = reduced(fe_model)
-    basis = structural_basis(fe_model, model)
+    basis = make_structural_basis(fe_model, model)
     theta = np.where(basis.logarithmic, np.log(1.2), 0.0)
     changed = np.tensordot(basis.amounts(theta), basis.stiffness, 1)
     assert np.abs(changed - 0.2 * model.stiffness).max() < EXACT * np.abs(model.stiffness).max()
@@ -76,8 +76,8 @@ def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(fe_model):
 
 def test_masses_change_only_on_request(fe_model):
     model = reduced(fe_model)
-    assert not structural_basis(fe_model, model).mass.any()
-    basis = structural_basis(fe_model, model, mass=True)
+    assert not make_structural_basis(fe_model, model).mass.any()
+    basis = make_structural_basis(fe_model, model, mass=True)
     of_mass = np.array([name.startswith("mass of") for name in basis.names])
     assert of_mass.sum() == 20
     assert not basis.stiffness[of_mass].any()
@@ -86,7 +86,7 @@ def test_masses_change_only_on_request(fe_model):
 
 def test_the_mass_of_a_sensor_may_be_a_parameter(fe_model):
     model = reduced(fe_model)
-    basis = structural_basis(fe_model, model, sensors=(Dof(21, "z"), Dof(21, "z", -1), Dof(5, "ry")))
+    basis = make_structural_basis(fe_model, model, sensors=(Dof(21, "z"), Dof(21, "z", -1), Dof(5, "ry")))
     of_sensors = np.flatnonzero([name.startswith("mass of the sensor") for name in basis.names])
     assert [basis.names[index] for index in of_sensors] == ["mass of the sensor at 21:z"]
     row = model.row(Dof(21, "z"))
@@ -96,7 +96,7 @@ def test_the_mass_of_a_sensor_may_be_a_parameter(fe_model):
 
 def test_without_parts_the_generic_parameters_are_used(fe_model):
     model = reduced(fe_model)
-    basis = structural_basis(replace(fe_model, parts=()), model)
+    basis = make_structural_basis(replace(fe_model, parts=()), model)
     assert basis.names == generic_basis(model).names
 
 
@@ -128,7 +128,7 @@ def test_rigid_body_modes_stay_where_they_are():
 
 
 def test_the_prior_has_the_stated_covariance(fe_model):
-    basis = structural_basis(fe_model, reduced(fe_model))
+    basis = make_structural_basis(fe_model, reduced(fe_model))
     names = [term.name for term in basis.terms]
     assert names[0] == "a factor on the stiffness"
     stds = np.array([term.std for term in basis.terms])
@@ -151,7 +151,7 @@ def test_the_generic_prior_is_the_same_in_rotated_coordinates():
 
 
 def test_slopes_are_the_derivatives_of_the_amounts(fe_model):
-    basis = structural_basis(fe_model, reduced(fe_model))
+    basis = make_structural_basis(fe_model, reduced(fe_model))
     theta = np.random.default_rng(0).normal(0, 0.1, len(basis.names))
     step = 1e-6
     expected = (basis.amounts(theta + step) - basis.amounts(theta - step)) / (2 * step)

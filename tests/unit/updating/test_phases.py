@@ -10,7 +10,7 @@ from frf_ipz.updating.methods import minimal_change
 from frf_ipz.updating.minimal_change.gauss_newton import iterate
 from frf_ipz.updating.minimal_change.modal_frame import frame_of, modal_frame
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import generic_basis, structural_basis
+from frf_ipz.updating.parameters import generic_basis, make_structural_basis
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.study import make_update_case
@@ -32,8 +32,8 @@ def case(request):
 @pytest.fixture(params=["parts", "parts and masses", "any stiffness"])
 def problem(request, case):
     basis = {
-        "parts": lambda: structural_basis(case.structure.nominal_model, case.reduced_model),
-        "parts and masses": lambda: structural_basis(case.structure.nominal_model, case.reduced_model, mass=True),
+        "parts": lambda: make_structural_basis(case.structure.nominal_model, case.reduced_model),
+        "parts and masses": lambda: make_structural_basis(case.structure.nominal_model, case.reduced_model, mass=True),
         "any stiffness": lambda: generic_basis(case.reduced_model),
     }[request.param]()
     return make_problem(case.reduced_model, case.fit, case.pairs, basis)
@@ -64,7 +64,7 @@ def test_stiffness_slopes_against_differences(problem):
 
 @pytest.mark.parametrize("has_damper", [False, True])
 def test_damping_slopes_against_differences(case, has_damper):
-    basis = structural_basis(case.structure.nominal_model, case.reduced_model)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
     problem = make_problem(case.reduced_model, case.fit, case.pairs, basis)
     if has_damper:
         damper = damper_at(problem, STRONG / 10)

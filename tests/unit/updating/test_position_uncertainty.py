@@ -63,7 +63,9 @@ def _newton(model, output, force, zero):
 
 def test_a_position_tolerance_makes_zeros_less_certain_and_not_poles():
     case = make_update_case(SEEDS[0])
-    off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
+    off = propagate_position_tolerance(
+        case.fit, case.reduced_model, fe_model=case.structure.nominal_model, tolerance_m_per_m=TOLERANCE
+    )
     ends = {(label.output_dof, True) for label in case.fit.labels} | {(x.input_dof, False) for x in case.fit.labels}
     assert {(position.dof, position.is_output) for position in off} == ends
     problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
@@ -77,11 +79,14 @@ def test_a_position_tolerance_makes_zeros_less_certain_and_not_poles():
 def test_a_misplaced_sensor_is_not_mistaken_for_a_stiffness():
     """A zero that lies elsewhere because of its sensor changes the model less where that is allowed for."""
     case = make_update_case(SEEDS[0])
-    off = propagate_position_tolerance(case.structure.nominal_model, case.reduced_model, case.fit.labels, TOLERANCE)
+    off = propagate_position_tolerance(
+        case.fit, case.reduced_model, fe_model=case.structure.nominal_model, tolerance_m_per_m=TOLERANCE
+    )
     changes = [
         np.abs(np.diagonal(covariance.model.stiffness) / np.diagonal(case.reduced_model.stiffness) - 1).max()
         for covariance in (
-            update_model(case.reduced_model, case.fit, case.pairs, misplacements=positions) for positions in ((), off)
+            update_model(case.fit, case.reduced_model, pairs=case.pairs, position_uncertainty=positions)
+            for positions in ((), off)
         )
     ]
     assert changes[1] < changes[0]

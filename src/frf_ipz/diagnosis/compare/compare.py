@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.compare import mass_loss
 from frf_ipz.diagnosis.compare.learnt_nuisance import estimate_change_error, learn, predict_unchanged_model
-from frf_ipz.diagnosis.compare.states import CompareOptions, State
+from frf_ipz.diagnosis.compare.states import CompareOptions, MachineState
 from frf_ipz.diagnosis.compare.unexplained_change import discount_unexplained
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.measured.data_split import split_data
@@ -36,7 +36,7 @@ class Comparison:
     ----------
     diagnosis : Diagnosis
         Of the state after against what the states before lead one to expect.
-    expected : State
+    expected : MachineState
         The state after as it was judged: its model if nothing had changed, and the measurement without known gains,
         with what the model cannot follow as noise.
     scatter : DiagnoseOptions
@@ -44,7 +44,7 @@ class Comparison:
     """
 
     diagnosis: Diagnosis
-    expected: State
+    expected: MachineState
     scatter: DiagnoseOptions
 
     @property
@@ -65,11 +65,11 @@ class Comparison:
         return self.diagnosis.statement
 
 
-def compare(
-    before: State | Sequence[State],
-    after: State,
-    options: CompareOptions | None = None,
+def compare_states(
+    before: MachineState | Sequence[MachineState],
+    after: MachineState,
     *,
+    options: CompareOptions | None = None,
     progress: Progress = silent,
 ) -> Comparison:
     """Find out what changed between two states of a machine, by how much and where, or that nothing did.
@@ -79,9 +79,9 @@ def compare(
 
     Parameters
     ----------
-    before : State or sequence of State
+    before : MachineState or sequence of MachineState
         The machine as it should be, once or repeatedly.
-    after : State
+    after : MachineState
         The machine to be judged, measured with the same channels over the same band.
     options : CompareOptions, optional
         What the model may be wrong by, and what differs from test to test at least.
@@ -99,19 +99,21 @@ def compare(
         If states do not show the same channels and modes, or a model lacks a DOF that was measured.
     """
     chosen = options or CompareOptions()
-    states = [before] if isinstance(before, State) else list(before)
+    states = [before] if isinstance(before, MachineState) else list(before)
     progress(0.0, "learning from the states before")
     return judge(learn(states, chosen), after, chosen, progress=progress)
 
 
-def judge(learnt: LearntNuisance, after: State, options: CompareOptions, *, progress: Progress = silent) -> Comparison:
+def judge(
+    learnt: LearntNuisance, after: MachineState, options: CompareOptions, *, progress: Progress = silent
+) -> Comparison:
     """Judge a state by what was learnt from the states before: for many states after the same ones.
 
     Parameters
     ----------
     learnt : LearntNuisance
         From `learn`.
-    after : State
+    after : MachineState
         The machine to be judged.
     options : CompareOptions
         As for `learn`.
@@ -127,7 +129,7 @@ def judge(learnt: LearntNuisance, after: State, options: CompareOptions, *, prog
     source = split_data(observed)
     nominal = replace(after, observed=observed)
     expected = predict_unchanged_model(nominal, learnt, options, source)
-    error = estimate_change_error(replace(nominal, model=expected), source, learnt, options)
+    error = estimate_change_error(replace(nominal, fe_model=expected), source, learnt, options)
     scatter = replace(
         learnt.scatter,
         stiffness_tolerance=float(np.hypot(learnt.scatter.stiffness_tolerance, error)),
@@ -135,5 +137,5 @@ def judge(learnt: LearntNuisance, after: State, options: CompareOptions, *, prog
         effects=options.effects,
         extra_effects=(MASS_LOSS,),
     )
-    diagnosis = diagnose(expected, observed, scatter, progress=progress)
-    return Comparison(diagnosis=diagnosis, expected=replace(nominal, model=expected), scatter=scatter)
+    diagnosis = diagnose(observed, expected, options=scatter, progress=progress)
+    return Comparison(diagnosis=diagnosis, expected=replace(nominal, fe_model=expected), scatter=scatter)

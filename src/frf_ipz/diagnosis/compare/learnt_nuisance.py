@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.diagnosis.compare.corrected_model import correct_model
-from frf_ipz.diagnosis.compare.states import State
+from frf_ipz.diagnosis.compare.states import MachineState
 from frf_ipz.diagnosis.compare.unexplained_change import UnexplainedPart, discount_unexplained, find_unexplained_part
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
@@ -64,12 +64,12 @@ class LearntNuisance:
     unexplained_part: UnexplainedPart | None
 
 
-def learn(before: Sequence[State], options: CompareOptions) -> LearntNuisance:
+def learn(before: Sequence[MachineState], options: CompareOptions) -> LearntNuisance:
     """Fit the states before, and measure their scatter.
 
     Parameters
     ----------
-    before : sequence of State
+    before : sequence of MachineState
         Healthy ones; of three and more the scatter is learnt.
     options : CompareOptions
         What the model may be wrong by, and what differs from test to test at least.
@@ -107,7 +107,7 @@ def learn(before: Sequence[State], options: CompareOptions) -> LearntNuisance:
 
 
 def _fit_states(
-    before: Sequence[tuple[State, DataSplit]], options: CompareOptions
+    before: Sequence[tuple[MachineState, DataSplit]], options: CompareOptions
 ) -> tuple[list[Fit], DiagnoseOptions]:
     """Fit the models, as closely as nearly all of them can follow what was measured."""
     errors = options.scatter
@@ -153,13 +153,13 @@ def fit_from_peaks(problem: InferenceProblem, source: DataSplit) -> Fit:
 
 
 def pose_state_problem(
-    state: State, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
+    state: MachineState, source: DataSplit, options: DiagnoseOptions, errors: DiagnoseOptions | None = None
 ) -> InferenceProblem:
     """Pose the inference problem of a state, with no effects to search for.
 
     Parameters
     ----------
-    state : State
+    state : MachineState
         The state.
     source : DataSplit
         What was measured in it.
@@ -175,20 +175,20 @@ def pose_state_problem(
     """
     frfs = state.observed.frfs
     scale = "none" if frfs is None else frfs.unknown_scale
-    problem = pose_problem(state.model, source, state.observed.band_hz, options, {}, free_gains=scale)
+    problem = pose_problem(state.fe_model, source, state.observed.band_hz, options, {}, free_gains=scale)
     if errors is None:
         return problem
     return replace(problem, data=make_data(source.training, errors, free_gains=scale))
 
 
 def predict_unchanged_model(
-    state: State, learnt: LearntNuisance, options: CompareOptions, source: DataSplit
+    state: MachineState, learnt: LearntNuisance, options: CompareOptions, source: DataSplit
 ) -> StructuralModel:
     """Predict the model of a state if nothing had changed.
 
     Parameters
     ----------
-    state : State
+    state : MachineState
         With a model of the same modes as the states before.
     learnt : LearntNuisance
         From them.
@@ -217,13 +217,13 @@ def predict_unchanged_model(
 
 
 def estimate_change_error(
-    corrected: State, source: DataSplit, learnt: LearntNuisance, options: CompareOptions
+    corrected: MachineState, source: DataSplit, learnt: LearntNuisance, options: CompareOptions
 ) -> float:
     """Estimate how wrong the model's answer to a change may be: its corrections are those of the states before.
 
     Parameters
     ----------
-    corrected : State
+    corrected : MachineState
         The state after, with its corrected model.
     source : DataSplit
         What was measured in it.
@@ -319,12 +319,12 @@ def _std_over_states(values: FloatArray) -> float:
 
 
 def _widen_tolerance(
-    before: Sequence[State], sources: Sequence[DataSplit], learnt: LearntNuisance, options: CompareOptions
+    before: Sequence[MachineState], sources: Sequence[DataSplit], learnt: LearntNuisance, options: CompareOptions
 ) -> LearntNuisance:
     """Widen the tolerance of the model until nothing has changed in the states before, by the rules for those after."""
     nominals = [
-        State(
-            model=predict_unchanged_model(state, learnt, options, source),
+        MachineState(
+            fe_model=predict_unchanged_model(state, learnt, options, source),
             observed=discount_unexplained(state.observed, learnt.gains, learnt.unexplained_part),
         )
         for state, source in zip(before, sources, strict=True)
@@ -339,6 +339,6 @@ def _widen_tolerance(
     return replace(learnt, scatter=scatter)
 
 
-def _is_explained(state: State, source: DataSplit, scatter: DiagnoseOptions) -> bool:
+def _is_explained(state: MachineState, source: DataSplit, scatter: DiagnoseOptions) -> bool:
     problem = pose_state_problem(state, source, scatter)
     return assess_goodness(problem, fit_from_peaks(problem, source)).is_good

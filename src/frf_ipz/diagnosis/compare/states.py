@@ -20,19 +20,19 @@ ROUGH_MODEL = DiagnoseOptions(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class State:
-    """A state of a machine: what is known of it and what was measured in it.
+class MachineState:
+    """A state of a machine: what was measured in it, and what is known of it.
 
     Parameters
     ----------
-    model : StructuralModel
-        The FE model, with damping, and with everything that is known to be different in this state.
     observed : Observations
-        Records or FRFs.
+        Records or FRFs, from `observe`.
+    fe_model : StructuralModel
+        The FE model, with damping, and with everything that is known to be different in this state.
     """
 
-    model: StructuralModel
     observed: Observations
+    fe_model: StructuralModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

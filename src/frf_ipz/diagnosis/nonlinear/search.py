@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -152,7 +151,7 @@ def search_laws(
     observations: Observations,
     options: DiagnoseOptions,
     *,
-    folder: Path = Path(),
+    laws: Sequence[Law] | None = None,
     progress: Progress = silent,
     linearity: Linearity | None = None,
 ) -> LawSearch:
@@ -166,8 +165,8 @@ def search_laws(
         Records of different levels; they need not start at rest.
     options : DiagnoseOptions
         Tolerances, and which effects may be missing.
-    folder : Path
-        Where paths of users' own laws start.
+    laws : sequence of Law, optional
+        What is searched for; the shipped laws that the options ask for where it is left out.
     progress : Progress
         Called with the part that is done.
     linearity : Linearity, optional
@@ -189,7 +188,7 @@ def search_laws(
         return LawSearch(
             verdict=LINEAR, linearity=linearity, statement="Records of all levels agree with one linear system."
         )
-    laws = select_laws(options, folder)
+    laws = tuple(select_laws(options) if laws is None else laws)
     if not laws:
         return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was searched for.")
     progress(0.1, "searching for a nonlinear law")

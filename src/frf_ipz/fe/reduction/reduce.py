@@ -17,7 +17,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import Dof, as_dof
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.fe.reduction.options import ReduceOptions
+    from frf_ipz.frf import Measured
 
 DEFAULT_DAMPING_RATIO = 0.005  # where neither model nor test states one: a bolted metal structure
 BAND_MARGIN = 2.5  # modes up to this times the top of the band: the band's antiresonances are then right to about 0.1 %
@@ -41,9 +42,64 @@ EIGENVALUE_TOLERANCE = 1e-6  # relative, of a mode's eigenvalue after the reduct
 
 
 def reduce_model(
-    model: StructuralModel,
-    options: ReduceOptions,
+    measured: Measured,
+    fe_model: StructuralModel,
     *,
+    points: Sequence[Dof | str] = (),
+    options: ReduceOptions | None = None,
+    default_damping_ratio: float | None = None,
+) -> ReducedModel:
+    """Reduce an FE model to the DOFs that were measured, those of interest, and what the band needs.
+
+    Parameters
+    ----------
+    measured : ModalFit or FrfSet
+        What was measured, and in which band.
+    fe_model : StructuralModel
+        The FE model.
+    points : sequence of Dof or str
+        Points of interest; signs are ignored.
+    options : ReduceOptions, optional
+        What the user has fixed.
+    default_damping_ratio : float, optional
+        As for `reduce_to_dofs`.
+
+    Returns
+    -------
+    ReducedModel
+        Matrices, retained DOFs, and the motion of the other DOFs.
+
+    Raises
+    ------
+    InputError, IllConditionedError
+        As for `reduce_to_dofs`.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, left="clamped"
+    ... )
+    >>> lines = np.arange(10, 700.0)
+    >>> frfs = frf_ipz.FrfSet.from_arrays(lines, np.ones((690, 1, 1)), outputs=["101:+z"], inputs=["89:+z"])
+    >>> [dof.name for dof in frf_ipz.reduce_model(frfs, beam, points=["49:+z"]).dofs][:3]
+    ['89:z', '101:z', '49:z']
+    """
+    return reduce_to_dofs(
+        fe_model,
+        options=options,
+        actuators=tuple(dict.fromkeys(label.input_dof for label in measured.labels)),
+        sensors=tuple(dict.fromkeys(label.output_dof for label in measured.labels)),
+        points=tuple(as_dof(point) for point in points),
+        band_hz=measured.band_hz,
+        default_damping_ratio=default_damping_ratio,
+    )
+
+
+def reduce_to_dofs(
+    model: StructuralModel,
+    *,
+    options: ReduceOptions | None = None,
     actuators: Sequence[Dof],
     sensors: Sequence[Dof],
     points: Sequence[Dof],
@@ -71,7 +127,7 @@ def reduce_model(
     ----------
     model : StructuralModel
         The FE model.
-    options : ReduceOptions
+    options : ReduceOptions, optional
         What the user has fixed.
     actuators, sensors, points : sequence of Dof
         DOFs of the test and points of interest; signs are ignored.
@@ -98,7 +154,7 @@ def reduce_model(
     if damped is not model:
         origin = "from the test" if default_damping_ratio is not None else "by default"
         notes.append(f"damping: {nominal:g} for every mode, {origin}")
-    plan = plan_reduction(damped, options, actuators=actuators, sensors=sensors, points=points)
+    plan = plan_reduction(damped, options or ReduceOptions(), actuators=actuators, sensors=sensors, points=points)
     basis = _solve_retained_modes(damped, plan, band_hz, notes)
     ritz = _with_residual_vectors(damped, basis, plan, notes)
     rows = _retained_rows(damped, ritz, plan, notes)

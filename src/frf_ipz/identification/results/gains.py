@@ -118,7 +118,7 @@ def _remark(channel: str, gain: float, std: float) -> str:
     return f"the channel '{channel}' records {gain:.4g} times the true signal (standard deviation {std:.2g})"
 
 
-def gains_from_shapes(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
+def estimate_gains(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     """Find one gain an FRF from known shapes, such as those of an FE model.
 
     The scale of each mode is free: only gains relative to the other FRFs are found.

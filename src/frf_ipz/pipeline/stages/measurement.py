@@ -71,7 +71,7 @@ def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = N
     return runner.stage(
         "fit",
         {"options": asdict(options), "after": runner.after("ingest"), "corrected": corrections(corrected_by)},
-        lambda progress: fit_modes(frfs, options, progress=progress),
+        lambda progress: fit_modes(frfs, options=options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),
             "poles.parquet": partial(write_table, tables.pole_table(result)),

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
-from frf_ipz.diagnosis.effect_selection import select_effects
+from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -50,12 +50,20 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagn
     band = {"fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz]}
 
     def compute(progress: Progress) -> Diagnosis:
-        observations = observe(inputs.test, ingest_options, frfs, fit=inputs.options.fit)
-        return find_mismatch(model, observations, options, folder=inputs.folder, progress=progress)
+        observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
+        return find_mismatch(
+            observations, model, options=options, effects=inputs.effects, folder=inputs.folder, progress=progress
+        )
 
     return runner.stage(
         "diagnose",
-        {"options": asdict(options), "model": inputs.model_key, "after": runner.after("ingest"), **band},
+        {
+            "options": asdict(options),
+            "effects": [repr(type(effect)) for effect in inputs.effects],
+            "model": inputs.model_key,
+            "after": runner.after("ingest"),
+            **band,
+        },
         compute,
         lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
     )
@@ -82,7 +90,7 @@ def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     return runner.stage(
         "levels",
         {"after": runner.after("ingest", "fit")},
-        lambda _: compare_levels(observe(runner.inputs.test, options.ingest, frfs, fit=options.fit), fit),
+        lambda _: compare_levels(observe(runner.inputs.test, ingest=options.ingest, frfs=frfs, fit=options.fit), fit),
     )
 
 
@@ -110,7 +118,7 @@ def apply_diagnosis(
         The corrected FRFs.
     """
     effects = effects_of(runner)
-    return apply_to_model(model, diagnosis, effects), apply_to_frfs(frfs, diagnosis, effects)
+    return correct_model(diagnosis, model, effects=effects), correct_frfs(frfs, diagnosis, effects=effects)
 
 
 def effects_of(runner: StageRunner) -> dict[str, Effect]:
@@ -126,7 +134,8 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
     dict of str to Effect
         By name.
     """
-    return select_effects(runner.inputs.options.diagnose or DiagnoseOptions(), runner.inputs.folder)
+    options = runner.inputs.options.diagnose or DiagnoseOptions()
+    return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
 
 
 def corrections(diagnosis: Diagnosis | None) -> str:

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray
-from frf_ipz.diagnosis.parameters import diagnosed_basis
+from frf_ipz.diagnosis.parameters import make_diagnosed_basis
 from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
-from frf_ipz.export.state_space_files import save_reduced_model
-from frf_ipz.fe.reduction.reduce import reduce_model
-from frf_ipz.pairing.pair import pair as pair_roots
+from frf_ipz.export.state_space_files import write_reduced_model
+from frf_ipz.fe.reduction.reduce import reduce_to_dofs
+from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pipeline.sensors import unweighed_sensors
 from frf_ipz.pipeline.stages.mismatch import corrections, effects_of
-from frf_ipz.updating.parameters import structural_basis
+from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 
 if TYPE_CHECKING:
@@ -83,9 +83,9 @@ def reduce(
             "after": runner.after("fit"),
             "points": repr(inputs.points),
         },
-        lambda _: reduce_model(
+        lambda _: reduce_to_dofs(
             model,
-            options,
+            options=options,
             actuators=_once(label.input_dof for label in modal_fit.labels),
             sensors=_once(label.output_dof for label in modal_fit.labels),
             points=inputs.points,
@@ -171,16 +171,18 @@ def update(
 
     def compute(progress: Progress) -> UpdatedModel:
         if options.parameters == "diagnosis" and corrected_by and nominal is not None and model is not nominal:
-            basis = diagnosed_basis(nominal, corrected_by, reduced, effects_of(runner))
+            basis = make_diagnosed_basis(corrected_by, nominal, reduced, effects=effects_of(runner))
         else:
-            basis = structural_basis(model, reduced, mass=options.mass, sensors=sensors)
+            basis = make_structural_basis(model, reduced, mass=options.mass, sensors=sensors)
         return update_model(
-            reduced,
             modal_fit,
-            pairs,
-            options,
+            reduced,
+            pairs=pairs,
+            options=options,
             basis=basis,
-            misplacements=propagate_position_tolerance(model, reduced, modal_fit.labels, tolerance)
+            position_uncertainty=propagate_position_tolerance(
+                modal_fit, reduced, fe_model=model, tolerance_m_per_m=tolerance
+            )
             if tolerance
             else (),
             progress=progress,
@@ -193,7 +195,7 @@ def update(
         lambda result: {
             "pairs.parquet": partial(write_table, tables.pair_table(pairs, modal_fit.labels, result.after)),
             "parameters.parquet": partial(write_table, tables.history_table(result)),
-            "updated_model.npz": partial(save_reduced_model, result.model),
+            "updated_model.npz": partial(write_reduced_model, result.model),
         },
     )
 

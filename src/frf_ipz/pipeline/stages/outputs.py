@@ -10,9 +10,9 @@ import numpy as np
 
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
-from frf_ipz.export.state_space import to_ensemble, to_state_space
-from frf_ipz.export.state_space_files import save_ensemble, save_state_space, save_weights
-from frf_ipz.export.uncertainty import uncertainty_weights
+from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble
+from frf_ipz.export.state_space_files import write_ensemble, write_state_space, write_uncertainty_weights
+from frf_ipz.export.uncertainty import estimate_uncertainty_weights
 from frf_ipz.frf import FrfSet
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.prediction.predict import predict_frfs
@@ -61,7 +61,7 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
     return runner.stage(
         "predict",
         {"points": repr(inputs.points), "after": runner.after("update")},
-        lambda _: predict_frfs(updated, inputs.points, modal_fit.labels, lines),
+        lambda _: predict_frfs(modal_fit, updated, points=inputs.points, frequency_hz=lines),
         lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
     )
 
@@ -93,9 +93,9 @@ def export(
     return runner.stage(
         "export",
         {"options": asdict(options), "points": repr(inputs.points), "after": runner.after("update"), "delays": delays},
-        lambda _: to_state_space(updated, modal_fit.labels, inputs.points, options, delays_s=delays),
+        lambda _: make_state_space(modal_fit, updated, points=inputs.points, options=options, delays_s=delays),
         lambda model: {
-            **{name: partial(save_state_space, model) for name in ("statespace.json", "statespace.mat")},
+            **{name: partial(write_state_space, model) for name in ("statespace.json", "statespace.mat")},
             **(_design_files(updated, modal_fit, inputs.points, options, delays) if options.ensemble else {}),
         },
     )
@@ -120,9 +120,11 @@ def _design_files(
     updated: UpdatedModel, modal_fit: ModalFit, points: Sequence[Dof], options: ExportOptions, delays: dict[str, float]
 ) -> Writers:
     """Members of the posterior, and the bound of what they do to each output."""
-    members = to_ensemble(updated, modal_fit.labels, points, options, delays_s=delays)
-    weights = uncertainty_weights(updated, modal_fit.labels, points, np.geomspace(*modal_fit.band_hz, WEIGHT_LINES))
+    members = make_state_space_ensemble(modal_fit, updated, points=points, options=options, delays_s=delays)
+    weights = estimate_uncertainty_weights(
+        modal_fit, updated, points=points, frequency_hz=np.geomspace(*modal_fit.band_hz, WEIGHT_LINES)
+    )
     return {
-        "statespace_ensemble.mat": partial(save_ensemble, members),
-        "uncertainty.json": partial(save_weights, weights),
+        "statespace_ensemble.mat": partial(write_ensemble, members),
+        "uncertainty.json": partial(write_uncertainty_weights, weights),
     }

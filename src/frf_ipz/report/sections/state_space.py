@@ -37,7 +37,7 @@ def build(run: RunContents) -> Section | None:
     time = f"sampled at {number(model.dt)} s" if model.dt else "in continuous time"
     lead = (
         f"{counted(len(model.state_names), 'state')}, {counted(len(model.input_names), 'input')}, "
-        f"{counted(len(model.output_names), 'output')}, {time}; frf_ipz.load_state_space('statespace.json') gives a "
+        f"{counted(len(model.output_names), 'output')}, {time}; frf_ipz.read_state_space('statespace.json') gives a "
         "control.StateSpace."
     )
     ports = [["input", name, unit] for name, unit in zip(model.input_names, model.input_units, strict=True)]

@@ -21,7 +21,7 @@ from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.fe.beam_models import with_axial_force, with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_released_supports, with_scaled_parts, with_springs
 from frf_ipz.fe.eigen import solve_modes
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 
@@ -66,18 +66,18 @@ def assert_same(actual, expected, tolerance):
 
 def test_the_nominal_model_is_that_of_the_fe_stage(tmp_path):
     model = beam(tmp_path)
-    assert_same(changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0]), model_frfs(model, labels(), S), REDUCED)
+    assert_same(changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0]), compute_frfs(model, labels(), S), REDUCED)
 
 
 def test_added_mass(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(with_point_masses(model, {12: 0.03}), labels(), S)
+    expected = compute_frfs(with_point_masses(model, {12: 0.03}), labels(), S)
     assert_same(changed_frfs(model, "added_mass", (12, "z"), [0.03]), expected, REDUCED)
 
 
 def test_grounded_spring(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(with_springs(model, {Dof(12, "z"): 5e3}), labels(), S)
+    expected = compute_frfs(with_springs(model, {Dof(12, "z"): 5e3}), labels(), S)
     assert_same(changed_frfs(model, "grounded_spring", (12, "z"), [5e3]), expected, REDUCED)
 
 
@@ -110,11 +110,11 @@ def damped_frfs(model, stiffness, mass, names, ratio=0.01):
 
 def test_local_stiffness_of_a_segment_and_of_a_spring(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(with_scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
+    expected = compute_frfs(with_scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
     assert_same(changed_frfs(model, "local_stiffness", ("element", 5, 6), [0.6]), expected, REDUCED)
     frame = lumped(tmp_path)
     names = labels(("3:+x", "1:-x"), ("2:+x",))
-    expected = model_frfs(with_scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
+    expected = compute_frfs(with_scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
     assert_same(changed_frfs(frame, "local_stiffness", ("spring", "k2"), [1.4], names), expected, REDUCED)
 
 
@@ -127,20 +127,20 @@ def test_global_stiffness_moves_all_frequencies_alike(tmp_path):
 
 def test_boundary_compliance(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(with_released_supports(model, {Dof(1, "ry"): 200.0}), labels(), S)
+    expected = compute_frfs(with_released_supports(model, {Dof(1, "ry"): 200.0}), labels(), S)
     assert_same(changed_frfs(model, "boundary_compliance", ("left", ("ry",)), [200.0]), expected, REDUCED)
 
 
 def test_axial_load(tmp_path):
     model = beam(tmp_path, right="pinned")
     names = labels(("9:+z",), ("6:+z",))
-    expected = model_frfs(with_axial_force(model, 300.0), names, S)
+    expected = compute_frfs(with_axial_force(model, 300.0), names, S)
     assert_same(changed_frfs(model, "axial_load", (), [300.0], names), expected, REDUCED)
 
 
 def test_shear_and_rotary_inertia(tmp_path):
     model = beam(tmp_path, thickness_m=0.03)
-    expected = model_frfs(with_formulation(model, "timoshenko"), labels(), S)
+    expected = compute_frfs(with_formulation(model, "timoshenko"), labels(), S)
     assert_same(changed_frfs(model, "shear_rotary_inertia", (), []), expected, REDUCED)
 
 
@@ -170,7 +170,7 @@ def test_what_is_attached(tmp_path, name, key, values, dynamic):
     names = labels(("3:+x", "1:+x"), ("2:+x",), FrfQuantity.RECEPTANCE)
     around = tuple(FrfLabel(parse_dof(f"{a}:+x"), parse_dof(f"{b}:+x"), FrfQuantity.RECEPTANCE) for a, b in (
         (3, node), (1, node), (node, 2), (node, node)))  # fmt: skip
-    bare, cross = model_frfs(frame, names, S), model_frfs(frame, around, S)
+    bare, cross = compute_frfs(frame, names, S), compute_frfs(frame, around, S)
     stiff = dynamic(S)
     effective = stiff / (1 + stiff * cross[:, 3])
     expected = bare - np.stack([cross[:, 0], cross[:, 1]], 1) * (effective * cross[:, 2])[:, None]
@@ -225,7 +225,7 @@ def test_a_damping_matrix_is_that_of_the_fe_stage_and_its_modal_part_scatters(tm
     nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
     nothing = make_hypothesis(context, nuisance_prior, ())
     none = np.zeros(nuisance_prior.size)
-    assert_same(nothing.respond(np.zeros(0), none, S).values, model_frfs(frame, names, S), REDUCED)
+    assert_same(nothing.respond(np.zeros(0), none, S).values, compute_frfs(frame, names, S), REDUCED)
     modes = nothing.modes(np.zeros(0), none)
     assert (modes.viscous is not None) == ("dashpot_Ns_m" in stated)
     jacobian = nuisance_jacobian(nothing.respond(np.zeros(0), none, S), nuisance_prior, context.layout)
@@ -242,12 +242,12 @@ def test_a_damping_level_replaces_a_damping_matrix(tmp_path):
     names = labels(("3:+x",), ("2:+x",))
     undamped = replace(frame, damping_all=0 * frame.damping_all, modal_damping=np.array([0.03]))
     frfs_changed = changed_frfs(frame, "damping_level", (), [0.03], names)
-    assert_same(frfs_changed, model_frfs(undamped, names, S), REDUCED)
+    assert_same(frfs_changed, compute_frfs(undamped, names, S), REDUCED)
     context = context_of(frame, names)
     effect = shipped_effects()["damping_level"]
     (location,) = effect.locations(context)
     corrected = with_change(frame, effect.build(context, location)(np.array([0.03])))
-    assert_same(model_frfs(corrected, names, S), model_frfs(undamped, names, S), EXACT)
+    assert_same(compute_frfs(corrected, names, S), compute_frfs(undamped, names, S), EXACT)
     (parameter,) = effect.parameters(context, location)
     assert_allclose(parameter.neutral, np.median(solve_modes(frame).damping_ratio), rtol=1e-3)
 
@@ -291,7 +291,7 @@ def test_channels(tmp_path, name, key, values, factor):
 
 def test_a_misplaced_sensor_shows_the_other_node(tmp_path):
     model = beam(tmp_path)
-    expected = model_frfs(model, labels(("17:+z", "13:-z")), S)
+    expected = compute_frfs(model, labels(("17:+z", "13:-z")), S)
     assert_same(changed_frfs(model, "sensor_misplaced", ("acc_2", 13), []), expected, REDUCED)
 
 
@@ -309,9 +309,9 @@ def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
     context = context_of(model, labels())
     change = shipped_effects()[name].build(context, Location(key=key))(np.array(values))
     s = 1j * S.imag
-    changed = model_frfs(with_change(model, change), labels(), S)
+    changed = compute_frfs(with_change(model, change), labels(), S)
     assert_same(changed, changed_frfs(model, name, key, values), LOSSES)
-    assert np.isfinite(model_frfs(with_change(model, change), labels(), s)).all()
+    assert np.isfinite(compute_frfs(with_change(model, change), labels(), s)).all()
 
 
 def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_path):
@@ -328,9 +328,9 @@ def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_pa
     one_by_one = with_change(with_change(model, resonator_), joint)
     together = with_change(model, resonator_ + joint)
     assert len(together.all_dofs) == len(model.all_dofs) + 2 == len(set(together.all_dofs))
-    changed, expected = model_frfs(together, labels(), S), model_frfs(one_by_one, labels(), S)
+    changed, expected = compute_frfs(together, labels(), S), compute_frfs(one_by_one, labels(), S)
     assert_allclose(changed, expected, rtol=EXACT)
-    assert not np.allclose(changed, model_frfs(with_change(model, resonator_), labels(), S), rtol=LOSSES)
+    assert not np.allclose(changed, compute_frfs(with_change(model, resonator_), labels(), S), rtol=LOSSES)
 
 
 def test_derivatives_by_nuisance_parameters(tmp_path):

@@ -58,7 +58,7 @@ def test_slopes_are_those_of_the_misfit_with_the_best_gains(nominal, kind):
 
 
 def test_a_mass_is_found_without_scales(nominal):
-    diagnosis = diagnose(nominal, of_unknown_scale(with_point_masses(nominal, {12: SMALL_KG})), FEW)
+    diagnosis = diagnose(of_unknown_scale(with_point_masses(nominal, {12: SMALL_KG})), nominal, options=FEW)
     assert diagnosis.verdict == "explained"
     (finding,) = diagnosis.findings
     assert (finding.effect, dict(finding.location)) == ("added_mass", {"nodes": [12]})
@@ -67,4 +67,4 @@ def test_a_mass_is_found_without_scales(nominal):
 
 
 def test_nothing_missing_is_consistent_without_scales(nominal):
-    assert diagnose(nominal, of_unknown_scale(nominal), FEW).verdict == "consistent"
+    assert diagnose(of_unknown_scale(nominal), nominal, options=FEW).verdict == "consistent"

@@ -32,7 +32,7 @@ def running(folder, n, structure, noise, seed):
         write_csv(folder / "records" / f"{number}.csv", signals, STEP_S)
     test = read_test(write_test(folder, RECORD, kind="random"))
     frfs = estimate_frfs(test, options=IngestOptions()).frfs
-    return observe(test, IngestOptions(), frfs, fit=FitOptions(band_hz=(15.0, 250.0)))
+    return observe(test, ingest=IngestOptions(), frfs=frfs, fit=FitOptions(band_hz=(15.0, 250.0)))
 
 
 @pytest.fixture

@@ -26,12 +26,12 @@ PEAK = 0.05  # relative: the largest force falls between two samples
 
 def observed(path):
     test = read_test(path)
-    return observe(test, IngestOptions(), estimate_frfs(test, options=IngestOptions()).frfs, fit=BAND)
+    return observe(test, ingest=IngestOptions(), frfs=estimate_frfs(test, options=IngestOptions()).frfs, fit=BAND)
 
 
 def observed_and_fitted(path):
     observations = observed(path)
-    return observations, fit_modes(observations.frfs, BAND)
+    return observations, fit_modes(observations.frfs, options=BAND)
 
 
 @pytest.fixture(scope="module")

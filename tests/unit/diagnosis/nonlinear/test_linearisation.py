@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import lumped
-from frf_ipz.diagnosis.apply import apply_to_model
+from frf_ipz.diagnosis.apply import correct_model
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
@@ -85,7 +85,7 @@ def test_the_linear_model_has_spring_and_damper(tmp_path, location):
         held_out_kind="records",
         linearised_law=law,
     )
-    changed = apply_to_model(model, diagnosis)
+    changed = correct_model(diagnosis, model)
     motion = dict(zip(reversed(location.ends), (1.0, -1.0), strict=False))
     row = np.array([motion.get(dof, 0.0) for dof in model.all_dofs])
     assert_allclose((changed.stiffness_all - model.stiffness_all).toarray(), 5e4 * np.outer(row, row))

@@ -97,7 +97,7 @@ def test_the_nominal_model_has_a_larger_misfit_than_within_its_tolerances(solved
 def test_a_law_that_explains_no_more_than_a_linear_system_does_not_win(chain, strike, monkeypatch):
     law, where, *_ = CASES["cubic_stiffness"]
     monkeypatch.setattr("frf_ipz.diagnosis.nonlinear.search.assess_agreement", lambda *_: Agreement(3.0, 1.0))
-    result = diagnose(chain.model, strike(law, where), DiagnoseOptions())
+    result = diagnose(strike(law, where), chain.model, options=DiagnoseOptions())
     assert result.verdict == "unexplained"
     assert result.findings == ()
     assert result.alternatives[0].effect == "cubic_stiffness"

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from diagnosed import beam, labels, measured, observed, problem_of
 from frf_ipz.diagnosis import diagnose as diagnosing
-from frf_ipz.diagnosis.apply import apply_to_frfs, apply_to_model
+from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
@@ -89,12 +89,12 @@ def test_a_thick_beam_of_a_softer_material_is_found_and_put_right(thick):
     exchanged = with_formulation(thick, "timoshenko")
     true = replace(exchanged, stiffness_all=SOFTER * exchanged.stiffness_all)
     options = DiagnoseOptions(effects=("shear_rotary_inertia", "global_stiffness", "added_mass", "axial_load"))
-    diagnosis = diagnose(thick, observed(measured(true, band_hz=HIGH_HZ), HIGH_HZ), options)
+    diagnosis = diagnose(observed(measured(true, band_hz=HIGH_HZ), HIGH_HZ), thick, options=options)
     assert diagnosis.verdict == "explained"
     assert {finding.effect for finding in diagnosis.findings} == {"shear_rotary_inertia", "global_stiffness"}
     (ratio,) = (finding.parameters["stiffness_ratio"].value for finding in diagnosis.findings if finding.parameters)
     assert ratio == pytest.approx(SOFTER, rel=SEEN)
-    right = apply_to_model(thick, diagnosis).stiffness_all.diagonal()
+    right = correct_model(diagnosis, thick).stiffness_all.diagonal()
     assert_allclose(right, true.stiffness_all.diagonal(), rtol=SEEN)
 
 
@@ -104,7 +104,7 @@ def test_a_wrong_sign_and_a_support_that_gives_way_are_found_together(tmp_path):
     names = labels(outputs=("12:+z", "9:-z"))
     frfs = measured(true, names, factors=lambda f: -np.ones((len(f), 2)))
     options = DiagnoseOptions(effects=("sensor_gain", "boundary_compliance", "added_mass", "global_stiffness"))
-    diagnosis = diagnose(held, observed(frfs), options)
+    diagnosis = diagnose(observed(frfs), held, options=options)
     assert diagnosis.verdict == "explained"
     assert {finding.effect for finding in diagnosis.findings} == {"sensor_gain", "boundary_compliance"}
 
@@ -157,7 +157,7 @@ def test_the_detectable_size_has_the_required_evidence(nominal, monkeypatch):
     needed = assess_goodness(problem, fit_null_model(problem)).required_log_bayes_factor
     assert needed > LIMITS["frf"].first_log_bayes_factor
     monkeypatch.setattr(diagnosing, "find_detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
-    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("added_mass",)))
+    diagnosis = diagnose(observed(frfs), nominal, options=DiagnoseOptions(effects=("added_mass",)))
     assert diagnosis.detectability["added_mass"]["nats"] == pytest.approx(needed)
 
 
@@ -180,7 +180,9 @@ def test_nothing_is_added_to_an_effect_that_explains_all(nominal):
 
 def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
     true = replace(with_point_masses(nominal, {12: 0.02}), modal_damping=GUESSED)
-    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    diagnosis = diagnose(
+        observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
+    )
     assert diagnosis.verdict == "unexplained"
     assert "damping ratios are not those of the model" in diagnosis.statement
     assert "4 % instead of 1 %" in diagnosis.statement
@@ -251,7 +253,9 @@ def test_two_resonators_at_one_node_are_not_named(nominal):
         alone = problem.make_hypothesis(()).respond(np.zeros(0), nuisance, s).values
         return hypothesis.respond(values, nuisance, s).values / alone
 
-    diagnosis = diagnose(nominal, observed(measured(nominal, factors=chain)), DiagnoseOptions(effects=(ATTACHED.name,)))
+    diagnosis = diagnose(
+        observed(measured(nominal, factors=chain)), nominal, options=DiagnoseOptions(effects=(ATTACHED.name,))
+    )
     assert diagnosis.verdict == "unexplained"
     assert "one thing of another kind" in diagnosis.statement
     assert [dict(finding.location) for finding in diagnosis.findings] == [{"nodes": [17]}] * 2
@@ -259,12 +263,12 @@ def test_two_resonators_at_one_node_are_not_named(nominal):
 
 def test_all_sensors_may_be_late_together(nominal):
     frfs = measured(nominal, factors=lambda f: np.exp(-2j * np.pi * f[:, None] * np.full(2, 1.2e-3)))
-    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=("time_delay", "sensor_gain")))
+    diagnosis = diagnose(observed(frfs), nominal, options=DiagnoseOptions(effects=("time_delay", "sensor_gain")))
     (finding,) = diagnosis.findings
     assert dict(finding.location) == {"channels": ["acc_1", "acc_2"]}
     assert finding.parameters["delay_s"].value == pytest.approx(1.2e-3, rel=SEEN)
     assert "All sensors together" in finding.statement
-    early, true = apply_to_frfs(frfs, diagnosis).values, measured(nominal).values
+    early, true = correct_frfs(frfs, diagnosis).values, measured(nominal).values
     assert np.linalg.norm(early - true) < SEEN * np.linalg.norm(true)
 
 
@@ -282,16 +286,20 @@ def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp
 
 def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
     true = replace(nominal, modal_damping=np.array([0.01, 0.01, 0.0035, 0.01]))
-    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    diagnosis = diagnose(
+        observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
+    )
     assert diagnosis.verdict == "unexplained"
     assert "0.35 % instead of 1 % at 287.1 Hz" in diagnosis.statement
     allowed = DiagnoseOptions(effects=("added_mass", "damping_level"), damping_tolerance=0.7)
-    assert diagnose(nominal, observed(measured(true)), allowed).verdict == "consistent"
+    assert diagnose(observed(measured(true)), nominal, options=allowed).verdict == "consistent"
 
 
 def test_a_level_that_alone_explains_is_significant_though_not_far_beyond_its_tolerance(nominal):
     true = replace(nominal, modal_damping=np.full(4, 0.0042))
-    diagnosis = diagnose(nominal, observed(measured(true)), DiagnoseOptions(effects=("added_mass", "damping_level")))
+    diagnosis = diagnose(
+        observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
+    )
     assert diagnosis.verdict == "explained"
     assert [(finding.effect, finding.is_significant) for finding in diagnosis.findings] == [("damping_level", True)]
 

@@ -74,7 +74,7 @@ def test_far_outside_a_tolerance_the_prior_rises_faster_but_not_for_shapes(probl
 
 def test_a_frequency_far_outside_its_tolerance_is_not_consistent(nominal):
     diagnosis = diagnose(
-        nominal, observed(measured(with_point_masses(nominal, {17: 4e-4}))), DiagnoseOptions(effects=FEW)
+        observed(measured(with_point_masses(nominal, {17: 4e-4}))), nominal, options=DiagnoseOptions(effects=FEW)
     )
     assert diagnosis.verdict == "explained"
     assert diagnosis.numbers["log_bayes_factor"] > 100
@@ -113,13 +113,13 @@ def test_one_frf_tells_no_node_from_another(nominal):
 
 
 def test_where_nothing_is_wrong_nothing_is_localised(nominal):
-    diagnosis = diagnose(nominal, observed(measured(nominal)), DiagnoseOptions(effects=FEW))
+    diagnosis = diagnose(observed(measured(nominal)), nominal, options=DiagnoseOptions(effects=FEW))
     assert diagnosis.to_json()["mismatch"]["location"] == {}
 
 
 def test_what_was_found_says_where_the_mismatch_is(nominal):
     diagnosis = diagnose(
-        nominal, observed(measured(with_point_masses(nominal, {12: 0.02}))), DiagnoseOptions(effects=FEW)
+        observed(measured(with_point_masses(nominal, {12: 0.02}))), nominal, options=DiagnoseOptions(effects=FEW)
     )
     assert diagnosis.to_json()["mismatch"]["location"] == {"nodes": [12]}
 
@@ -138,7 +138,7 @@ def test_three_effects_are_found_at_once(nominal):
     changed = with_springs(with_point_masses(nominal, {12: 0.02}), {parse_dof("6:z"): 6e3})
     gain = np.array([1.0, 1.06])
     frfs = measured(changed, factors=lambda frequency: np.ones((len(frequency), 1)) * gain)
-    diagnosis = diagnose(nominal, observed(frfs), DiagnoseOptions(effects=FEW))
+    diagnosis = diagnose(observed(frfs), nominal, options=DiagnoseOptions(effects=FEW))
     assert diagnosis.verdict == "explained"
     assert {finding.effect for finding in diagnosis.findings} == set(FEW)
     assert all(finding.log_evidence_gain > 50 for finding in diagnosis.findings)

@@ -8,7 +8,7 @@ import pytest
 from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.fe.response import model_frfs
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.quantities import FrfQuantity
 
 IMITATORS = ("attached_resonator", "viscoelastic_joint")
@@ -22,7 +22,7 @@ def with_force(model, node, stiffness):
     """Factors by which a dynamic stiffness between a node and the ground changes FRFs, [Sherman1950] on receptances."""
 
     def receptance(s, outputs, inputs):
-        return model_frfs(model, labels(outputs, inputs, FrfQuantity.RECEPTANCE), s)
+        return compute_frfs(model, labels(outputs, inputs, FrfQuantity.RECEPTANCE), s)
 
     def factors(frequency_hz):
         s, at = 2j * np.pi * frequency_hz, (f"{node}:+z",)
@@ -41,7 +41,7 @@ def nominal(tmp_path_factory):
 
 def diagnosed(model, stiffness, effects=IMITATORS):
     frfs = measured(model, factors=with_force(model, 12, stiffness), noise=NOISY)
-    return diagnose(model, observed(frfs), DiagnoseOptions(effects=effects))
+    return diagnose(observed(frfs), model, options=DiagnoseOptions(effects=effects))
 
 
 @pytest.mark.parametrize("order", [pytest.param(0.3, marks=pytest.mark.slow), 0.5])

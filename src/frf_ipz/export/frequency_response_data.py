@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
 
 
-def measured_frd(frfs: FrfSet) -> control.FRD:
+def to_frd(frfs: FrfSet) -> control.FRD:
     """Hand measured FRFs to python-control.
 
     Parameters
