@@ -90,7 +90,7 @@ from .updating.options import UpdateOptions as UpdateOptions
 from .updating.parameters import ParameterBasis as ParameterBasis
 from .updating.parameters import make_structural_basis as make_structural_basis
 from .updating.update import update_model as update_model
-from .updating.updated_model import UpdateStatus as UpdateStatus
 from .updating.updated_model import UpdatedModel as UpdatedModel
+from .updating.updated_model import UpdateStatus as UpdateStatus
 
 __version__: str

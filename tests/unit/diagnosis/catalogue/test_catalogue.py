@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.effect_selection import select_effects
+from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.errors import InputError
@@ -40,13 +40,15 @@ def test_imitators_are_effects():
 
 
 def test_only_chosen_effects_are_looked_for():
-    assert set(select_effects(DiagnoseOptions(effects=("added_mass",)), Path())) == {"added_mass"}
+    assert set(EffectCatalogue(options=DiagnoseOptions(effects=("added_mass",)), folder=Path()).effects()) == {
+        "added_mass"
+    }
 
 
 @pytest.mark.parametrize("name", ["cubic_stiffness", "gap_contact", "dry_friction"])
 def test_a_force_law_can_be_chosen_alone(name):
     options = DiagnoseOptions(effects=(name,))
-    assert select_effects(options, Path()) == {}
+    assert EffectCatalogue(options=options, folder=Path()).effects() == {}
     assert [law.name for law in select_laws(options)] == [name]
 
 
@@ -56,14 +58,14 @@ def test_force_laws_can_be_left_out():
 
 def test_an_unknown_effect_is_refused_with_the_nearest_one():
     with pytest.raises(InputError, match="cubic_stiffness"):
-        select_effects(DiagnoseOptions(effects=("cubic_stifness",)), Path())
+        EffectCatalogue(options=DiagnoseOptions(effects=("cubic_stifness",)), folder=Path()).effects()
 
 
 def test_a_users_force_law_is_looked_for(tmp_path):
     (tmp_path / "mine.py").write_text(USERS_LAW, encoding="utf-8")
     options = DiagnoseOptions(effects=("added_mass",), extra_effects=("mine.py:SquareDrag",))
-    assert set(select_effects(options, tmp_path)) == {"added_mass"}
-    assert [law.name for law in select_laws(options, tmp_path)] == ["square_drag"]
+    assert set(EffectCatalogue(options=options, folder=tmp_path).effects()) == {"added_mass"}
+    assert [law.name for law in EffectCatalogue(options=options, folder=tmp_path).laws()] == ["square_drag"]
 
 
 @pytest.mark.parametrize(
@@ -78,4 +80,4 @@ def test_a_users_force_law_is_looked_for(tmp_path):
 def test_a_bad_file_of_the_user_is_refused(tmp_path, reference, content, problem):
     (tmp_path / "mine.py").write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=problem):
-        select_effects(DiagnoseOptions(extra_effects=(reference,)), tmp_path)
+        EffectCatalogue(options=DiagnoseOptions(extra_effects=(reference,)), folder=tmp_path).effects()
