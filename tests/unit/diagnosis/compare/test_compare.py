@@ -46,7 +46,7 @@ def state(model, machine, seed, **options):
 
 
 def test_nothing_has_changed(nominal, real):
-    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, real, 2), FEW)
+    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, real, 2), options=FEW)
     assert not comparison.is_changed
     assert comparison.changes == ()
     assert comparison.statement.startswith("Nothing has changed")
@@ -54,7 +54,7 @@ def test_nothing_has_changed(nominal, real):
 
 def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
     after = with_point_masses(real, {12: ADDED_KG})
-    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, after, 2), options=FEW)
     assert comparison.diagnosis.verdict == "explained"
     (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("added_mass", {"nodes": [12]})
@@ -66,7 +66,7 @@ def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
 def test_a_mass_that_is_gone_is_found(nominal):
     with_piece = with_point_masses(nominal, {14: 1.2 * HUNG_KG})  # its mass is not known well either
     machine = real_one(with_point_masses(nominal, {14: HUNG_KG}))
-    comparison = frf_ipz.compare_states(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), FEW)
+    comparison = frf_ipz.compare_states(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), options=FEW)
     (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("mass_loss", {"nodes": [14]})
     assert change.parameters["mass_kg"].value == pytest.approx(HUNG_KG, rel=SIZE)
@@ -75,7 +75,7 @@ def test_a_mass_that_is_gone_is_found(nominal):
 
 def test_softer_elements_are_located(nominal, real):
     after = with_scaled_parts(real, "element", ["7", "8"], stiffness_ratio=0.8)
-    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, after, 2), FEW)
+    comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, after, 2), options=FEW)
     (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("local_stiffness", {"elements": [7, 8]})
     assert change.parameters["stiffness_ratio"].value == pytest.approx(0.8, rel=SIZE)
@@ -86,19 +86,19 @@ def test_gains_that_were_there_before_are_no_change(nominal, real):
         return np.tile([1.05, 0.97], (len(frequency_hz), 1))
 
     before, after = (state(nominal, real, seed, factors=channels) for seed in (1, 2))
-    assert not frf_ipz.compare_states(before, after, FEW).is_changed
-    assert frf_ipz.compare_states(state(nominal, real, 1), after, FEW).is_changed
+    assert not frf_ipz.compare_states(before, after, options=FEW).is_changed
+    assert frf_ipz.compare_states(state(nominal, real, 1), after, options=FEW).is_changed
 
 
 def test_scatter_is_learnt_from_repeats(nominal, real):
     drawn = np.random.default_rng(0).standard_normal(7)
     machines = [replace(real, stiffness_all=(1 + SCATTER * deviation) * real.stiffness_all) for deviation in drawn]
     repeats = [state(nominal, machine, seed) for seed, machine in enumerate(machines)]
-    comparison = frf_ipz.compare_states(repeats[:-1], repeats[-1], FEW)
+    comparison = frf_ipz.compare_states(repeats[:-1], repeats[-1], options=FEW)
     assert not comparison.is_changed
     std = SCATTER * drawn[:-1].std(ddof=1) / 2  # of frequencies; tolerances are half widths
     assert comparison.scatter.frequency_tolerance == pytest.approx(np.sqrt(3 * (1 + 1 / 6)) * std, rel=SIZE)
-    assert frf_ipz.compare_states(repeats[4], repeats[6], FEW).is_changed
+    assert frf_ipz.compare_states(repeats[4], repeats[6], options=FEW).is_changed
 
 
 def test_the_corrected_model_has_the_measured_frfs(nominal, real):
@@ -137,12 +137,12 @@ def test_a_node_cannot_lose_more_than_it_has(nominal):
 
 def test_no_state_before_is_refused(nominal, real):
     with pytest.raises(InputError, match="no state before"):
-        frf_ipz.compare_states([], state(nominal, real, 1), FEW)
+        frf_ipz.compare_states([], state(nominal, real, 1), options=FEW)
 
 
 def test_states_of_other_channels_are_refused(nominal, real):
     single_channel = state(nominal, real, 2, names=labels(outputs=("17:+z",)))
     with pytest.raises(InputError, match="channels"):
-        frf_ipz.compare_states([state(nominal, real, 1), single_channel], state(nominal, real, 3), FEW)
+        frf_ipz.compare_states([state(nominal, real, 1), single_channel], state(nominal, real, 3), options=FEW)
     with pytest.raises(InputError, match="channels"):
-        frf_ipz.compare_states(state(nominal, real, 1), single_channel, FEW)
+        frf_ipz.compare_states(state(nominal, real, 1), single_channel, options=FEW)
