@@ -1,4 +1,4 @@
-"""What hypotheses are fitted to, and what a fit comes to."""
+"""The data that hypotheses are fitted to, and the result of a fit."""
 
 from __future__ import annotations
 

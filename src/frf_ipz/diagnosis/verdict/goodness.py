@@ -1,4 +1,4 @@
-"""The verdict: whether anything is missing, and whether what was found is all of it.
+"""How good a fit is: whether anything is missing, and whether what was found is all of it.
 
 The limits were chosen on simulated tests that no reported rate was measured on.
 """

@@ -1,8 +1,7 @@
 """A nonlinear law and a linear effect together: the one is taken out of the recordings, and the other is searched for.
 
-The linear effect goes first where no law explains by itself; the law, where it explains but
-needs a large nuisance chi2 of the nominal model, or where the linear effect first led to nothing and the law follows
-the recordings all the same.
+The linear effect goes first where no law explains by itself; the law, where it explains but needs a large nuisance chi2
+of the nominal model, or where the linear effect first led to nothing and the law follows the recordings all the same.
 """
 
 from __future__ import annotations
