@@ -9,11 +9,13 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -120,6 +122,35 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
         first = min(error.errors(), key=_rank)
         where = ".".join(_key_text(part) for part in first["loc"] if not _is_type_tag(part))
         raise FileFormatError(path, _explain(first, options_type), where=where and f"key '{where}'") from None
+
+
+def check_values(options: object) -> None:
+    """Check options that are made in Python, as those of a file are: called when they are made.
+
+    Parameters
+    ----------
+    options : dataclass
+        Its values are brought to their types, lists to tuples for one.
+
+    Raises
+    ------
+    InputError
+        On the first value that does not fit.
+    """
+    kind: Any = type(options)
+    for name, adapter in _adapters(kind).items():
+        value = getattr(options, name)
+        value = value.item() if isinstance(value, np.generic) else value  # a number of numpy is a number
+        try:
+            object.__setattr__(options, name, adapter.validate_python(value))
+        except ValidationError as error:
+            raise InputError(f"{kind.__name__}.{name}: {_explain(error.errors()[0], kind)}") from None
+
+
+@lru_cache
+def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
+    hints = get_type_hints(kind, include_extras=True)
+    return {field.name: TypeAdapter(hints[field.name]) for field in fields(kind)}
 
 
 def _rank(error: Any) -> int:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import CountOrNone, NotNegative
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,9 +37,12 @@ class DiagnoseOptions:
     apply: bool = False
     effects: tuple[str, ...] = ()
     extra_effects: tuple[str, ...] = ()
-    stiffness_tolerance: float = 1e-3
-    frequency_tolerance: float = 1e-3
-    damping_tolerance: float = 0.3
-    gain_tolerance: float = 5e-3
-    position_tolerance_m_per_m: float = 1e-3
-    seed: int = 0
+    stiffness_tolerance: NotNegative = 1e-3
+    frequency_tolerance: NotNegative = 1e-3
+    damping_tolerance: NotNegative = 0.3
+    gain_tolerance: NotNegative = 5e-3
+    position_tolerance_m_per_m: NotNegative = 1e-3
+    seed: CountOrNone = 0
+
+    def __post_init__(self) -> None:
+        check_values(self)

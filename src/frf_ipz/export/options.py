@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import CountOrNone, NotNegative
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +31,9 @@ class ExportOptions:
 
     outputs: Literal["measured", "displacement", "velocity", "acceleration"] = "measured"
     residual: Literal["dynamics", "feedthrough"] = "dynamics"
-    pade_order: int = 0
-    sample_time_s: float = 0.0
-    ensemble: int = 0
+    pade_order: CountOrNone = 0
+    sample_time_s: NotNegative = 0.0
+    ensemble: CountOrNone = 0
+
+    def __post_init__(self) -> None:
+        check_values(self)

@@ -7,16 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
+from frf_ipz.option_types import Name, NotNegative, Ratio
 from frf_ipz.toml_files import STRICT
-
-# Numbers are strict: TOML distinguishes numbers, texts and truth values, so a length of "0.5" or of true is a slip.
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
-Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]
-Count = Annotated[int, Field(ge=1, strict=True)]
-Node = Annotated[int, Field(ge=1, strict=True)]
-NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
-Name = Annotated[str, Field(min_length=1)]
 
 
 def _as_list(value: Any) -> Any:  # noqa: ANN401 - any content of the file; the type behind it checks

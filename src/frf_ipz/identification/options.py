@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from frf_ipz.errors import InputError
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import Count, Frequency
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +24,11 @@ class RejectedPole:
 
     __pydantic_config__ = STRICT
 
-    hz: float
+    hz: Frequency
     why: str
+
+    def __post_init__(self) -> None:
+        check_values(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,8 +45,11 @@ class PinnedPole:
 
     __pydantic_config__ = STRICT
 
-    hz: float
+    hz: Frequency
     why: str = ""
+
+    def __post_init__(self) -> None:
+        check_values(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,16 +84,17 @@ class FitOptions:
 
     __pydantic_config__ = STRICT
 
-    band_hz: tuple[float, float] | None = None
-    exclude_hz: tuple[tuple[float, float], ...] = ()
-    pin_hz: tuple[float | PinnedPole, ...] = ()
+    band_hz: tuple[Frequency, Frequency] | None = None
+    exclude_hz: tuple[tuple[Frequency, Frequency], ...] = ()
+    pin_hz: tuple[Frequency | PinnedPole, ...] = ()
     strike: tuple[RejectedPole, ...] = ()
     modes: Literal["complex", "real"] = "complex"
-    max_order: int | None = None
+    max_order: Count | None = None
     delay: bool = False
     gain: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_values(self)
         bands = [] if self.band_hz is None else [("band_hz", self.band_hz)]
         for key, (low, high) in (*bands, *(("exclude_hz", pair) for pair in self.exclude_hz)):
             if not 0 <= low < high:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import NotNegative, Positive
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,9 +34,12 @@ class IngestOptions:
     __pydantic_config__ = STRICT
 
     estimator: Literal["H1", "H2", "Hv"] = "H1"
-    force_window_s: float | None = None
-    exponential_window_s: float | None = None
-    segment_s: float | None = None
+    force_window_s: NotNegative | None = None
+    exponential_window_s: NotNegative | None = None
+    segment_s: Positive | None = None
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
     hide: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_values(self)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,3 +24,6 @@ class PredictOptions:
 
     points: tuple[str, ...] = ()
     reference: str | None = None
+
+    def __post_init__(self) -> None:
+        check_values(self)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,11 +44,14 @@ class UpdateOptions:
     parameters: Literal["parts", "diagnosis"] = "parts"
     mass: bool = False
     damping: bool = True
-    max_iterations: int | None = None
-    alpha: float = 0.1
-    beta: float = 0.3
-    delta: float = 1e-3
-    delta_damping: float = 0.1
+    max_iterations: Count | None = None
+    alpha: NotNegative = 0.1
+    beta: Positive = 0.3
+    delta: Positive = 1e-3
+    delta_damping: Positive = 0.1
     cross_sensitivities: bool = True
-    ensemble: int = 200
-    seed: int = 0
+    ensemble: CountOrNone = 200
+    seed: CountOrNone = 0
+
+    def __post_init__(self) -> None:
+        check_values(self)

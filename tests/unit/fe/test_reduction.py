@@ -260,7 +260,6 @@ def test_rounding_in_the_matrices_is_noticed(monkeypatch):
     ("options", "message"),
     [
         (ReduceOptions(modes=41), "modes is 41; the model 'beam' has 40 free DOFs"),
-        (ReduceOptions(modes=0), "modes is 0"),
         (ReduceOptions(modes=4, dofs=("3:z", "4:z"), residual_flexibility=("9:z",)), "names 2 DOFs, but 4 modes and 1"),
         (ReduceOptions(modes=4, dofs=("3:z", "9:z", "15:z")), "names 3 DOFs, but there are 4 modes and 1"),
         (ReduceOptions(dofs=("9:z",), residual_flexibility=("9:z",)), "no mode remains"),

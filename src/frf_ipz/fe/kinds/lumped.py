@@ -11,7 +11,8 @@ import numpy as np
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness, stated_damping
-from frf_ipz.fe.model_options import DampingSection, ModelSection, Name, Node, NodeOrGround, NotNegative, Positive
+from frf_ipz.fe.model_options import DampingSection, ModelSection
+from frf_ipz.option_types import Name, Node, NodeOrGround, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT
 

@@ -14,9 +14,10 @@ from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.assembly import stated_damping
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
 from frf_ipz.fe.matrices.matrix_market import read_symmetric
-from frf_ipz.fe.model_options import DampingSection, ModelSection, Name
+from frf_ipz.fe.model_options import DampingSection, ModelSection
 from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite
 from frf_ipz.numerics.neighbours import lines_between_neighbours
+from frf_ipz.option_types import Name
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from frf_ipz.toml_files import STRICT
+from frf_ipz.option_types import Count
+from frf_ipz.toml_files import STRICT, check_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +26,9 @@ class ReduceOptions:
 
     __pydantic_config__ = STRICT
 
-    modes: int | None = None
+    modes: Count | None = None
     dofs: tuple[str, ...] = ()
     residual_flexibility: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        check_values(self)

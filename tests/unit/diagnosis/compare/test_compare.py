@@ -66,7 +66,9 @@ def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
 def test_a_mass_that_is_gone_is_found(nominal):
     with_piece = with_point_masses(nominal, {14: 1.2 * HUNG_KG})  # its mass is not known well either
     machine = real_one(with_point_masses(nominal, {14: HUNG_KG}))
-    comparison = frf_ipz.compare_states(state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), options=FEW)
+    comparison = frf_ipz.compare_states(
+        state(with_piece, machine, 1), state(with_piece, real_one(nominal), 2), options=FEW
+    )
     (change,) = comparison.changes
     assert (change.effect, dict(change.location)) == ("mass_loss", {"nodes": [14]})
     assert change.parameters["mass_kg"].value == pytest.approx(HUNG_KG, rel=SIZE)
