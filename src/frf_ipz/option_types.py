@@ -1,0 +1,24 @@
+"""What values of options may be: types that pydantic checks, and that the reference of the files is written from.
+
+Numbers are strict: TOML tells numbers, texts and truth values apart, so a length of "0.5" or of true is a slip. None is
+infinite or no number.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+LARGEST_HZ = 1e9  # beyond any vibration: a frequency that was meant otherwise
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]
+Frequency = Annotated[float, Field(ge=0, le=LARGEST_HZ, allow_inf_nan=False, strict=True)]
+Count = Annotated[int, Field(ge=1, strict=True)]
+CountOrNone = Annotated[int, Field(ge=0, strict=True)]
+Node = Annotated[int, Field(ge=1, strict=True)]
+NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
+Name = Annotated[str, Field(min_length=1)]
