@@ -6,7 +6,10 @@ import pandas as pd
 
 from synthetic_run import synthetic_folder, synthetic_law
 
-HOSTILE = """<script>window.hacked = 1</script>"'{{7*7}}</script><img src=x onerror="window.hacked = 1">&amp;"""
+HOSTILE = (
+    """<script>window.hacked = 1</script>"'{{7*7}}</script><img src=x onerror="window.hacked = 1">&amp;"""
+    r"%{x}{y}_$\frac^$"
+)
 
 
 def hostile(text=""):

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import (
     FuncFormatter,
     LogFormatterMathtext,
@@ -53,9 +54,14 @@ POINTS_PER_PX = 0.62  # of widths and symbols: a page is wider than a column, an
 TITLE_IN = 0.25  # above each of several pictures
 MOST_NAMES = 18  # in a legend; with more it is left out, as it would hide the picture
 MOST_COLUMNS = 3  # of a legend
+ROW_IN = 0.17  # of a legend
+LONGEST_NAME, LONGEST_TICK = 90, 40  # characters that there is room for: in a row, and upright or beside the axes
+LEGEND_SYMBOL = 7.0  # at most, points
 CHARACTERS = 96  # of the legend's font in the width of a figure
 SYMBOL_CHARACTERS = 7  # as wide as a symbol before a name
+ALL_LABELLED = 0.5  # decades of a logarithmic axis of which all ticks are labelled
 FEW_DECADES, PLAIN = 2.0, (1e-4, 1e5)  # seen of a logarithmic axis whose ticks are plain numbers
+SHADE_TICKS = tuple(np.log10([1, 2, 5]).tolist())  # of each decade
 MOST_CELLS = 240  # of a map in which the numbers are written
 MANY_POINTS = 20_000  # from which a vector file holds a raster of them
 COLOURS = (
@@ -98,6 +104,7 @@ SYMBOLS = {
     "star": "*",
     "tick": "|",
 }
+LEAST_WIDTH = 0.9  # of a vertical line, points
 BESIDE_POINTS = 4.0  # from a point to its label
 BAR_WIDTH = 0.8  # of the room that a category has
 
@@ -118,7 +125,7 @@ def draw_pictures(pictures: Sequence[Picture]) -> Figure:
         It belongs to no window.
     """
     title = TITLE_IN if len(pictures) > 1 else 0.0
-    heights = [INCHES_PER_PX * picture.height_px + title for picture in pictures]
+    heights = [INCHES_PER_PX * picture.height_px + title + _legend_height_in(picture) for picture in pictures]
     figure = Figure(figsize=(WIDTH_IN, sum(heights)), layout="constrained")
     parts = figure.subfigures(len(pictures), 1, height_ratios=heights, squeeze=False)[:, 0]
     for part, picture in zip(parts, pictures, strict=True):
@@ -260,7 +267,7 @@ def _set_axis(ax: Axes, side: str, axis: Axis) -> None:
 
 def _set_ticks(ticks: XAxis | YAxis, axis: Axis) -> None:
     if axis.ticks is not None:
-        ticks.set_ticks(list(axis.ticks), [_plain(text) for text in axis.tick_labels] or None)
+        ticks.set_ticks(list(axis.ticks), [_plain(text, LONGEST_TICK) for text in axis.tick_labels] or None)
     elif axis.scale == "linear" and axis.tick_step is not None:
         ticks.set_major_locator(MultipleLocator(axis.tick_step))
     elif axis.scale == "linear":
@@ -280,12 +287,34 @@ def _label(value: float, ticks: XAxis | YAxis) -> str:
     low, high = sorted(ticks.get_view_interval())
     decades = float(np.log10(high / low)) if low > 0 else np.inf
     is_plain = PLAIN[0] < low and high < PLAIN[1] and decades <= FEW_DECADES
-    return f"{value:.4g}" if is_plain and (decades <= 1 or f"{value:e}"[0] in "1235") else ""
+    return f"{value:.4g}" if is_plain and (decades <= ALL_LABELLED or f"{value:e}"[0] in "1235") else ""
 
 
 def _title(ax: Axes, x: Axis, y: Axis) -> None:
     ax.set_xlabel(_plain(x.title), fontsize=9)
-    ax.set_ylabel(_plain(y.title), fontsize=9)
+    ax.set_ylabel(_plain(y.title, LONGEST_TICK), fontsize=9)
+
+
+def _legend_height_in(picture: Picture) -> float:
+    """Give the room that the rows of a legend need beyond the first."""
+    names = list(dict.fromkeys(layer.name for layer in legend_layers(picture))) if picture.has_legend else []
+    if not 0 < len(names) <= MOST_NAMES:
+        return 0.0
+    return ROW_IN * (-(-len(names) // _legend_columns(names)) - 1)
+
+
+def _legend_columns(names: Iterable[str]) -> int:
+    return int(np.clip(CHARACTERS // (max(map(len, names)) + SYMBOL_CHARACTERS), 1, MOST_COLUMNS))
+
+
+def _legend_handle(artist: Artist) -> Artist:
+    """Give what stands for a layer in a legend: large symbols would cover each other there."""
+    if not isinstance(artist, Line2D) or artist.get_markersize() <= LEGEND_SYMBOL:
+        return artist
+    small = Line2D([], [])
+    small.update_from(artist)
+    small.set_markersize(LEGEND_SYMBOL)
+    return small
 
 
 def _legend(ax: Axes, layers: Sequence[Layer], handles: Handles) -> None:
@@ -294,20 +323,21 @@ def _legend(ax: Axes, layers: Sequence[Layer], handles: Handles) -> None:
     if not 0 < len(named) <= MOST_NAMES:
         return
     ax.legend(
-        list(named.values()),
+        [_legend_handle(handle) for handle in named.values()],
         [_plain(name) for name in named],
         loc="lower left",
         bbox_to_anchor=(0, 1),
-        ncols=int(np.clip(CHARACTERS // (max(map(len, named)) + SYMBOL_CHARACTERS), 1, MOST_COLUMNS)),
+        ncols=_legend_columns(named),
         frameon=False,
         fontsize=8,
         borderaxespad=0.2,
     )
 
 
-def _plain(text: str) -> str:
-    """Text that Matplotlib sets as it stands: no formula, and no name that a legend leaves out."""
-    escaped = text.replace("$", "\\$")
+def _plain(text: str, longest: int = LONGEST_NAME) -> str:
+    """Text that Matplotlib sets as it stands: no formula, no name that a legend leaves out; cut where it is long."""
+    short = text if len(text) <= longest else f"{text[: longest - 1]}…"
+    escaped = short.replace("$", "\\$")
     return f" {escaped}" if escaped.startswith("_") else escaped
 
 
@@ -352,6 +382,7 @@ def _(layer: Band, ax: Axes) -> Artist:
 @_draw_layer.register(Points)
 def _(layer: Points, ax: Axes) -> Artist:
     size, colour = POINTS_PER_PX * layer.size, _colour(layer.colour)
+    is_filled = layer.is_filled or layer.symbol == "square-x"  # whose outline alone is no symbol here
     if layer.scale_title and layer.values is not None:
         largest = max(float(np.abs(layer.values).max(initial=0.0)), np.finfo(float).tiny)
         colours: dict[str, Any] = {"c": layer.values, "cmap": BLUE_TO_ORANGE, "vmin": -largest, "vmax": largest}
@@ -371,14 +402,14 @@ def _(layer: Points, ax: Axes) -> Artist:
         color=colour,
         alpha=layer.opacity,
         markersize=size,
-        markerfacecolor=colour if layer.is_filled else "none",
-        markeredgewidth=0 if layer.is_filled and layer.symbol not in {"cross", "tick"} else 1.0,
+        markerfacecolor=colour if is_filled else "none",
+        markeredgewidth=0 if is_filled and layer.symbol not in {"cross", "tick"} else 1.0,
         rasterized=len(layer.x) > MANY_POINTS,
     )[0]
 
 
 def _names(values: Any) -> Any:  # noqa: ANN401  an array, or names
-    return [_plain(value) if isinstance(value, str) else value for value in values]
+    return [_plain(value, LONGEST_TICK) if isinstance(value, str) else value for value in values]
 
 
 @_draw_layer.register(Labels)
@@ -421,7 +452,7 @@ def _(layer: VerticalLines, ax: Axes) -> Artist:
         color=_colour(layer.colour),
         alpha=layer.opacity,
         linestyle=DASHES[layer.dash],
-        linewidth=POINTS_PER_PX * layer.width,
+        linewidth=max(POINTS_PER_PX * layer.width, LEAST_WIDTH),
     )
 
 
@@ -437,8 +468,8 @@ def _(layer: HeatMap, ax: Axes) -> Artist:
     image = ax.imshow(logarithm, cmap="cividis", aspect="auto", vmin=0, vmax=top)
     ax.set_xticks(range(len(layer.columns)), _names(layer.columns))
     ax.set_yticks(range(len(layer.rows)), _names(layer.rows))
-    decades = np.arange(0, int(top) + 1)
-    bar = ax.figure.colorbar(image, ax=ax, ticks=decades, format=FuncFormatter(lambda value, _: f"{10**value:g}"))
+    ticks = [decade + step for decade in range(int(top) + 1) for step in SHADE_TICKS if decade + step <= top]
+    bar = ax.figure.colorbar(image, ax=ax, ticks=ticks, format=FuncFormatter(lambda value, _: f"{10**value:.3g}"))
     bar.set_label(_plain(layer.scale_title), fontsize=8)
     bar.ax.tick_params(labelsize=8)
     if layer.values.size <= MOST_CELLS:

@@ -111,6 +111,7 @@ def _diagram(poles: pd.DataFrame) -> list[Layer]:
             values=damping[here],
         )
         for here, name, colour, opacity, symbol, is_filled, size in styles
+        if here.any()
     ]
 
 

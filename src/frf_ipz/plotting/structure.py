@@ -212,13 +212,13 @@ def _supports(geometry: Geometry | None, positions: FloatArray, rows: Mapping[in
     held = {} if geometry is None else {rows[node]: how for node, how in geometry.supports.items() if node in rows}
     if not held:
         return []
-    places = positions[list(held)]
+    coordinates = positions[list(held)]
     return [
         Points(
             name="support",
             colour=Role.INK,
-            x=places[:, 0],
-            y=places[:, 1],
+            x=coordinates[:, 0],
+            y=coordinates[:, 1],
             symbol="square-x",
             size=15,
             is_filled=False,
@@ -235,14 +235,14 @@ def _dofs(
     if not known:
         return []
     mark, texts = MARKS[name], [str(dof) for dof in known]
-    places = positions[[rows[dof.node] for dof in known]]
-    heights = places[:, 1] + (mark.height if is_line else 0.0)
+    coordinates = positions[[rows[dof.node] for dof in known]]
+    heights = coordinates[:, 1] + (mark.height if is_line else 0.0)
     is_labelled = len(known) <= MOST_LABELS and not is_line
     points = Points(
         name=name,
         colour=mark.colour,
         group=name,
-        x=places[:, 0],
+        x=coordinates[:, 0],
         y=heights,
         symbol=mark.symbol,
         size=15 if is_line or name == SENSOR_NAME else 11,
@@ -253,7 +253,7 @@ def _dofs(
     if not is_line:
         return [points]
     extent = float(np.ptp(positions[:, 0])) or 1.0
-    labels = _side_by_side([(float(x), text) for x, text in zip(places[:, 0], texts, strict=True)], extent)
+    labels = _side_by_side([(float(x), text) for x, text in zip(coordinates[:, 0], texts, strict=True)], extent)
     height = heights[0] + (ABOVE_MARK if mark.side == "above" else -BELOW_MARK)
     words = Labels(
         name=name,
@@ -305,13 +305,13 @@ def _rings(
     known = {rows[node]: text for node, text in nodes.items() if node in rows}
     if not known:
         return []
-    places = positions[list(known)]
+    coordinates = positions[list(known)]
     return [
         Points(
             name=name,
             colour=Role.BAD,
-            x=places[:, 0],
-            y=places[:, 1],
+            x=coordinates[:, 0],
+            y=coordinates[:, 1],
             symbol=symbol,
             size=30,
             is_filled=False,

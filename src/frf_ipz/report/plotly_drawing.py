@@ -52,6 +52,7 @@ SYMBOLS = {"cross": "x", "tick": "line-ns"}
 THIN_SYMBOLS = {"cross": "x-thin"}
 SIDES = {"above": "top", "below": "bottom"}
 FIELDS = {"x": "x", "y": "y", "text": "text", "value": "customdata"}
+WHOLE = {"cliponaxis": False}  # words at the rim of a picture are not cut
 ALWAYS_CLEAR = {"marker": {"opacity": 1.0}}  # points outside a range that is chosen stay as clear as they were
 
 
@@ -321,7 +322,7 @@ def _(layer: Points, panel: Panel) -> list[Trace]:
     if len(layer.texts):
         trace["text"] = _texts(layer.texts)
     if layer.labels:
-        trace |= {"textposition": _side(layer.labels), "textfont": {"color": colour, "size": 12.5}}
+        trace |= {"textposition": _side(layer.labels), "textfont": {"color": colour, "size": 12.5}, **WHOLE}
     if layer.values is not None:
         trace["customdata"] = layer.values
         trace["marker"] = _shades(layer.values, layer) if layer.scale_title else marker
@@ -350,7 +351,7 @@ def _(layer: Labels, panel: Panel) -> list[Trace]:
     del panel
     font = {"color": _colour(layer.colour), "size": 12.5}
     words = {"text": _texts(layer.texts), "textposition": _side(layer.side), "textfont": font}
-    return [{"type": "scatter", "mode": "text", "x": layer.x, "y": layer.y, "hoverinfo": "skip", **words}]
+    return [{"type": "scatter", "mode": "text", "x": layer.x, "y": layer.y, "hoverinfo": "skip", **words, **WHOLE}]
 
 
 @_draw.register(Areas)

@@ -79,13 +79,13 @@ def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> 
     known = [dof for dof in dofs if dof.node in rows]
     if not known:
         return picture
-    places = project(geometry.coordinates_m)[[rows[dof.node] for dof in known]]
+    coordinates = project(geometry.coordinates_m)[[rows[dof.node] for dof in known]]
     names = [dof.name for dof in known]
     rings = Points(
         name="retained in the reduction",
         colour=3,
-        x=places[:, 0],
-        y=places[:, 1],
+        x=coordinates[:, 0],
+        y=coordinates[:, 1],
         size=14,
         is_filled=False,
         hover="{text}: the model is reduced to it",

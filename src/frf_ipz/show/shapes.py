@@ -182,25 +182,25 @@ def _models(run: RunContents, number: int) -> dict[str, tuple[ReducedModel, comp
     updated, pairs = run.updated, run.pairs
     if updated is None or pairs is None:
         return {}
-    for place, row in enumerate(pairs.targets):
+    for target, row in enumerate(pairs.targets):
         if row.kind == "pole" and row.measured == number:
             return {
                 "nominal": (updated.nominal, row.computed_value),
-                "updated": (updated.model, complex(updated.after[place])),
+                "updated": (updated.model, complex(updated.after[target])),
             }
     return {}
 
 
 def _closest_mode(model: ReducedModel, pole: complex) -> tuple[complex, ComplexArray]:
     roots = damped_poles(model.mass, model.damping, model.stiffness)
-    place = int(np.argmin(np.abs(roots.values - pole)))
-    return complex(roots.values[place]), roots.right_vectors[:, place]
+    mode = int(np.argmin(np.abs(roots.values - pole)))
+    return complex(roots.values[mode]), roots.right_vectors[:, mode]
 
 
 def _scaled_onto(motion: Motion, measured: Motion, hertz: float) -> Motion:
     """Turn and scale a model's shape onto the measured one, and state their MAC."""
-    place = {dof: k for k, dof in enumerate(motion.dofs)}
-    shared = [(place[dof], k) for k, dof in enumerate(measured.dofs) if dof in place]
+    rows_of = {dof: k for k, dof in enumerate(motion.dofs)}
+    shared = [(rows_of[dof], k) for k, dof in enumerate(measured.dofs) if dof in rows_of]
     if not shared:
         return _scaled(motion)
     rows, columns = (list(part) for part in zip(*shared, strict=True))
@@ -232,8 +232,8 @@ def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
     nodes, positions, lines = _plan(geometry, shape.motions)
     is_row = not np.ptp(positions[:, 1:]) if len(nodes) else True
     extent = (float(np.ptp(positions, axis=0).max()) if len(nodes) else 0.0) or 1.0
-    place = {int(node): row for row, node in enumerate(nodes)}
-    moves = [_move(motion, place, is_row=is_row) for motion in shape.motions]
+    node_rows = {int(node): row for row, node in enumerate(nodes)}
+    moves = [_move(motion, node_rows, is_row=is_row) for motion in shape.motions]
     scale = _scale(shape, [move for _, move in moves], extent)
     ground = _project(positions, is_row=is_row)
     drawn = [
@@ -250,7 +250,9 @@ def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
     return {
         "title": shape.title,
         "ground": _digits(ground, extent),
-        "lines": [[place[int(a)], place[int(b)]] for a, b in lines if int(a) in place and int(b) in place],
+        "lines": [
+            [node_rows[int(a)], node_rows[int(b)]] for a, b in lines if int(a) in node_rows and int(b) in node_rows
+        ],
         "frame": _frame(ground, extent, is_row=is_row),
         "motions": drawn,
     }
@@ -271,14 +273,14 @@ def _plan(geometry: Geometry | None, motions: Sequence[Motion]) -> tuple[IntArra
     return geometry.nodes[is_drawn], geometry.coordinates_m[is_drawn], geometry.lines
 
 
-def _move(motion: Motion, place: dict[int, int], *, is_row: bool) -> tuple[IntArray, ComplexArray]:
+def _move(motion: Motion, node_rows: dict[int, int], *, is_row: bool) -> tuple[IntArray, ComplexArray]:
     """Which points move, and how, across and up. In a row of nodes all motion is drawn upwards."""
     moved: dict[int, ComplexArray] = {}
     for dof, value in zip(motion.dofs, motion.values, strict=True):
-        if dof.direction in AXES and dof.node in place:
-            moved.setdefault(place[dof.node], np.zeros(3, complex))[AXES[dof.direction]] = value
-    if len(moved) > len(place) / 2:  # a model that knows nearly all nodes: the others are held
-        moved = {row: moved.get(row, np.zeros(3, complex)) for row in place.values()}
+        if dof.direction in AXES and dof.node in node_rows:
+            moved.setdefault(node_rows[dof.node], np.zeros(3, complex))[AXES[dof.direction]] = value
+    if len(moved) > len(node_rows) / 2:  # a model that knows nearly all nodes: the others are held
+        moved = {row: moved.get(row, np.zeros(3, complex)) for row in node_rows.values()}
     rows = sorted(moved)
     space = np.array([moved[row] for row in rows], complex).reshape(-1, 3)
     if is_row:

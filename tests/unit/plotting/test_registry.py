@@ -1,19 +1,24 @@
 """Every picture draws from the results of a run, and says so where they are missing."""
 
+import html
+import io
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.plotting.figures import FORMATS, draw_pictures, save_figure
+from frf_ipz.plotting.picture import Axis, Line, Panel, Picture
 from frf_ipz.plotting.registry import PICTURES, describe, picture_names, run_pictures
 from frf_ipz.report.page import SECTIONS
 from frf_ipz.report.section import pictures_of
 from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
+from hostile_run import hostile_folder
 from synthetic_run import Folder, synthetic_folder, synthetic_law
 
 OF_A_DIAGNOSIS = {"mismatch", "ranking", "proof"}
@@ -118,3 +123,20 @@ def test_functions_are_shown_to_those_who_look_for_them():
         "sys.exit('matplotlib' in sys.modules or not {'plot_frfs', 'plot_fit', 'draw_pictures'} <= set(names))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_names_that_look_like_formulas_or_fields_are_drawn_as_they_are():
+    run = read_contents(Results(hostile_folder()))
+    for name in picture_names(run):
+        if name != "change":
+            save_figure(draw_pictures(describe(name, run)), io.BytesIO(), file_format="svg")
+
+
+def test_a_name_that_looks_like_a_formula_is_written_as_it_is():
+    line = Line(name=r"_$\frac^$", colour=0, x=np.arange(3.0), y=np.arange(3.0))
+    picture = Picture(name="p", title="", alt="", panels=(Panel(y=Axis(title=r"$\alpha$, m"), layers=(line,)),))
+    stream = io.BytesIO()
+    save_figure(draw_pictures([picture]), stream, file_format="svg")
+    text = html.unescape(stream.getvalue().decode())
+    assert r"_$\frac^$" in text
+    assert r"$\alpha$, m" in text

@@ -55,7 +55,7 @@
     const base = {
       paper_bgcolor: paper, plot_bgcolor: paper, font: { family: "system-ui, sans-serif", size: 12.5, color: ink },
       margin: { l: 74, r: 44, t: 12, b: 46 }, modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: muted, activecolor: ink }, hovermode: "closest", dragmode: "zoom", autosize: true,
-      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11.5 }, tracegroupgap: 0 },
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11.5 }, tracegroupgap: 0, bgcolor: "rgba(0,0,0,0)" },
       hoverlabel: { bgcolor: paper, bordercolor: muted, font: { color: ink, size: 12 }, namelength: -1 },
     };
     const full = { ...base, ...layout };

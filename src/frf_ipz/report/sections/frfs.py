@@ -52,13 +52,13 @@ def build(run: RunContents) -> Section | None:
 
 def _table(frfs: FrfSet) -> Table:
     rows = []
-    for place, label in enumerate(frfs.labels):
-        coherence, variance = frfs.coherence[:, place], frfs.variance[:, place]
-        power = np.mean(np.abs(frfs.values[:, place]) ** 2)
+    for frf, label in enumerate(frfs.labels):
+        coherence, variance = frfs.coherence[:, frf], frfs.variance[:, frf]
+        power = np.mean(np.abs(frfs.values[:, frf]) ** 2)
         known = np.isfinite(variance)
         noise = np.sqrt(np.mean(variance[known]) / power) if known.any() and power > 0 else np.nan
         median = np.median(coherence[np.isfinite(coherence)]) if np.isfinite(coherence).any() else np.nan
-        averages = str(int(frfs.averages[place])) if frfs.averages[place] else "–"
+        averages = str(int(frfs.averages[frf])) if frfs.averages[frf] else "–"
         rows.append(
             [
                 str(label.output_dof),

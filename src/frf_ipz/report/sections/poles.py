@@ -55,11 +55,11 @@ def _mode_table(fit: ModalFit) -> Table:
     hertz_std, ratio_std = root_deviations(poles, root_covariances(fit)[: fit.n_modes])
     extra = [name for name in ("mpc", "quality") if name in fit.modes and len(fit.modes) == len(poles)]
     rows = []
-    for place, pole in enumerate(poles):
+    for row, pole in enumerate(poles):
         hertz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
-        quality = [_cell(fit.modes[name].iloc[place]) for name in extra]
-        cells = [with_error(hertz, hertz_std[place], 7), with_error(100 * ratio, 100 * ratio_std[place], 5)]
-        rows.append([str(place + 1), *cells, *quality])
+        quality = [_cell(fit.modes[name].iloc[row]) for name in extra]
+        cells = [with_error(hertz, hertz_std[row], 7), with_error(100 * ratio, 100 * ratio_std[row], 5)]
+        rows.append([str(row + 1), *cells, *quality])
     columns = (
         "pole",
         "frequency, Hz",
@@ -78,16 +78,16 @@ def _zero_table(fit: ModalFit) -> Table:
     hertz_std, ratio_std = root_deviations(zeros.values, root_covariances(fit)[fit.n_modes :])
     order: IntArray = np.lexsort((np.abs(zeros.values), zeros.frf))
     rows = []
-    for place in order:
-        root, known = zeros.values[place], bool(zeros.identifiable[place])
+    for row in order:
+        root, known = zeros.values[row], bool(zeros.identifiable[row])
         numbers = ["–", "–"]
         if known:
             hertz, ratio = float(natural_frequency_hz(root)), float(damping_ratio(root))
-            damping = with_error(100 * ratio, 100 * ratio_std[place], 5)
-            if zeros.kind[place] == "real":
+            damping = with_error(100 * ratio, 100 * ratio_std[row], 5)
+            if zeros.kind[row] == "real":
                 damping = f"{'left' if root.real < 0 else 'right'} half plane"
-            numbers = [with_error(hertz, hertz_std[place], 7), damping]
-        rows.append([str(fit.labels[zeros.frf[place]]), zeros.kind[place], *numbers, zeros.reason[place]])
+            numbers = [with_error(hertz, hertz_std[row], 7), damping]
+        rows.append([str(fit.labels[zeros.frf[row]]), zeros.kind[row], *numbers, zeros.reason[row]])
     columns = ("FRF (output / input)", "kind", "frequency, Hz", "damping ratio, %", "why without a number")
     marked = frozenset(np.flatnonzero(~zeros.identifiable[order]).tolist())
     return Table(caption="Zeros", columns=columns, rows=rows, marked=marked, file="zeros.parquet")

@@ -51,12 +51,12 @@ def _table(prediction: Prediction, known: dict[int, ComplexArray]) -> Table:
     rows = []
     moved = compare_frfs(prediction.nominal, prediction.values)
     low, high = prediction.magnitude_low, prediction.magnitude_high
-    for place, label in enumerate(prediction.labels):
-        good = (low[:, place] > 0) & np.isfinite(high[:, place])
-        width = 10 * np.log10(high[good, place] / low[good, place]) if good.any() else np.array([np.nan])
+    for frf, label in enumerate(prediction.labels):
+        good = (low[:, frf] > 0) & np.isfinite(high[:, frf])
+        width = 10 * np.log10(high[good, frf] / low[good, frf]) if good.any() else np.array([np.nan])
         cells = [str(label), number(float(np.median(width)), 3), number(float(width.max()), 3)]
-        cells.append(number(float(moved.median_db[place]), 3))
-        rows.append(cells + _errors(prediction, place, known.get(place)))
+        cells.append(number(float(moved.median_db[frf]), 3))
+        rows.append(cells + _errors(prediction, frf, known.get(frf)))
     columns = ["FRF (output / input)", "band ± dB, median", "band ± dB, largest", "moved by the update, dB (median)"]
     columns += (
         ["error before, dB", "error after, dB", "correlation of shape, after", "of amplitude, after"] if known else []
@@ -66,13 +66,13 @@ def _table(prediction: Prediction, known: dict[int, ComplexArray]) -> Table:
     )
 
 
-def _errors(prediction: Prediction, place: int, measured: ComplexArray | None) -> list[str]:
+def _errors(prediction: Prediction, frf: int, measured: ComplexArray | None) -> list[str]:
     if measured is None:
         return ["–"] * 4
     good = np.isfinite(measured)
     truth = measured[good, None]
     before, after = (
-        compare_frfs(truth, values[good, place : place + 1]) for values in (prediction.nominal, prediction.values)
+        compare_frfs(truth, values[good, frf : frf + 1]) for values in (prediction.nominal, prediction.values)
     )
     decibels = [number(float(figure), 3) for figure in (before.median_db[0], after.median_db[0])]
     return [*decibels, f"{after.shape[0]:.4f}", f"{after.amplitude[0]:.4f}"]
