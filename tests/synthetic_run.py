@@ -4,6 +4,7 @@ For whatever draws results. The measured FRFs are those of a true structure with
 the stages give.
 """
 
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -351,3 +352,10 @@ def synthetic_diagnosis(labels, nodes):
             expected=np.full(shape, 0.01),
         ),
     )
+
+
+def with_results(run, **changes):
+    """A run with some of its results changed, by the names that `Results` has for them."""
+    changed = copy(run)
+    vars(changed).update(changes)
+    return changed

@@ -164,8 +164,10 @@ def _key_text(part: int | str) -> str:
 
 def _is_type_tag(part: int | str) -> bool:
     """Pydantic names the branch of a union in the location, which is no key of the user's."""
-    plain = {"str", "float", "int", "bool", "constrained-str"}
-    return isinstance(part, str) and ("[" in part or part in plain or bool(CLASS_NAME.fullmatch(part)))
+    plain = {"str", "float", "int", "bool"}
+    if not isinstance(part, str):
+        return False
+    return "[" in part or part in plain or part.startswith("constrained-") or bool(CLASS_NAME.fullmatch(part))
 
 
 def _explain(error: Any, options_type: type) -> str:
@@ -175,7 +177,7 @@ def _explain(error: Any, options_type: type) -> str:
         return f"unknown key '{key}'; {did_you_mean(key, known)}"
     if error["type"] in {"missing", "missing_argument", "missing_keyword_only_argument"}:
         return f"the key '{error['loc'][-1]}' is missing"
-    message = str(error["msg"]).removeprefix("Value error, ")
+    message = str(error["msg"]).removeprefix("Value error, ").replace("Input should", "must")
     value = error.get("input")
     return f"{message[:1].lower()}{message[1:]}; given is {value!r}"
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.plotting.figures import FORMATS, draw_pictures, save_figure
 from frf_ipz.plotting.registry import describe, picture_names
-from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import open_results
 
 
@@ -29,7 +28,7 @@ def picture_list(folder: Path) -> str:
     InputError
         If there is no run in the folder.
     """
-    run = read_contents(open_results(folder))
+    run = open_results(folder)
     return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *picture_names(run)])
 
 
@@ -60,7 +59,7 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     if file_format not in FORMATS:
         raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
     path = Path(f"{name}.{file_format}") if out is None else out
-    figure = draw_pictures(describe(name, read_contents(open_results(folder))))
+    figure = draw_pictures(describe(name, open_results(folder)))
     try:
         save_figure(figure, path, file_format=file_format)
     except OSError as error:

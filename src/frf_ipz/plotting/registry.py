@@ -33,24 +33,25 @@ from frf_ipz.plotting.updating import (
     describe_targets,
 )
 from frf_ipz.prediction.reference import measured_at
+from frf_ipz.runs.picture_data import changed_parts, update_targets
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from frf_ipz.plotting.picture import Picture
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
-Describe: TypeAlias = "Callable[[RunContents], Iterable[Picture | None]]"
+Describe: TypeAlias = "Callable[[Results], Iterable[Picture | None]]"
 
 # What a run holds, by the stage that gives it.
 CONTENTS = {
     "ingest": "estimate",
     "fit": "fit",
     "pair": "pairs",
-    "update": "updated",
+    "update": "updated_model",
     "predict": "prediction",
     "diagnose": "diagnosis",
-    "levels": "levels",
+    "levels": "level_dependence",
 }
 MOST_PREDICTIONS = 8  # predicted FRFs drawn; all stand in the file
 
@@ -74,12 +75,12 @@ class _Entry:
     otherwise: str = "this run has nothing to show there"
 
 
-def picture_names(run: RunContents | None = None) -> tuple[str, ...]:
+def picture_names(run: Results | None = None) -> tuple[str, ...]:
     """Names of all pictures, or of those whose stages a run holds.
 
     Parameters
     ----------
-    run : RunContents, optional
+    run : Results, optional
         What the run holds.
 
     Returns
@@ -90,14 +91,14 @@ def picture_names(run: RunContents | None = None) -> tuple[str, ...]:
     return tuple(name for name, entry in PICTURES.items() if run is None or not _missing_stages(entry, run))
 
 
-def describe(name: str, run: RunContents) -> tuple[Picture, ...]:
+def describe(name: str, run: Results) -> tuple[Picture, ...]:
     """Describe a picture of a run.
 
     Parameters
     ----------
     name : str
         One of `picture_names`.
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -121,12 +122,12 @@ def describe(name: str, run: RunContents) -> tuple[Picture, ...]:
     return pictures
 
 
-def run_pictures(run: RunContents, *names: str) -> tuple[Picture, ...]:
+def run_pictures(run: Results, *names: str) -> tuple[Picture, ...]:
     """Describe those pictures that a run has something to show in.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     *names : str
         Some of `picture_names`.
@@ -141,7 +142,7 @@ def run_pictures(run: RunContents, *names: str) -> tuple[Picture, ...]:
     return tuple(picture for picture in drawn if picture is not None)
 
 
-def _missing_stages(entry: _Entry, run: RunContents) -> list[str]:
+def _missing_stages(entry: _Entry, run: Results) -> list[str]:
     return [stage for stage in entry.stages if getattr(run, CONTENTS[stage]) is None]
 
 
@@ -150,34 +151,36 @@ def _of(attribute: str, describe_result: Callable[[Any], Picture | None]) -> Des
     return lambda run: [describe_result(getattr(run, attribute))]
 
 
-def _frfs(run: RunContents) -> list[Picture]:
+def _frfs(run: Results) -> list[Picture]:
     fitted = None if run.fit is None else run.fit.band_hz
     return [] if run.frfs is None else [describe_frfs(run.frfs, band_hz=run.band_hz, fitted_hz=fitted)]
 
 
-def _coherence(run: RunContents) -> list[Picture]:
+def _coherence(run: Results) -> list[Picture]:
     return [select_panel(picture, 2) for picture in _frfs(run) if len(picture.panels) > 2]
 
 
-def _fit(run: RunContents) -> list[Picture]:
+def _fit(run: Results) -> list[Picture]:
     return [] if run.fit is None or run.frfs is None else [describe_fit(run.frfs, run.fit)]
 
 
-def _stabilization(run: RunContents) -> list[Picture]:
+def _stabilization(run: Results) -> list[Picture]:
     return [describe_stabilization(run.fit, run.frfs)] if run.fit is not None and len(run.fit.stabilization) else []
 
 
-def _pairs(run: RunContents) -> list[Picture]:
+def _pairs(run: Results) -> list[Picture]:
     if run.pairs is None or not run.pairs.rows:
         return []
     return [describe_pairs(run.pairs, run.labels, band_hz=run.band_hz)]
 
 
-def _flexibility(run: RunContents) -> list[Picture | None]:
-    return [] if run.updated is None else [describe_flexibility_change(run.updated, run.geometry, run.labels)]
+def _flexibility(run: Results) -> list[Picture | None]:
+    return (
+        [] if run.updated_model is None else [describe_flexibility_change(run.updated_model, run.geometry, run.labels)]
+    )
 
 
-def _predictions(run: RunContents) -> list[Picture]:
+def _predictions(run: Results) -> list[Picture]:
     if run.prediction is None:
         return []
     measured = {**measured_at(run.prediction, run.frfs), **measured_at(run.prediction, run.reference)}
@@ -185,7 +188,7 @@ def _predictions(run: RunContents) -> list[Picture]:
     return [describe_prediction(run.prediction, frf, measured.get(frf)) for frf in range(count)]
 
 
-def _structure(run: RunContents) -> list[Picture | None]:
+def _structure(run: Results) -> list[Picture | None]:
     frfs = run.frfs
     marks = StructureMarks(
         sensors=() if frfs is None else frfs.output_dofs,
@@ -193,24 +196,27 @@ def _structure(run: RunContents) -> list[Picture | None]:
         points=run.points,
         missing=finding_nodes(run.diagnosis, frfs),
         mismatch=mismatch_nodes(run.diagnosis, frfs),
-        across="Masses in a row" if run.is_lumped else "Position, m",
+        across="Masses in a row" if run.geometry is not None and run.geometry.is_schematic else "Position, m",
     )
     return [describe_structure(run.geometry, marks)]
 
 
-def _law(run: RunContents) -> list[Picture | None]:
+def _law(run: Results) -> list[Picture | None]:
     law = None if run.diagnosis is None else run.diagnosis.law_in_time
     return [] if law is None else [describe_law_force(law), describe_law_response(law)]
 
 
-def _expected_misfit(run: RunContents) -> list[Picture | None]:
+def _expected_misfit(run: Results) -> list[Picture | None]:
     return [] if run.diagnosis is None else [describe_expected_misfit(run.diagnosis, band_hz=run.band_hz)]
 
 
-def _levels(run: RunContents) -> list[Picture | None]:
-    if run.levels is None:
+def _levels(run: Results) -> list[Picture | None]:
+    if run.level_dependence is None:
         return []
-    return [describe_levels(run.levels, run.labels, band_hz=run.band_hz), describe_level_modes(run.levels)]
+    return [
+        describe_levels(run.level_dependence, run.labels, band_hz=run.band_hz),
+        describe_level_modes(run.level_dependence),
+    ]
 
 
 PICTURES: dict[str, _Entry] = {
@@ -227,17 +233,17 @@ PICTURES: dict[str, _Entry] = {
     "pairs": _Entry(("pair", "fit"), _pairs, "there was nothing to pair"),
     "targets": _Entry(
         ("update", "pair", "fit"),
-        lambda run: [describe_targets(run.targets())],
+        lambda run: [describe_targets(update_targets(run))],
         "no measured pole or zero has a counterpart in the model",
     ),
-    "convergence": _Entry(("update",), _of("updated", describe_convergence), "the update took one step"),
+    "convergence": _Entry(("update",), _of("updated_model", describe_convergence), "the update took one step"),
     "change": _Entry(
         ("update",),
-        lambda run: [describe_stiffness_change(run.parts)],
+        lambda run: [describe_stiffness_change(changed_parts(run))],
         "the update of this run has not changed named parts of the FE model",
     ),
     "flexibility": _Entry(("update",), _flexibility, "the model has no positions"),
-    "modal-change": _Entry(("update",), _of("updated", describe_modal_change)),
+    "modal-change": _Entry(("update",), _of("updated_model", describe_modal_change)),
     "prediction": _Entry(
         ("predict",), _predictions, "this run predicts no FRF: name points of interest in [predict] points"
     ),

@@ -30,7 +30,8 @@ from frf_ipz.report.sections import (
     state_space,
     updating,
 )
-from frf_ipz.runs.contents import RunContents, read_contents
+from frf_ipz.runs.picture_data import hidden_frfs
+from frf_ipz.runs.results import Results
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.runs.results import Results
 
-Build: TypeAlias = "Callable[[RunContents], Section | None]"
+Build: TypeAlias = "Callable[[Results], Section | None]"
 
 SECTIONS: tuple[Build, ...] = (
     overview.build,
@@ -57,12 +58,12 @@ SECTIONS: tuple[Build, ...] = (
 )
 
 
-def write_report(results: Results, path: Path, *, progress: Progress = silent) -> None:
+def write_report(run: Results, path: Path, *, progress: Progress = silent) -> None:
     """Put everything that a run holds on one page.
 
     Parameters
     ----------
-    results : Results
+    run : Results
         The run.
     path : Path
         File to write.
@@ -76,7 +77,6 @@ def write_report(results: Results, path: Path, *, progress: Progress = silent) -
     OSError
         If the page cannot be written.
     """
-    run = read_contents(results)
     sections = []
     for number, build in enumerate(SECTIONS):
         progress(number / len(SECTIONS), "drawing")
@@ -85,12 +85,12 @@ def write_report(results: Results, path: Path, *, progress: Progress = silent) -
     path.write_text(render_page(run, sections), encoding="utf-8", newline="\n")
 
 
-def render_page(run: RunContents, sections: Sequence[Section]) -> str:
+def render_page(run: Results, sections: Sequence[Section]) -> str:
     """Write the whole page as HTML.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     sections : sequence of Section
         What to show.
@@ -109,12 +109,12 @@ def render_page(run: RunContents, sections: Sequence[Section]) -> str:
     )
 
 
-def run_values(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
+def run_values(run: Results, sections: Sequence[Section]) -> dict[str, object]:
     """Give what ``report/run.html`` shows of a run.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     sections : sequence of Section
         What to show.
@@ -155,12 +155,12 @@ class FrfBox:
     is_visible: bool
 
 
-def frf_chooser(run: RunContents) -> dict[str, object] | None:
+def frf_chooser(run: Results) -> dict[str, object] | None:
     """Lay out a matrix of boxes, outputs by inputs: which FRFs the pictures show.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         Says which FRFs there are.
 
     Returns
@@ -176,7 +176,7 @@ def frf_chooser(run: RunContents) -> dict[str, object] | None:
             number=number,
             label=f"{label}, {label.quantity.value}",
             colour=colour_name(number),
-            is_visible=number not in run.hidden_frfs,
+            is_visible=number not in hidden_frfs(run),
         )
         boxes.setdefault((label.output_dof, label.input_dof), []).append(box)
     inputs = dict.fromkeys(label.input_dof for label in run.labels)
@@ -186,6 +186,6 @@ def frf_chooser(run: RunContents) -> dict[str, object] | None:
             {"output": str(output), "cells": [boxes.get((output, dof), []) for dof in inputs]}
             for output in dict.fromkeys(label.output_dof for label in run.labels)
         ],
-        "n_visible": len(run.labels) - len(run.hidden_frfs),
+        "n_visible": len(run.labels) - len(hidden_frfs(run)),
         "n_frfs": len(run.labels),
     }

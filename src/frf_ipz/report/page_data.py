@@ -14,23 +14,24 @@ import numpy as np
 from frf_ipz.plotting.picture import frequency_axis
 from frf_ipz.report.plotly_drawing import draw_picture
 from frf_ipz.report.section import pictures_of
+from frf_ipz.runs.picture_data import hidden_frfs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.report.section import Section
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 LEAST_PACKED = 24  # shorter arrays are written as numbers
 DIGITS = 8  # of numbers that are written: single precision, as the packed ones
 
 
-def page_data(run: RunContents, sections: Sequence[Section]) -> dict[str, object]:
+def page_data(run: Results, sections: Sequence[Section]) -> dict[str, object]:
     """Give what the page's script draws from.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     sections : sequence of Section
         With the pictures.
@@ -45,7 +46,7 @@ def page_data(run: RunContents, sections: Sequence[Section]) -> dict[str, object
     frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
     return {
         "pictures": pictures,
-        "hiddenFrfs": run.hidden_frfs,
+        "hiddenFrfs": hidden_frfs(run),
         "frequencyScale": frequency_axis(*run.band_hz).scale,
         "lowestHz": min([1.0, *frequencies]),
         "arrays": packer.arrays,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.plotting.picture import Picture
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 MOST_ROWS = 400  # of a table on the page; all rows stand in the Parquet file beside it
 
@@ -175,13 +175,13 @@ class Section:
 
 
 def run_figures(
-    run: RunContents, *names: str, hints: Mapping[str, str] | None = None, tables: Mapping[str, Table] | None = None
+    run: Results, *names: str, hints: Mapping[str, str] | None = None, tables: Mapping[str, Table] | None = None
 ) -> list[Figure]:
     """Show those pictures that a run has something to show in.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     *names : str
         Names of pictures, as `plotting.registry` has them.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from frf_ipz.export.state_space import to_control
 from frf_ipz.runs.folder import read_run
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis
+    from frf_ipz.dofs import Dof
     from frf_ipz.export.state_space import StateSpaceModel
-    from frf_ipz.frf import FrfSet
+    from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
@@ -193,6 +194,43 @@ class Results:
     def level_dependence(self) -> LevelDependence | None:
         """Modes and FRFs at weak beside strong levels of excitation."""
         return self._load("levels")  # type: ignore[no-any-return]
+
+    @property
+    def labels(self) -> tuple[FrfLabel, ...]:
+        """What each measured FRF connects."""
+        return () if self.frfs is None else self.frfs.labels
+
+    @property
+    def points(self) -> tuple[Dof, ...]:
+        """The points of interest."""
+        return () if self.prediction is None else tuple(dict.fromkeys(x.output_dof for x in self.prediction.labels))
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The band of the fit; without a fit that of the measurement, and (0, 1) without either."""
+        if self.fit is not None:
+            return self.fit.band_hz
+        if self.frfs is not None:
+            return float(self.frfs.frequency_hz[0]), float(self.frfs.frequency_hz[-1])
+        return 0.0, 1.0
+
+    def load(self) -> Self:
+        """Read all results now; else each is read when it is first used.
+
+        Returns
+        -------
+        Results
+            The same object.
+
+        Raises
+        ------
+        FileFormatError
+            If a file is damaged.
+        """
+        for name, attribute in vars(type(self)).items():
+            if isinstance(attribute, cached_property) and name != "state_space":
+                getattr(self, name)
+        return self
 
     def _load(self, stage: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
         return self._store.load(stage) if stage in self.stages else None

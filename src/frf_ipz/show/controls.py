@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 USES = {"checks": "as the checks say", "keep": "keep", "drop": "drop"}
 
@@ -119,12 +119,12 @@ def pole_forms(fit: ModalFit) -> Form:
     return Form(template="show/pole_forms.html", data={"modes": modes})
 
 
-def record_list(run: RunContents, choices: PipelineFile) -> Form | None:
+def record_list(run: Results, choices: PipelineFile) -> Form | None:
     """Let the user keep or drop each record.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     choices : PipelineFile
         What the user has chosen.
@@ -150,12 +150,12 @@ def _use(name: str, choices: PipelineFile) -> str:
     return "keep" if is_named(name, choices.ingest.keep) else "checks"
 
 
-def dof_forms(run: RunContents, choices: PipelineFile, retained: Sequence[Dof]) -> Form:
+def dof_forms(run: Results, choices: PipelineFile, retained: Sequence[Dof]) -> Form:
     """Let the user choose points of interest, leave sensors out, and choose what the model is reduced to.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     choices : PipelineFile
         What the user has chosen.
@@ -177,12 +177,12 @@ def dof_forms(run: RunContents, choices: PipelineFile, retained: Sequence[Dof]) 
     )
 
 
-def shape_form(run: RunContents) -> Form:
+def shape_form(run: Results) -> Form:
     """Let the user choose which shape of the structure is animated.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.plotting.picture import Picture
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
     from frf_ipz.show.workbench import Workbench
 
 SHOW = "frf_ipz.show"
@@ -98,12 +98,12 @@ def _choices_of(bench: Workbench) -> Choices:
     )
 
 
-def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Section]:
+def page_sections(run: Results, choices: PipelineFile | None) -> list[Section]:
     """Give the report's sections, and beside their pictures what the user can change.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     choices : PipelineFile, optional
         What the user has chosen; None where nothing can be changed.
@@ -123,7 +123,7 @@ def page_sections(run: RunContents, choices: PipelineFile | None) -> list[Sectio
     return sections
 
 
-def _with_controls(section: Section, run: RunContents, choices: PipelineFile) -> Section:
+def _with_controls(section: Section, run: Results, choices: PipelineFile) -> Section:
     blocks = list(section.blocks)
     if section.anchor == "stabilization" and run.fit is not None:
         fit = run.fit
@@ -137,9 +137,9 @@ def _with_controls(section: Section, run: RunContents, choices: PipelineFile) ->
     return replace(section, blocks=tuple(blocks))
 
 
-def _pickable(section: Section, run: RunContents, choices: PipelineFile) -> Section:
+def _pickable(section: Section, run: Results, choices: PipelineFile) -> Section:
     """Let the user pick DOFs on the drawing of the structure."""
-    retained, geometry = () if run.reduced is None else run.reduced.dofs, run.geometry
+    retained, geometry = () if run.reduced_model is None else run.reduced_model.dofs, run.geometry
     blocks = list(section.blocks)
     if geometry is not None:
         blocks = _redrawn(blocks, STRUCTURE, lambda picture: with_retained(picture, geometry, retained))
@@ -156,7 +156,7 @@ def _redrawn(blocks: Sequence[Block], name: str, change: Callable[[Picture], Pic
     ]
 
 
-def _shapes(run: RunContents) -> Section:
+def _shapes(run: Results) -> Section:
     lead = "How the structure moves: what was measured beside the model before and after updating."
     return Section(anchor="shapes", title="Shapes", lead=lead, blocks=(shape_form(run),))
 

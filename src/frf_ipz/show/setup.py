@@ -8,7 +8,8 @@ from frf_ipz.errors import InputError
 from frf_ipz.plotting.structure import StructureMarks, describe_structure
 from frf_ipz.plotting.wording import counted, listed
 from frf_ipz.report.section import Block, Figure, Section, Table
-from frf_ipz.runs.contents import RunContents
+from frf_ipz.runs.memory import RunMemory
+from frf_ipz.runs.results import Results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,9 +17,10 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.pipeline.inputs import PipelineInputs
+    from frf_ipz.structure import Geometry
 
 
-def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[RunContents, Section]:
+def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[Results, Section]:
     """Read a pipeline that has not been run yet.
 
     Parameters
@@ -30,7 +32,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
 
     Returns
     -------
-    run : RunContents
+    run : Results
         The name, and the geometry where there is a model.
     section : Section
         What was read; or what is wrong with it.
@@ -41,11 +43,8 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     except InputError as error:
         notes = (str(error), "Correct the file, then load this page again.")
         lead = "This pipeline cannot be run as it stands."
-        empty = RunContents(manifest={"name": pipeline.stem})
-        return empty, Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
-    run = RunContents(
-        manifest={"name": inputs.name}, geometry=None if inputs.fe_model is None else inputs.fe_model.geometry
-    )
+        return _results_of(pipeline.stem), Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
+    run = _results_of(inputs.name, None if inputs.fe_model is None else inputs.fe_model.geometry)
     marks = StructureMarks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
     drawing = describe_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."
@@ -53,6 +52,11 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
         [_what_was_read(inputs)] if drawing is None else [Figure(picture=drawing), _what_was_read(inputs)]
     )
     return run, Section(anchor=anchor, title=title, lead=lead, blocks=tuple(blocks))
+
+
+def _results_of(name: str, geometry: Geometry | None = None) -> Results:
+    results = {} if geometry is None else {"model": geometry}
+    return Results(RunMemory(manifest={"name": name, "stages": {stage: {} for stage in results}}, results=results))
 
 
 def _what_was_read(inputs: PipelineInputs) -> Table:

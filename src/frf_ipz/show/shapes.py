@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
     from frf_ipz.structure import Geometry, ReducedModel
 
 FLAT = 1e-6  # of the largest extent: thinner than this is flat
@@ -71,12 +71,12 @@ class Shape:
     motions: tuple[Motion, ...]
 
 
-def mode_shape(run: RunContents, number: int) -> Shape:
+def mode_shape(run: Results, number: int) -> Shape:
     """Give a mode, measured and of both models.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     number : int
         Which mode of the fit, from 0.
@@ -99,7 +99,7 @@ def mode_shape(run: RunContents, number: int) -> Shape:
     measured = _largest_row(fit.labels, fit.model.residues[number] / pole**powers)
     frequency = float(natural_frequency_hz(fit.model.poles[number : number + 1])[0])
     models = _models(run, number)
-    title = "measured" if models or run.updated is None else "measured; the model has no counterpart of this mode"
+    title = "measured" if models or run.updated_model is None else "measured; the model has no counterpart of this mode"
     motions = [_scaled(Motion(name="measured", title=title, dofs=tuple(measured), values=_values(measured)))]
     for name, (model, target) in models.items():
         root, vector = _closest_mode(model, target)
@@ -108,12 +108,12 @@ def mode_shape(run: RunContents, number: int) -> Shape:
     return Shape(title=f"Mode {number + 1}, {frequency:.5g} Hz", motions=tuple(motions))
 
 
-def operating_shape(run: RunContents, hertz: float, input_dof: str) -> Shape:
+def operating_shape(run: Results, hertz: float, input_dof: str) -> Shape:
     """Give the motion at a frequency for a force of 1 N at an excited DOF, measured and of both models.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     hertz : float
         Hz; the nearest measured line is taken.
@@ -144,7 +144,9 @@ def operating_shape(run: RunContents, hertz: float, input_dof: str) -> Shape:
         for label, value in zip(labels, values, strict=True)
     }
     motions = [Motion(name="measured", title="measured", dofs=tuple(moved), values=_values(moved))]
-    models = {} if run.updated is None else {"nominal": run.updated.nominal, "updated": run.updated.model}
+    models = (
+        {} if run.updated_model is None else {"nominal": run.updated_model.nominal, "updated": run.updated_model.model}
+    )
     for name, model in models.items():
         dynamic = s**2 * model.mass + s * model.damping + model.stiffness
         motion = model.expansion @ np.linalg.solve(dynamic, sign * model.row(labels[0].input_dof.unsigned))
@@ -177,9 +179,9 @@ def _scaled(motion: Motion) -> Motion:
     return Motion(name=motion.name, title=motion.title, dofs=motion.dofs, values=real / (scale or 1.0))
 
 
-def _models(run: RunContents, number: int) -> dict[str, tuple[ReducedModel, complex]]:
+def _models(run: Results, number: int) -> dict[str, tuple[ReducedModel, complex]]:
     """Give the models, and which of their poles the measured one was paired with."""
-    updated, pairs = run.updated, run.pairs
+    updated, pairs = run.updated_model, run.pairs
     if updated is None or pairs is None:
         return {}
     for target, row in enumerate(pairs.targets):

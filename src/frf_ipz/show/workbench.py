@@ -6,7 +6,6 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
-from frf_ipz.runs.contents import RunContents, read_contents
 from frf_ipz.runs.folder import MANIFEST, read_manifest
 from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
@@ -73,7 +72,7 @@ class Workbench:
         self._changing = Lock()
         self._before: str | None = None
         self._written: str | None = None
-        self._read: tuple[str, RunContents] | None = None
+        self._read: tuple[str, Results] | None = None
         self._worker = Worker(self._work)
 
     @property
@@ -94,12 +93,12 @@ class Workbench:
         """What ``run.json`` says; empty before the first run."""
         return read_manifest(self.folder)
 
-    def contents(self) -> RunContents:
+    def contents(self) -> Results:
         """Read what the folder holds, once until it holds something else.
 
         Returns
         -------
-        RunContents
+        Results
             Results of all stages.
 
         Raises
@@ -109,7 +108,7 @@ class Workbench:
         """
         stamp = self.stamp
         if self._read is None or self._read[0] != stamp:
-            self._read = stamp, read_contents(open_results(self.folder))
+            self._read = stamp, open_results(self.folder).load()
         return self._read[1]
 
     def text(self) -> str:

@@ -13,17 +13,17 @@ from frf_ipz.report.plotly_drawing import draw_picture
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 DIGITS = 8  # of a number: neighbouring lines of a long record differ in the sixth
 
 
-def zoomed_traces(run: RunContents, range_hz: tuple[float, float], selected: Sequence[int]) -> list[dict[str, Any]]:
+def zoomed_traces(run: Results, range_hz: tuple[float, float], selected: Sequence[int]) -> list[dict[str, Any]]:
     """Draw some FRFs over a frequency range, as the report draws all of them over everything.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
     range_hz : pair of float
         From, to, Hz; a line on each side of it is drawn too.

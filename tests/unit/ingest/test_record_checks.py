@@ -219,8 +219,8 @@ def test_a_file_that_cannot_be_read_may_be_dropped(tmp_path):
         ({"drop": ("p7_01.csv#2",)}, "drop: there is no record or file 'p7_01.csv#2'"),
         ({"keep": ("p7_01.csv",), "drop": ("p7_01.csv",)}, "named by both keep and drop"),
         ({"drop": ("p7_01.csv", "p7_02.csv", "p7_03.csv")}, "drop leaves no record at 7:\\+z"),
-        ({"exponential_window_s": -1.0}, "exponential_window_s is -1"),
-        ({"force_window_s": -1.0}, "force_window_s is -1"),
+        ({"exponential_window_s": -1.0}, "exponential_window_s: must be .* 0; given is -1"),
+        ({"force_window_s": -1.0}, "force_window_s: must be .* 0; given is -1"),
     ],
 )
 def test_choices_that_make_no_sense_are_refused(tmp_path, options, says):

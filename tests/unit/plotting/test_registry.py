@@ -16,7 +16,6 @@ from frf_ipz.plotting.picture import Axis, Line, Panel, Picture
 from frf_ipz.plotting.registry import PICTURES, describe, picture_names, run_pictures
 from frf_ipz.report.page import SECTIONS
 from frf_ipz.report.section import pictures_of
-from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from hostile_run import hostile_folder
 from synthetic_run import Folder, synthetic_folder, synthetic_law
@@ -26,7 +25,7 @@ STARTS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
 
 
 def draw(name, folder):
-    return draw_pictures(describe(name, read_contents(Results(folder))))
+    return draw_pictures(describe(name, Results(folder)))
 
 
 @pytest.fixture(scope="module")
@@ -86,13 +85,13 @@ def test_the_force_of_a_law_is_drawn_where_no_record_was_simulated(folder):
 
 def test_names_are_in_the_order_of_the_chain_and_those_of_a_run_are_what_it_holds():
     names = picture_names()
-    held = picture_names(read_contents(Results(synthetic_folder())))
+    held = picture_names(Results(synthetic_folder()))
     assert set(names) - set(held) == {*OF_A_DIAGNOSIS, "law", "expected-misfit", "data-checks", "levels"}
     assert names.index("frfs") < names.index("poles") < names.index("pairs") < names.index("prediction")
 
 
 def test_every_picture_of_the_report_has_a_name_on_the_command_line(folder):
-    run = read_contents(Results(folder))
+    run = Results(folder)
     sections = [build(run) for build in SECTIONS]
     shown = [picture.name for picture in pictures_of([section for section in sections if section is not None])]
     assert set(shown) - {"flexibility"} == {
@@ -126,7 +125,7 @@ def test_functions_are_shown_to_those_who_look_for_them():
 
 
 def test_names_that_look_like_formulas_or_fields_are_drawn_as_they_are():
-    run = read_contents(Results(hostile_folder()))
+    run = Results(hostile_folder())
     for name in picture_names(run):
         if name != "change":
             save_figure(draw_pictures(describe(name, run)), io.BytesIO(), file_format="svg")

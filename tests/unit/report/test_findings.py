@@ -11,15 +11,14 @@ from frf_ipz.report.findings import card_texts, typeset, verdict_of
 from frf_ipz.report.section import Figure, Table
 from frf_ipz.report.sections.diagnosis import build
 from frf_ipz.report.sections.overview import build as overview
-from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.runs.summary import diagnosis_lines
-from synthetic_run import synthetic_folder
+from synthetic_run import synthetic_folder, with_results
 
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(Results(synthetic_folder(diagnosed=True)))
+    return Results(synthetic_folder(diagnosed=True))
 
 
 def figure(run, name):
@@ -66,9 +65,9 @@ def test_the_location_of_an_unexplained_mismatch_is_stated_and_marked(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained", findings=(), mismatch_location={"nodes": [4]})
     sentence = "An unknown force at node 4 would explain most of the mismatch."
     assert verdict_of(diagnosis)[1] == sentence
-    assert sentence in build(replace(run, diagnosis=diagnosis)).notes
+    assert sentence in build(with_results(run, diagnosis=diagnosis)).notes
     assert list(mismatch_nodes(diagnosis, run.frfs)) == [4]
-    blocks = overview(replace(run, diagnosis=diagnosis)).blocks
+    blocks = overview(with_results(run, diagnosis=diagnosis)).blocks
     drawn = next(block.picture for block in blocks if isinstance(block, Figure))
     (ring,) = [layer for layer in drawn.layers if layer.name == "location of the mismatch"]
     assert "(node 4)" in drawn.alt
@@ -98,7 +97,7 @@ def test_the_map_holds_misfits_before_and_after(run):
 def test_models_that_hold_no_force_law_are_not_said_to_hold_it(run):
     linear = figure(run, "mismatch").picture
     assert "as it is and with findings" in linear.alt
-    law = figure(replace(run, diagnosis=replace(run.diagnosis, linearised_law="a spring")), "mismatch").picture
+    law = figure(with_results(run, diagnosis=replace(run.diagnosis, linearised_law="a spring")), "mismatch").picture
     assert len(linear.layers) == 2
     assert len(law.layers) == 1
     assert "the force law explains" in law.note
@@ -108,7 +107,7 @@ def test_models_that_hold_no_force_law_are_not_said_to_hold_it(run):
 def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
     worse = replace(run.diagnosis.alternatives[0], log_evidence_gain=-5e7)
     diagnosis = replace(run.diagnosis, alternatives=(worse,))
-    (bars,) = figure(replace(run, diagnosis=diagnosis), "ranking").picture.layers
+    (bars,) = figure(with_results(run, diagnosis=diagnosis), "ranking").picture.layers
     assert bars.texts[-1] == "worse than without"
     assert min(bars.sizes) >= 0
     assert bars.texts[0].startswith("p = ")
@@ -116,7 +115,7 @@ def test_an_explanation_that_gains_nothing_has_no_probability_on_its_bar(run):
 
 def test_numbers_of_a_few_digits_are_written_out(run):
     diagnosis = replace(run.diagnosis, warnings=("Blows differ, 3.28e+03 times more than noise.",))
-    assert "Blows differ, 3280 times more than noise." in build(replace(run, diagnosis=diagnosis)).notes
+    assert "Blows differ, 3280 times more than noise." in build(with_results(run, diagnosis=diagnosis)).notes
     assert typeset("658.1 N/m (+- 1.2e+02) and 4.2e+09 N/m") == "658.1 N/m (± 120) and 4.2e+09 N/m"
 
 

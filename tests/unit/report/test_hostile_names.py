@@ -10,7 +10,6 @@ from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import run_values, write_report
-from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.page import SHOW, page_sections
@@ -51,7 +50,7 @@ def report(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def workbench():
-    run = read_contents(Results(hostile_folder()))
+    run = Results(hostile_folder())
     file = PipelineFile(
         pipeline=PipelineSection(name=HOSTILE, test=HOSTILE),
         ingest=IngestOptions(keep=(HOSTILE,), drop=(HOSTILE,), hide=(HOSTILE,)),

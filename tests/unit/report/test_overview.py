@@ -9,14 +9,14 @@ from frf_ipz.pairing.pairs import Verdict
 from frf_ipz.plotting.wording import number
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.sections.overview import build, verdict
-from frf_ipz.runs.contents import read_contents
+from frf_ipz.runs.picture_data import update_targets
 from frf_ipz.runs.results import Results
-from synthetic_run import synthetic_folder
+from synthetic_run import synthetic_folder, with_results
 
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(Results(synthetic_folder()))
+    return Results(synthetic_folder())
 
 
 def card(run, title):
@@ -31,11 +31,11 @@ def test_the_error_at_the_point_of_interest_is_that_against_the_frf_kept_aside(r
 
 
 def test_the_worst_target_is_the_largest_error(run):
-    errors = [abs(row.after) for row in run.targets()]
+    errors = [abs(row.after) for row in update_targets(run)]
     measured = [pair.measured_value for pair in run.pairs.targets]
-    by_hand = np.abs(np.abs(run.updated.after) / np.abs(measured) - 1)
+    by_hand = np.abs(np.abs(run.updated_model.after) / np.abs(measured) - 1)
     np.testing.assert_allclose(errors, by_hand, rtol=1e-9, atol=1e-15)  # differences of nearly equal numbers
-    worst = run.targets()[int(np.argmax(by_hand))]
+    worst = update_targets(run)[int(np.argmax(by_hand))]
     target = card(run, "Worst target after updating")
     assert target.figure == f"{100 * by_hand.max():.2g} %"
     assert target.meaning.startswith(worst.name)
@@ -52,14 +52,14 @@ def test_roots_that_the_model_lacks_are_counted(run):
         replace(row, verdict=Verdict.MISSING_IN_MODEL, computed=-1) if place < 2 else row
         for place, row in enumerate(run.pairs.rows)
     )
-    figure = card(replace(run, pairs=replace(run.pairs, rows=rows)), "Missing in the model").figure
+    figure = card(with_results(run, pairs=replace(run.pairs, rows=rows)), "Missing in the model").figure
     assert figure == "2 poles and zeros"
 
 
 def test_unknown_gains_are_fitted_before_errors_are_stated(run):
     frfs = replace(run.estimate.frfs, values=3.0 * run.estimate.frfs.values, unknown_scale="per_channel")
-    scaled = replace(run, estimate=replace(run.estimate, frfs=frfs), prediction=None)
-    exact = replace(run, prediction=None)
+    scaled = with_results(run, estimate=replace(run.estimate, frfs=frfs), prediction=None)
+    exact = with_results(run, prediction=None)
     figure, refit = (
         card(contents, "Error at the measured points").figure.split("→")[1].split(" dB")[0]
         for contents in (exact, scaled)
@@ -71,8 +71,8 @@ def test_unknown_gains_are_fitted_before_errors_are_stated(run):
 def test_a_worst_target_that_came_no_closer_stands_apart_from_the_others(run):
     assert "right within" in verdict(run)[0]
     assert "worst" not in verdict(run)[0]
-    worse = run.updated.after.copy()
+    worse = run.updated_model.after.copy()
     worse[0] *= 1.5
-    sentence = verdict(replace(run, updated=replace(run.updated, after=worse)))[0]
+    sentence = verdict(with_results(run, updated_model=replace(run.updated_model, after=worse)))[0]
     assert "in the median (before: " in sentence
     assert ", but the worst 50 %" in sentence

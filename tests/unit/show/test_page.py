@@ -9,7 +9,6 @@ from frf_ipz.pipeline.config import PipelineFile, PipelineSection
 from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.section import pictures_of
-from frf_ipz.runs.contents import read_contents
 from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.marks import with_choices, with_retained
@@ -33,7 +32,7 @@ CHOICES = PipelineFile(
 
 @pytest.fixture(scope="module")
 def run():
-    return read_contents(Results(synthetic_folder()))
+    return Results(synthetic_folder())
 
 
 def html_of(run, choices=CHOICES):
@@ -89,7 +88,7 @@ def test_the_list_of_records_shows_what_was_chosen_and_what_is_used(run):
     ids=["no model", "no fit", "nothing"],
 )
 def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
-    html = html_of(read_contents(Results(synthetic_folder(without=without))))
+    html = html_of(Results(synthetic_folder(without=without)))
     forms = {"point-form", "reduce-form", "pole-form", "modes", "shape-form", "record-choices"}
     assert {form for form in forms if f'id="{form}"' not in html} == missing
 
@@ -118,11 +117,11 @@ def test_without_a_pipeline_file_there_is_the_report_alone(run):
 
 def test_nodes_that_the_model_is_reduced_to_are_ringed(run):
     drawing = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "structure")
-    ringed = with_retained(drawing, run.geometry, run.reduced.dofs)
+    ringed = with_retained(drawing, run.geometry, run.reduced_model.dofs)
     rings = ringed.layers[-1]
     nodes = next(layer for layer in drawing.layers if layer.name == "nodes")
-    for dof, x in zip(run.reduced.dofs, rings.x, strict=True):
+    for dof, x in zip(run.reduced_model.dofs, rings.x, strict=True):
         assert x == nodes.x[nodes.texts.index(f"node {dof.node}")]
-    assert list(rings.texts) == [dof.name for dof in run.reduced.dofs]
+    assert list(rings.texts) == [dof.name for dof in run.reduced_model.dofs]
     names = [layer.name for layer in pictures_of(page_sections(run, CHOICES))[0].layers]
     assert "retained in the reduction" in names

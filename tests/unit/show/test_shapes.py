@@ -52,7 +52,7 @@ def measured_run(model, nominal):
         for k, value in enumerate(nominal_roots.values)
     ]
     updated = SimpleNamespace(model=model, nominal=nominal, after=roots.values)
-    return SimpleNamespace(fit=fit, frfs=frfs, updated=updated, pairs=SimpleNamespace(targets=targets))
+    return SimpleNamespace(fit=fit, frfs=frfs, updated_model=updated, pairs=SimpleNamespace(targets=targets))
 
 
 @pytest.fixture
@@ -85,11 +85,11 @@ def test_a_mode_of_the_updated_model_is_the_measured_one(run, number):
     assert_allclose(at(updated, measured.dofs), measured.values, atol=1e-7 * np.abs(measured.values).max(), rtol=0)
     assert "MAC 1.000 at 3 DOFs" in updated.title
     assert np.abs(measured.values.real).max() == pytest.approx(1.0, rel=1e-3)
-    assert f"{abs(poles_of(run.updated.nominal).values[number]) / 2 / np.pi:.5g} Hz" in nominal.title
+    assert f"{abs(poles_of(run.updated_model.nominal).values[number]) / 2 / np.pi:.5g} Hz" in nominal.title
 
 
 def test_a_run_without_a_model_has_the_measured_shape_alone(run):
-    run.updated = run.pairs = None
+    run.updated_model = run.pairs = None
     assert [motion.name for motion in mode_shape(run, 0).motions] == ["measured"]
     assert [motion.name for motion in operating_shape(run, 20.0, "4:+x").motions] == ["measured"]
 

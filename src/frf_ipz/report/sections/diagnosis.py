@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from frf_ipz.diagnosis.result import Diagnosis, Finding
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 
 WHOLE_HINT = "Double-click to see the whole record."
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the diagnosis.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -45,8 +45,8 @@ def build(run: RunContents) -> Section | None:
         return None
     is_explained = bool(diagnosis.findings or diagnosis.alternatives)
     tables = {"proof": _proof_table(diagnosis), "data-checks": _check_table(diagnosis)}
-    if run.levels is not None and len(run.levels.modes):
-        tables["level-modes"] = _level_table(run.levels.modes)
+    if run.level_dependence is not None and len(run.level_dependence.modes):
+        tables["level-modes"] = _level_table(run.level_dependence.modes)
     blocks: tuple[Block, ...] = (
         *run_figures(run, "mismatch", "ranking"),
         *([_finding_table(diagnosis)] if is_explained else []),

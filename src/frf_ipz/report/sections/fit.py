@@ -12,17 +12,17 @@ from frf_ipz.report.section import Section, Table, run_figures
 if TYPE_CHECKING:
     import pandas as pd
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 LARGE = 2.0  # misfit over noise from which a row of the table is marked
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the fit.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

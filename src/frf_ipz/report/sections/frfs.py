@@ -11,17 +11,17 @@ from frf_ipz.report.section import Section, Table, run_figures
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 ZOOM_HINT = "All pictures over frequency zoom together; 'FRFs' at the top chooses what they show."
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the measured FRFs.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

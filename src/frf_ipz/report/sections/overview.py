@@ -12,23 +12,24 @@ from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.findings import card_texts, verdict_of
 from frf_ipz.report.section import Card, Headline, Section, run_figures
+from frf_ipz.runs.picture_data import fitted_lines, model_values, update_targets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
     from frf_ipz.updating.targets import Target
 
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
 
-def build(run: RunContents) -> Section:
+def build(run: Results) -> Section:
     """Give the first screen.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -50,12 +51,12 @@ def build(run: RunContents) -> Section:
     )
 
 
-def verdict(run: RunContents) -> tuple[str, str]:
+def verdict(run: Results) -> tuple[str, str]:
     """Sum up the run.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -64,7 +65,7 @@ def verdict(run: RunContents) -> tuple[str, str]:
         The verdict in a sentence, and what there is to add.
     """
     parts = list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
-    if run.updated is not None and run.pairs is not None:
+    if run.updated_model is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
         low, high = run.fit.band_hz
@@ -77,8 +78,8 @@ def verdict(run: RunContents) -> tuple[str, str]:
     return sentence, " ".join(filter(None, additions))
 
 
-def _of_update(run: RunContents) -> str:
-    rows = run.targets()
+def _of_update(run: Results) -> str:
+    rows = update_targets(run)
     if not rows:
         return "No measured pole or zero has a counterpart in the model, so the model is left as it was."
     kinds = {kind: sum(row.kind == kind for row in rows) for kind in ("pole", "zero")}
@@ -100,16 +101,16 @@ def _errors(rows: Sequence[Target]) -> str:
     return f"{middle} (before: {percent(np.median(before), 2)}), but the worst {percent(after.max(), 2)}"
 
 
-def _cards(run: RunContents) -> list[Card]:
-    if run.updated is None:
+def _cards(run: Results) -> list[Card]:
+    if run.updated_model is None:
         return _cards_without_model(run)
     return [_point_card(run), _target_card(run), _missing_card(run)]
 
 
-def _cards_without_model(run: RunContents) -> list[Card]:
+def _cards_without_model(run: Results) -> list[Card]:
     cards = []
     if run.frfs is not None:
-        coherence = run.frfs.coherence[run.used_lines()]
+        coherence = run.frfs.coherence[fitted_lines(run)]
         known = coherence[np.isfinite(coherence)]
         figure = number(float(np.median(known)), 5) if known.size else "unknown"
         cards.append(Card("Coherence", figure, "median over the band; 1 is perfect"))
@@ -122,7 +123,7 @@ def _cards_without_model(run: RunContents) -> list[Card]:
     return cards
 
 
-def _point_card(run: RunContents) -> Card:
+def _point_card(run: Results) -> Card:
     prediction = run.prediction
     known = {}
     if prediction is not None:
@@ -141,14 +142,14 @@ def _point_card(run: RunContents) -> Card:
     return Card("Error at the point of interest", figure, meaning)
 
 
-def _measured_card(run: RunContents) -> Card:
-    updated, frfs = run.updated, run.frfs
+def _measured_card(run: Results) -> Card:
+    updated, frfs = run.updated_model, run.frfs
     if updated is None or frfs is None:
         return Card("Error at measured points", "unknown", "no FRF was measured")
-    measured = frfs.values[run.used_lines()]
+    measured = frfs.values[fitted_lines(run)]
     decibels, errors = [], []
     for model in (updated.nominal, updated.model):
-        values = run.model_values(model)
+        values = model_values(run, model)
         if frfs.unknown_scale != "none":
             values = values * _gains(values, measured)
         decibels.append(number(float(np.median(compare_frfs(measured, values).median_db)), 2))
@@ -168,8 +169,8 @@ def _gains(values: ComplexArray, measured: ComplexArray) -> FloatArray:
     return np.asarray(sign * np.exp(ratio))
 
 
-def _target_card(run: RunContents) -> Card:
-    rows = run.targets()
+def _target_card(run: Results) -> Card:
+    rows = update_targets(run)
     if not rows:
         return Card("Worst target", "none", "no measured pole or zero has a counterpart in the model")
     worst = max(rows, key=lambda row: abs(row.after))
@@ -177,7 +178,7 @@ def _target_card(run: RunContents) -> Card:
     return Card("Worst target after updating", small_percent(abs(worst.after)), meaning)
 
 
-def _missing_card(run: RunContents) -> Card:
+def _missing_card(run: Results) -> Card:
     if run.diagnosis is not None:
         figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
@@ -191,7 +192,7 @@ def _missing_card(run: RunContents) -> Card:
     return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run")
 
 
-def _half_width_db(run: RunContents) -> float:
+def _half_width_db(run: Results) -> float:
     if run.prediction is None:
         return float("nan")
     low, high = run.prediction.magnitude_low, run.prediction.magnitude_high

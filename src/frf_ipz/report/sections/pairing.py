@@ -15,15 +15,15 @@ from frf_ipz.report.section import Section, Table, run_figures
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the pairing.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -46,7 +46,7 @@ def build(run: RunContents) -> Section | None:
     )
 
 
-def _table(run: RunContents, rows: Sequence[Pair]) -> Table:
+def _table(run: Results, rows: Sequence[Pair]) -> Table:
     cells = []
     for row in rows:
         measured, computed = _hertz(row.measured_value), _hertz(row.computed_value)

@@ -14,15 +14,15 @@ from frf_ipz.report.section import Block, Section, Table, run_figures
 
 if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on poles and zeros.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

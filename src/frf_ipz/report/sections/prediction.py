@@ -14,15 +14,15 @@ from frf_ipz.report.section import Section, Table, run_figures
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the points of interest.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

@@ -9,17 +9,17 @@ from frf_ipz.plotting.wording import number
 from frf_ipz.report.section import Listing, Section, Table
 
 if TYPE_CHECKING:
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 SHOWN_DIGITS = 16  # of a digest; all stand in run.json
 
 
-def build(run: RunContents) -> Section:
+def build(run: Results) -> Section:
     """Give the section on provenance.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -55,7 +55,7 @@ def build(run: RunContents) -> Section:
     return Section(anchor="provenance", title="Provenance", lead=lead, blocks=blocks)
 
 
-def _stages(run: RunContents) -> list[list[str]]:
+def _stages(run: Results) -> list[list[str]]:
     return [
         [
             name,

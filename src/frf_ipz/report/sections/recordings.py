@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 LEGEND_HINT = "Click a name in the legend to hide or show a record. Drag to zoom."
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on records and their quality.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

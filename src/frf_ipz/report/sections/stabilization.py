@@ -10,15 +10,15 @@ from frf_ipz.report.section import Block, Section, Table, run_figures
 if TYPE_CHECKING:
     import pandas as pd
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the stabilisation diagram.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns

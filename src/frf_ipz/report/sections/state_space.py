@@ -12,18 +12,18 @@ from frf_ipz.report.section import Section, Table
 
 if TYPE_CHECKING:
     from frf_ipz.export.state_space import StateSpaceModel
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
 
 MOST_POLES = 40
 AT_REST = 1e-6  # of the highest frequency: a double pole at 0 is found to about the root of machine precision
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the state space.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -31,7 +31,7 @@ def build(run: RunContents) -> Section | None:
     Section or None
         None where nothing was exported.
     """
-    model = run.state_space
+    model = run.state_space_arrays
     if model is None:
         return None
     time = f"sampled at {number(model.dt)} s" if model.dt else "in continuous time"

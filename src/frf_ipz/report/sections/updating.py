@@ -8,6 +8,7 @@ import numpy as np
 
 from frf_ipz.plotting.wording import counted, number, percent, small_percent
 from frf_ipz.report.section import Section, Table, run_figures
+from frf_ipz.runs.picture_data import changed_parts, update_targets
 from frf_ipz.updating.along_structure import notable_changes
 from frf_ipz.updating.targets import Target
 
@@ -16,19 +17,19 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from frf_ipz.runs.contents import RunContents
+    from frf_ipz.runs.results import Results
     from frf_ipz.updating.updated_model import UpdatedModel
 
 SCALE = "std: "  # how columns of the history begin that say how wide a part of the prior is
 MOST_PARTS = 5  # named one by one
 
 
-def build(run: RunContents) -> Section | None:
+def build(run: Results) -> Section | None:
     """Give the section on the update.
 
     Parameters
     ----------
-    run : RunContents
+    run : Results
         What the run holds.
 
     Returns
@@ -36,17 +37,17 @@ def build(run: RunContents) -> Section | None:
     Section or None
         None without an update.
     """
-    updated = run.updated
+    updated = run.updated_model
     if updated is None:
         return None
-    rows, parts = run.targets(), run.parts
+    rows, parts = update_targets(run), changed_parts(run)
     tables = {"targets": _target_table(rows)} if rows else {}
     tables |= {"convergence": _iteration_table(updated)} if len(updated.history) else {}
     tables |= {"change": _part_table(parts)} if len(parts) else {}
     change = "change" if len(parts) else "flexibility"
     figures = run_figures(run, "targets", "convergence", change, "modal-change", tables=tables)
     lead = f"Method {updated.method}: {updated.status.value}. {counted(len(updated.history), 'iteration')}."
-    reduced = run.reduced
+    reduced = run.reduced_model
     return Section(
         anchor="updating",
         title="Updating",

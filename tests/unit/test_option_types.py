@@ -1,0 +1,35 @@
+"""Options made in Python are checked as those of a file are."""
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from frf_ipz.errors import InputError
+
+WRONG = [
+    (frf_ipz.FitOptions, "max_order", -1),
+    (frf_ipz.FitOptions, "band_hz", (10.0, "high")),
+    (frf_ipz.IngestOptions, "exponential_window_s", -1.0),
+    (frf_ipz.IngestOptions, "force_window_s", float("inf")),
+    (frf_ipz.ReduceOptions, "modes", 0),
+    (frf_ipz.UpdateOptions, "delta", 0.0),
+    (frf_ipz.PredictOptions, "points", 5),
+    (frf_ipz.ExportOptions, "sample_time_s", float("nan")),
+    (frf_ipz.ExportOptions, "outputs", "metres"),
+    (frf_ipz.DiagnoseOptions, "seed", True),
+]
+
+
+@pytest.mark.parametrize(("options", "key", "value"), WRONG, ids=lambda value: getattr(value, "__name__", str(value)))
+def test_a_wrong_value_is_refused_by_the_name_of_its_option(options, key, value):
+    with pytest.raises(InputError, match=rf"{options.__name__}\.{key}.*: .*given is"):
+        options(**{key: value})
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert frf_ipz.ReduceOptions(modes=np.int64(4)).modes == 4
+    assert frf_ipz.IngestOptions(force_window_s=np.float32(0.5)).force_window_s == 0.5
+
+
+def test_a_list_is_as_good_as_a_tuple():
+    assert frf_ipz.FitOptions(band_hz=[10.0, 700.0]).band_hz == (10.0, 700.0)
