@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,8 @@ class Column:
     Parameters
     ----------
     name : str
-        With the unit at its end unless it is an SI base unit.
+        With the unit at its end unless it is an SI base unit. A ``*`` in it stands for any text, where a table has one
+        column for each of something.
     kind : str
         ``float``, ``int``, ``text`` or ``flag``.
     unit : str
@@ -43,6 +45,37 @@ class Column:
         return pa.field(self.name, KINDS[self.kind], metadata={"unit": self.unit, "meaning": self.meaning})
 
 
+def declared_column(columns: Sequence[Column], name: str) -> Column:
+    """Find the declaration of a column.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        What is declared; the first one that fits counts.
+    name : str
+        Name of the column.
+
+    Returns
+    -------
+    Column
+        With this name.
+
+    Raises
+    ------
+    KeyError
+        If none fits: a table says what every column of it means.
+
+    Examples
+    --------
+    >>> declared_column([Column("damping of mode *", "float", "1", "ratio")], "damping of mode 2").name
+    'damping of mode 2'
+    """
+    for column in columns:
+        if fnmatchcase(name, column.name):
+            return replace(column, name=name)
+    raise KeyError(f"the column '{name}' is not declared among {[column.name for column in columns]}")
+
+
 def make_table(
     columns: Sequence[Column], values: Mapping[str, Any], *, about: Mapping[str, str] | None = None
 ) -> pa.Table:
@@ -53,7 +86,7 @@ def make_table(
     columns : sequence of Column
         Its columns, in order.
     values : mapping of str to sequence
-        The values of each column; NaN in a column of floats becomes null.
+        The values of each column, and of no other; NaN in a column of floats becomes null.
     about : mapping of str to str, optional
         Metadata of the whole table.
 
@@ -62,12 +95,19 @@ def make_table(
     pyarrow.Table
         The table.
 
+    Raises
+    ------
+    KeyError
+        If a column has no values, or values have no column: a fault of the program.
+
     Examples
     --------
     >>> table = make_table([Column("gain", "float", "1", "ratio")], {"gain": [1.0, np.nan]})
     >>> table["gain"].null_count, table.schema.field("gain").metadata[b"unit"]
     (1, b'1')
     """
+    for name in values:
+        declared_column(columns, name)
     arrays = [_array(values[column.name], column) for column in columns]
     metadata = dict(about or {})
     return pa.Table.from_arrays(arrays, schema=pa.schema([column.field for column in columns], metadata))

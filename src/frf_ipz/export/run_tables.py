@@ -1,4 +1,8 @@
-"""The tables of a run: the columns of each file of the contract."""
+"""The tables of a run: the columns of each file of the contract, with unit and meaning.
+
+`FILES` is what a run may write: a column that is not declared there is refused. The reference of the files is written
+from it too.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.export.parquet import Column, make_table, repeated
+from frf_ipz.export.parquet import Column, declared_column, make_table, repeated
 from frf_ipz.identification.results.shapes import driving_points, mode_shapes
 from frf_ipz.identification.root_covariance import pair_blocks
 from frf_ipz.modes import modal_assurance
@@ -21,10 +25,28 @@ if TYPE_CHECKING:
 
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.updating.updated_model import UpdatedModel
 
+RECORD = (
+    Column("record", "text", "", "file relative to the test; #2 for the second record in it"),
+    Column("input_dof", "text", "", "excited DOF, with the sign of the test"),
+    Column("peak_force_N", "float", "N", "extreme value of the force, with its sign"),
+    Column("pulse_s", "float", "s", "length of the pulse at half of its height; null for a shaker"),
+    Column("used", "flag", "", "true where it enters the FRFs"),
+    Column("weight", "float", "1", "its share of the energy of the force among the records of its set-up"),
+    Column("marks", "text", "", "what is wrong with it, the reasons for leaving it out first"),
+    Column("second_pulse_ratio", "float", "1", "height of a second pulse over the first; 0 where there is none"),
+    Column("remaining_amplitude", "float", "1", "share of its amplitude that the slowest mode still has at the end"),
+    Column("slowest_mode_hz", "float", "Hz", "frequency of that mode"),
+    Column("snr_db", "float", "dB", "power of the response over its noise, median of the channels; null if unknown"),
+    Column("force_noise_N", "float", "N", "standard deviation of the force outside of its pulse; null for a shaker"),
+    Column("step_s", "float", "s", "time step of the file"),
+    Column("samples", "int", "1", "number of samples"),
+    Column("trigger_s", "float", "s", "time from its start at which the force sets in"),
+)
 FREQUENCY = Column("frequency_hz", "float", "Hz", "frequency line")
 LABEL = (
     Column("output_dof", "text", "", "sensor, with the sign of the test"),
@@ -96,9 +118,55 @@ MODE = (
     Column("mpc", "float", "1", "modal phase collinearity: 1 for a normal mode"),
     Column("mac", "float", "1", "largest modal assurance criterion with another mode"),
     Column("mac_pole_id", "int", "", "the mode of that largest value"),
+    Column("highest_mac", "float", "1", "the same over the residues of all FRFs instead of the shape"),
+    Column("significance", "float", "1", "what the mode takes off the misfit, over what the BIC demands for it"),
+    Column("damping_std_ratio", "float", "1", "standard deviation of the damping over the damping"),
+    Column("misfit_level", "float", "1", "misfit at its frequency over noise, median of the FRFs, at least 1"),
     Column("quality", "text", "", "good, fair or poor"),
     Column("remarks", "text", "", "why"),
 )
+FIT = (
+    Column("frf", "int", "", "number of the FRF, from 0, in the order of frf.parquet"),
+    *LABEL[:2],
+    Column("band_low_hz", "float", "Hz", "lower end of the band"),
+    Column("band_high_hz", "float", "Hz", "upper end of the band"),
+    Column("misfit", "float", "SI of the quantity per N", "root mean square of measured minus fitted"),
+    Column("noise", "float", "SI of the quantity per N", "root mean square of the noise"),
+    Column("ratio", "float", "1", "root mean square of misfit over noise, line by line"),
+    Column("delay_s", "float", "s", "fitted delay of the FRF; 0 unless [fit] delay = true"),
+    Column("gain", "float", "1", "measured FRF over the true one; 1 unless [fit] gain names one of its channels"),
+    Column("gain_std", "float", "1", "standard deviation of the gain"),
+)
+PARAMETER = (
+    Column("phase", "text", "", "stiffness, damping, stiffness with damping or chosen parameters"),
+    Column("iteration", "int", "1", "number of the iteration"),
+    Column("misfit", "float", "1", "weighted sum of squares that is minimised"),
+    Column("step", "float", "1", "fraction of the step taken (minimal-change), or its size (ipz)"),
+    Column("largest_error", "float", "1", "largest relative error of a target (minimal-change)"),
+    Column("size_of_change", "float", "1", "norm of the parameters over their expected size (minimal-change)"),
+    Column("data_left_free", "float", "1", "number of combinations of parameters that the targets determine"),
+    Column("gamma", "float", "1", "cosine between predicted and actual change of the poles (ipz)"),
+    Column("std: *", "float", "1", "expected size of this kind of change, as the targets make it most likely"),
+    Column("stiffness of *", "float", "1", "stiffness of these parts, updated over nominal (ipz: its parameter)"),
+    Column("mass of *", "float", "1, or kg for a sensor", "parameter of the mass of these parts or of this sensor"),
+    Column("damping of mode *", "float", "1", "damping of this mode, updated over that of the nominal model"),
+    Column("stiffness *", "float", "1", "parameter of this pair of modes"),
+    Column("pole parameter *", "float", "as published", "parameter of the published method that moves a pole"),
+    Column("zero parameter *", "float", "as published", "parameter of the published method that moves a zero"),
+    Column("* *", "float", "1", "change of this parameter of this effect, relative to what the diagnosis found"),
+)
+# Every table that a run writes. A name with * stands for all that fit: updating parameters have names of their own.
+FILES = {
+    "frf.parquet": FRF,
+    "records.parquet": RECORD,
+    "poles.parquet": POLE,
+    "zeros.parquet": ZERO,
+    "fit.parquet": FIT,
+    "modes.parquet": MODE,
+    "pairs.parquet": PAIR,
+    "parameters.parquet": PARAMETER,
+    "poi_frf.parquet": PREDICTION,
+}
 
 
 def frf_table(frfs: FrfSet) -> pa.Table:
@@ -198,7 +266,7 @@ def mode_table(fit: ModalFit, *, scale_is_known: bool = True) -> pa.Table:
     if fit.n_modes:
         frame["mac"] = np.repeat(assurance.max(axis=1), count)
         frame["mac_pole_id"] = np.repeat(assurance.argmax(axis=1) + 1, count)
-    return frame_table(frame, {column.name: column for column in MODE}, meaning="criterion of the quality")
+    return frame_table(frame, MODE)
 
 
 def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) -> pa.Table:
@@ -279,38 +347,63 @@ def history_table(updated: UpdatedModel) -> pa.Table:
     pyarrow.Table
         ``parameters.parquet``.
     """
-    known = {
-        "phase": Column("phase", "text", "", "stiffness or damping"),
-        "iteration": Column("iteration", "int", "", "number of the iteration"),
-        "misfit": Column("misfit", "float", "1", "weighted sum of squares that is minimised"),
-        "step": Column("step", "float", "1", "size of the step relative to the parameters"),
-    }
-    return frame_table(updated.history, known, meaning="updating parameter", unit="as the parameter")
+    return frame_table(updated.history, PARAMETER)
 
 
-def frame_table(frame: pd.DataFrame, known: dict[str, Column], *, meaning: str, unit: str = "1") -> pa.Table:
+def record_table(estimate: FrfEstimate) -> pa.Table:
+    """Table of the records, one row each.
+
+    Parameters
+    ----------
+    estimate : FrfEstimate
+        FRFs and the quality of the records.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``records.parquet``.
+    """
+    return frame_table(estimate.records, RECORD)
+
+
+def misfit_table(fit: ModalFit) -> pa.Table:
+    """Table of the misfit against noise, one row an FRF and band.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``fit.parquet``.
+    """
+    return frame_table(fit.misfit, FIT)
+
+
+def frame_table(frame: pd.DataFrame, columns: Sequence[Column]) -> pa.Table:
     """Table of a data frame.
 
     Parameters
     ----------
     frame : DataFrame
         Columns of floats, ints, texts or flags.
-    known : dict of str to Column
-        Columns that are described; further ones get `meaning` and `unit`.
-    meaning, unit : str
-        Meaning and unit of the columns that are not described.
+    columns : sequence of Column
+        What may stand in the table.
 
     Returns
     -------
     pyarrow.Table
-        The table.
+        The columns of the frame, in its order.
+
+    Raises
+    ------
+    KeyError
+        If the frame has a column that is not declared: a fault of the program.
     """
-    kinds = {"f": "float", "i": "int", "u": "int", "b": "flag"}
-    columns = [
-        known.get(str(name)) or Column(str(name), kinds.get(frame[name].dtype.kind, "text"), unit, meaning)
-        for name in frame.columns
-    ]
-    return make_table(columns, {str(name): frame[name].to_numpy() for name in frame.columns})
+    present = [declared_column(columns, str(name)) for name in frame.columns]
+    return make_table(present, {str(name): frame[name].to_numpy() for name in frame.columns})
 
 
 def _label_columns(labels: Sequence[FrfLabel], repeat: int) -> dict[str, pa.Array]:

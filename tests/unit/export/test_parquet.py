@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
+import pytest
 
 from frf_ipz.dofs import Dof
 from frf_ipz.export.parquet import Column, make_table, repeated, write_table
@@ -46,11 +47,32 @@ def test_every_column_has_a_unit_and_a_meaning(tmp_path):
     assert all(schema.field(name).metadata[b"meaning"] for name in CONTRACT)
 
 
-def test_columns_of_a_frame_find_their_kind():
-    frame = pd.DataFrame({"order": [1], "hz": [2.5], "name": ["a"], "taken": [True]})
-    table = frame_table(frame, {"hz": Column("hz", "float", "Hz", "frequency")}, meaning="of a pole")
+def test_columns_of_a_frame_are_those_declared():
+    declared = [
+        Column("order", "int", "1", "model order"),
+        Column("std: *", "float", "1", "expected size"),
+        Column("name", "text", "", "name"),
+        Column("taken", "flag", "", "taken"),
+        Column("absent", "float", "1", "not in this frame"),
+    ]
+    frame = pd.DataFrame({"order": [1], "std: mass": [2.5], "name": ["a"], "taken": [True]})
+    table = frame_table(frame, declared)
+    assert table.column_names == ["order", "std: mass", "name", "taken"]
     assert [str(field.type) for field in table.schema] == ["int64", "double", "string", "bool"]
-    assert table.schema.field("hz").metadata[b"unit"] == b"Hz"
+    assert table.schema.field("std: mass").metadata == {b"unit": b"1", b"meaning": b"expected size"}
+    with pytest.raises(KeyError, match="'hz' is not declared"):
+        frame_table(frame.assign(hz=1.0), declared)
+
+
+def test_values_without_a_column_are_refused():
+    columns = [Column("number", "int", "", "n")]
+    with pytest.raises(KeyError, match="'text' is not declared"):
+        make_table(columns, {"number": [1], "text": ["a"]})
+
+
+def test_a_frame_without_rows_has_the_kinds_of_its_columns():
+    table = frame_table(pd.DataFrame([], columns=["number", "text"]), [Column("*", "int", "", "n")])
+    assert [str(field.type) for field in table.schema] == ["int64", "int64"]
 
 
 def test_none_is_null_in_every_kind():

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
-from frf_ipz.export.run_tables import mode_table
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -43,9 +42,7 @@ def ingest(runner: StageRunner) -> FrfEstimate:
         lambda progress: estimate_frfs(runner.inputs.test, options=options, progress=progress),
         lambda result: {
             "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
-            "records.parquet": partial(
-                write_table, tables.frame_table(result.records, {}, meaning="quality of a record")
-            ),
+            "records.parquet": partial(write_table, tables.record_table(result)),
         },
     )
 
@@ -76,7 +73,9 @@ def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = N
             "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),
             "poles.parquet": partial(write_table, tables.pole_table(result)),
             "zeros.parquet": partial(write_table, tables.zero_table(result)),
-            "fit.parquet": partial(write_table, tables.frame_table(result.misfit, {}, meaning="misfit against noise")),
-            "modes.parquet": partial(write_table, mode_table(result, scale_is_known=frfs.unknown_scale == "none")),
+            "fit.parquet": partial(write_table, tables.misfit_table(result)),
+            "modes.parquet": partial(
+                write_table, tables.mode_table(result, scale_is_known=frfs.unknown_scale == "none")
+            ),
         },
     )
