@@ -34,6 +34,8 @@ SEED = 3
 class Folder(SimpleNamespace):
     """Stands for a run's folder: ``load`` and ``record``."""
 
+    name = "in memory"
+
     def load(self, name):
         return self.results.get(name)
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
+from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.dofs import Dof, as_dof
 from frf_ipz.errors import InputError, QuantityError, ShapeError, did_you_mean
 from frf_ipz.quantities import FrfQuantity
@@ -75,7 +76,7 @@ class Measured(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrfSet:
+class FrfSet(Tabulated, Drawn):
     """Measured FRFs on common frequency lines.
 
     Not every pair of sensor and excited DOF need be measured (roving sensors), so FRFs stand in a row, not in a
@@ -129,6 +130,12 @@ class FrfSet:
         require_finite("the FRFs' values", self.values)
         for name in ARRAYS:
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        low, high = self.band_hz
+        ends = f"{', '.join(map(str, self.output_dofs))} / {', '.join(map(str, self.input_dofs))}"
+        kinds = ", ".join(dict.fromkeys(label.quantity.value for label in self.labels))
+        return f"FrfSet: {self.n_frfs} FRFs ({kinds}) on {self.n_lines} lines from {low:g} to {high:g} Hz, {ends}"
 
     @classmethod
     def from_arrays(

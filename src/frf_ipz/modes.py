@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.dofs import Dof
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ModeSet:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ModeSet(Concise):
     """Modes at some DOFs.
 
     Parameters

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.frf import FrfSet
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PoleResidueModel:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PoleResidueModel(Concise):
     """A set of FRFs with common poles.
 
     Parameters
@@ -92,8 +93,8 @@ class PoleResidueModel:
         return damping_ratio(self.poles)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ZeroSet:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ZeroSet(Concise):
     """Zeros of single FRFs.
 
     Parameters

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
+from frf_ipz.display import Concise, Drawn
 from frf_ipz.dofs import Dof, as_dof
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
@@ -26,9 +27,11 @@ if TYPE_CHECKING:
 
 SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 
+DOFS_SHOWN = 6
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Part:
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Part(Concise):
     """An additive part of a model with a name: an element, a spring, a group, a point mass.
 
     Parameters
@@ -54,8 +57,8 @@ class Part:
     mass: FloatArray | Matrix
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Geometry:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Geometry(Concise):
     """Where the nodes are, for drawing and for positions along the structure.
 
     Parameters
@@ -80,7 +83,7 @@ class Geometry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StructuralModel:
+class StructuralModel(Drawn):
     """A linear FE model ``M x'' + B x' + K x = f`` with modal damping besides B.
 
     The matrices are those of all DOFs, the held ones (`fixed`) included, so that a support can be released.
@@ -128,6 +131,11 @@ class StructuralModel:
     parts: tuple[Part, ...] = ()
     source: object = None
     full_indices: Mapping[Dof, int] = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"StructuralModel: {self.name} ({self.kind}), {len(self.dofs)} free DOFs, {len(self.geometry.nodes)} nodes"
+        )
 
     def __post_init__(self) -> None:
         n_all = len(self.all_dofs)
@@ -339,6 +347,10 @@ class ReducedModel:
     residual_dofs: tuple[Dof, ...] = ()
     choices: tuple[str, ...] = ()
     dashpots: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __repr__(self) -> str:
+        dofs = ", ".join(map(str, self.dofs[:DOFS_SHOWN])) + (", ..." if len(self.dofs) > DOFS_SHOWN else "")
+        return f"ReducedModel: {len(self.dofs)} DOFs ({dofs}), {self.n_modes} modes in its basis"
 
     def __post_init__(self) -> None:
         order = len(self.dofs)

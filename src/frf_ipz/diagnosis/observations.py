@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.measured_lines import measured_lines
@@ -43,8 +44,8 @@ class Sensor:
     quantity: FrfQuantity
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ObservedRecord:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ObservedRecord(Concise):
     """One impact of a hammer, or one run of a shaker, with its responses.
 
     Parameters
@@ -115,8 +116,8 @@ class ObservedRecord:
         return float(np.abs(self.force).max())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Observations:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Observations(Concise):
     """All records of a test that are used.
 
     Parameters

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.display import Concise, Drawn, Tabulated
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 
@@ -179,8 +180,8 @@ class Ambiguity:
         return f"These data cannot tell apart: {', '.join(first)} and {last}. {self.resolve_by}".strip()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Curves:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Curves(Concise):
     """FRFs beside the imaginary axis, to be drawn.
 
     Parameters
@@ -204,8 +205,8 @@ class Curves:
     expected: FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LinearisedLaw:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class LinearisedLaw(Concise):
     """A force law as a spring and a damper, about the amplitudes of the test.
 
     Parameters
@@ -240,8 +241,8 @@ class LinearisedLaw:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LawInTime:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class LawInTime(Concise):
     """A force law at its location in time, to be drawn.
 
     Parameters
@@ -275,7 +276,7 @@ class LawInTime:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Diagnosis:
+class Diagnosis(Tabulated, Drawn):
     """What is missing from a nominal model, if anything.
 
     Parameters
@@ -342,6 +343,10 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     linearised_law: LinearisedLaw | None = None
     law_in_time: LawInTime | None = None
+
+    def __repr__(self) -> str:
+        effects = ", ".join(finding.effect for finding in self.findings) or "no finding"
+        return f"Diagnosis: {self.verdict}, {effects}"
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``diagnosis.json``.

@@ -269,17 +269,15 @@ def mode_table(fit: ModalFit, *, scale_is_known: bool = True) -> pa.Table:
     return frame_table(frame, MODE)
 
 
-def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) -> pa.Table:
+def pair_table(pairs: Pairs, after: ComplexArray | None = None) -> pa.Table:
     """Table of measured against computed poles and zeros.
 
     Parameters
     ----------
     pairs : Pairs
         The pairing.
-    labels : sequence of FrfLabel
-        Labels of the FRFs to which zeros belong.
-    after : (n_targets,) complex array
-        Poles and zeros of the model after updating, in the order of `Pairs.targets`; NaN before it.
+    after : (n_targets,) complex array, optional
+        Poles and zeros of the model after updating, in the order of `Pairs.targets`; their columns are null without.
 
     Returns
     -------
@@ -287,7 +285,8 @@ def pair_table(pairs: Pairs, labels: Sequence[FrfLabel], after: ComplexArray) ->
         ``pairs.parquet``.
     """
     rows = pairs.rows
-    updated_values = dict(zip(pairs.targets, after, strict=True))
+    updated_values = {} if after is None else dict(zip(pairs.targets, after, strict=True))
+    labels = pairs.labels
     stages = {
         "measured": np.array([row.measured_value for row in rows], complex),
         "before": np.array([row.computed_value for row in rows], complex),

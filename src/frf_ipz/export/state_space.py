@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dof
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
@@ -30,8 +31,8 @@ ARRAYS = ("A", "B", "C", "D")
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StateSpaceModel:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class StateSpaceModel(Concise):
     """x' = A x + B u, y = C x + D u, or its discrete counterpart.
 
     Parameters

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dof
 from frf_ipz.errors import InputError
 from frf_ipz.prediction.ensemble import ModelEnsemble
@@ -35,8 +36,8 @@ BOUND = 1.0 + 1e-9  # so that the bound holds despite rounding
 STARTS = ((0.1, 1.0), (1.0, 10.0), (0.1, 10.0), (0.5, 2.0))  # corners of the weight, over the middle of the band
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class UncertaintyWeights:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class UncertaintyWeights(Concise):
     """Relative errors of the members, and weights that bound them.
 
     Parameters

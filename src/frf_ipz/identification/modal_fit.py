@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
+from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.root_covariance import RootCovariance
-from frf_ipz.rational import PoleResidueModel, ZeroSet
+from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
+
+MODES_SHOWN = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ModalFit:
+class ModalFit(Tabulated, Drawn):
     """A rational model of a set of measured FRFs.
 
     Parameters
@@ -79,6 +83,12 @@ class ModalFit:
     channel_gains: pd.DataFrame
     noise_from: str
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        values = [f"{hertz:.2f}" for hertz in natural_frequency_hz(self.model.poles[: self.n_modes])]
+        listed = ", ".join(values[:MODES_SHOWN]) + (", ..." if len(values) > MODES_SHOWN else "")
+        zeros = f"{np.count_nonzero(self.zeros.identifiable)} zeros of {len(self.labels)} FRFs"
+        return f"ModalFit: {self.n_modes} modes at {listed} Hz, {zeros}" if values else f"ModalFit: no modes, {zeros}"
 
     def __post_init__(self) -> None:
         size = 2 * (self.n_modes + len(self.zeros.values))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, read_only, require_finite, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.dofs import Dof, as_dof
 from frf_ipz.errors import InputError, QuantityError, did_you_mean
 from frf_ipz.frf import FrfLabel, FrfSet
@@ -63,8 +64,8 @@ class Channel:
         return numerator_of(self.sensitivity) if self.sensitivity else self.unit
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TestSetup:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class TestSetup(Concise):
     """Recordings with the force at one DOF and the sensors in one layout.
 
     Parameters
@@ -82,8 +83,8 @@ class TestSetup:
     files: tuple[Path, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Recording:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Recording(Concise):
     """A recording in memory: a force and the responses to it, in SI units, at a constant rate.
 
     Parameters
@@ -157,8 +158,8 @@ class Recording:
         return np.column_stack([time, self.force, self.responses.T])
 
 
-@dataclass(frozen=True, kw_only=True)
-class VibrationTest:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class VibrationTest(Concise):
     """A test: what was measured, where, and in which files.
 
     Parameters

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfSet
 
 
@@ -34,7 +35,7 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrfEstimate:
+class FrfEstimate(Tabulated, Drawn):
     """FRFs and the quality of the records that they were estimated from.
 
     Parameters
@@ -60,3 +61,8 @@ class FrfEstimate:
     traces: tuple[Trace, ...] = ()
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        used = int(self.records["used"].sum()) if len(self.records) else 0
+        of_records = f"{used} of {len(self.records)} records" if len(self.records) else "FRFs estimated elsewhere"
+        return f"FrfEstimate: {of_records}; {self.frfs!r}"

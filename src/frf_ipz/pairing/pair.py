@@ -52,7 +52,7 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
         zeros = model_zeros(reduced_model, fit.labels[frf])
         zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
         rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles)
-    return Pairs(rows=tuple(rows), warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
+    return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
 
 
 def _pole_rows(fit: ModalFit, model: ModelPoles, pairing: PolePairing) -> list[Pair]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from frf_ipz.display import Drawn, Tabulated
+from frf_ipz.frf import FrfLabel
+
 
 class Verdict(Enum):
     """Result of pairing a pole or zero."""
@@ -50,19 +53,30 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pairs:
+class Pairs(Tabulated, Drawn):
     """All poles and zeros of measurement and model.
 
     Parameters
     ----------
     rows : tuple of Pair
         Poles first, then the zeros FRF by FRF.
+    labels : tuple of FrfLabel
+        What the FRFs connect to which zeros belong.
     warnings : tuple of str
         What the user has to know.
     """
 
     rows: tuple[Pair, ...]
+    labels: tuple[FrfLabel, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        counts = []
+        for kind in ("pole", "zero"):
+            measured = [row for row in self.rows if row.kind == kind and row.measured >= 0]
+            paired = sum(row.verdict is Verdict.PAIRED for row in measured)
+            counts.append(f"{paired} of {len(measured)} measured {kind}s")
+        return f"Pairs: {', '.join(counts)} have a counterpart in the model"
 
     @property
     def targets(self) -> tuple[Pair, ...]:

@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dof
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
 MEASUREMENT, MODEL, REFERENCE = "measurement", "FE model", "reference"  # names of what is in memory, for digests
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Campaign:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Campaign(Concise):
     """A measurement, an FE model of the same structure, and the points at which no sensor can sit.
 
     Parameters

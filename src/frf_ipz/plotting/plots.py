@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis, LawInTime
     from frf_ipz.dofs import Dof
-    from frf_ipz.frf import FrfLabel, FrfSet
+    from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
@@ -226,15 +226,13 @@ def plot_pole_zero_map(fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     return draw_panel(describe_pole_zero_map(fit), ax)
 
 
-def plot_pairs(pairs: Pairs, labels: Sequence[FrfLabel], *, ax: Axes | None = None) -> Axes:
+def plot_pairs(pairs: Pairs, *, ax: Axes | None = None) -> Axes:
     """Draw measured (upper) and computed (lower) poles and zeros, linked where they are paired.
 
     Parameters
     ----------
     pairs : Pairs
         Who belongs to whom.
-    labels : sequence of FrfLabel
-        What the measured FRFs connect.
     ax : Axes, optional
         Where to draw; axes of a new figure where it is left out.
 
@@ -243,7 +241,7 @@ def plot_pairs(pairs: Pairs, labels: Sequence[FrfLabel], *, ax: Axes | None = No
     Axes
         One lane for the poles and one for the zeros of each FRF.
     """
-    return draw_panel(describe_pairs(pairs, labels), ax)
+    return draw_panel(describe_pairs(pairs), ax)
 
 
 def plot_targets(targets: Sequence[Target], *, ax: Axes | None = None) -> Axes:

@@ -206,15 +206,13 @@ def _ellipses(
     return [Areas(name=name, colour=colour, opacity=0.12, frf=frf, group=name, in_legend=False, x=hertz, y=100 * ratio)]
 
 
-def describe_pairs(pairs: Pairs, labels: Sequence[FrfLabel], *, band_hz: tuple[float, float] | None = None) -> Picture:
+def describe_pairs(pairs: Pairs, *, band_hz: tuple[float, float] | None = None) -> Picture:
     """Describe measured (upper) and computed (lower) poles and zeros, linked where they are paired.
 
     Parameters
     ----------
     pairs : Pairs
         Who belongs to whom.
-    labels : sequence of FrfLabel
-        What the measured FRFs connect.
     band_hz : pair of float, optional
         What is seen at first; from the lowest to the highest root where it is left out.
 
@@ -223,6 +221,7 @@ def describe_pairs(pairs: Pairs, labels: Sequence[FrfLabel], *, band_hz: tuple[f
     Picture
         One lane for the poles and one for the zeros of each FRF.
     """
+    labels = pairs.labels
     lanes = sorted({row.frf for row in pairs.rows})[:MOST_LANES]
     names = ["poles" if frf < 0 else str(labels[frf]) for frf in lanes]
     heights = {frf: float(len(lanes) - lane) for lane, frf in enumerate(lanes)}

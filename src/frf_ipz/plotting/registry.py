@@ -171,7 +171,7 @@ def _stabilization(run: Results) -> list[Picture]:
 def _pairs(run: Results) -> list[Picture]:
     if run.pairs is None or not run.pairs.rows:
         return []
-    return [describe_pairs(run.pairs, run.labels, band_hz=run.band_hz)]
+    return [describe_pairs(run.pairs, band_hz=run.band_hz)]
 
 
 def _flexibility(run: Results) -> list[Picture | None]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfLabel
 from frf_ipz.rational import ZeroSet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Prediction:
+class Prediction(Tabulated, Drawn):
     """FRFs at the points of interest.
 
     Parameters
@@ -40,6 +41,12 @@ class Prediction:
     zeros: ZeroSet
     zero_std: FloatArray
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        lines = f"{len(self.frequency_hz)} lines"
+        if len(self.frequency_hz):
+            lines += f" from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
+        return f"Prediction: {', '.join(map(str, self.labels))} on {lines}"
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))

@@ -87,7 +87,7 @@ def update_targets(run: Results) -> list[Target]:
     """
     if run.updated_model is None or run.pairs is None:
         return []
-    return target_rows(run.updated_model, run.pairs, run.labels)
+    return target_rows(run.updated_model, run.pairs)
 
 
 def changed_parts(run: Results) -> pd.DataFrame:

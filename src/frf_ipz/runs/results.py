@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from functools import cached_property
 from html import escape
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
+from frf_ipz.display import PICTURES, REPORT
+from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.export.frames import FRAMES, as_frame
+from frf_ipz.export.run_tables import pair_table
 from frf_ipz.export.state_space import to_control
 from frf_ipz.runs.folder import read_run
 from frf_ipz.runs.summary import summarise
@@ -16,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import control
+    import pandas as pd
+    from matplotlib.figure import Figure
 
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis
@@ -125,6 +132,71 @@ class Results:
             At most a screen of text.
         """
         return summarise(self)
+
+    def to_frame(self, table: str) -> pd.DataFrame:
+        """Give a table of the run.
+
+        Parameters
+        ----------
+        table : str
+            The name of its file without the ending, such as ``"poles"``; or another table of one of the results.
+
+        Returns
+        -------
+        DataFrame
+            The table.
+
+        Raises
+        ------
+        InputError
+            If there is no such table, or its stage has not run.
+        """
+        results = [self.estimate, self.fit, self.pairs, self.updated_model, self.prediction, self.diagnosis]
+        tables = {name: result for result in results if result is not None for name in FRAMES[type(result)]}
+        if table not in tables:
+            raise InputError(f"{self.name} has no table '{table}'; {did_you_mean(table, list(tables))}")
+        if table == "pairs" and self.pairs is not None and self.updated_model is not None:
+            return as_frame(pair_table(self.pairs, self.updated_model.after))
+        return tables[table].to_frame(table)
+
+    def plot(self, picture: str) -> Figure:
+        """Draw a picture of the run, as ``frf-ipz plot`` does.
+
+        Parameters
+        ----------
+        picture : str
+            Its name, such as ``"prediction"``.
+
+        Returns
+        -------
+        Figure
+            Of Matplotlib.
+
+        Raises
+        ------
+        InputError
+            If there is no such picture, or its stage has not run.
+        """
+        figure: Figure = import_module(PICTURES).plot_run(self, picture)
+        return figure
+
+    def write_report(self, path: str | Path) -> None:
+        """Write one page with all that the run holds.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write, such as ``"report.html"``.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        try:
+            import_module(REPORT).write_report(self, Path(path))
+        except OSError as error:
+            raise InputError(f"{path}: the report cannot be written: {error.strerror}") from None
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"

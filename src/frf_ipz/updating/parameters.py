@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
+from frf_ipz.display import Concise
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.regions import Region, reduced_regions
 
@@ -41,8 +42,8 @@ SAME_POSITION = 1e-9  # of the variance, by which two parts at one position diff
 MAX_FREE_MODES = 24  # a change among higher modes hardly moves what was measured
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PriorTerm:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PriorTerm(Concise):
     """One independent contribution to the parameters: `std` times `root` times a vector of unit normal numbers.
 
     Parameters
@@ -63,8 +64,8 @@ class PriorTerm:
     scale_uncertainty: float = SCALE_UNCERTAINTY
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ParameterBasis:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ParameterBasis(Concise):
     """Parameters of an update with their prior.
 
     Parameters

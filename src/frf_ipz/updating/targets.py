@@ -10,9 +10,6 @@ import numpy as np
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from frf_ipz.frf import FrfLabel
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -53,7 +50,7 @@ class Target:
         return self.after_hz / self.measured_hz - 1
 
 
-def target_rows(updated: UpdatedModel, pairs: Pairs, labels: Sequence[FrfLabel]) -> list[Target]:
+def target_rows(updated: UpdatedModel, pairs: Pairs) -> list[Target]:
     """Give all targets of an update.
 
     Parameters
@@ -62,8 +59,6 @@ def target_rows(updated: UpdatedModel, pairs: Pairs, labels: Sequence[FrfLabel])
         The update.
     pairs : Pairs
         What it aimed at.
-    labels : sequence of FrfLabel
-        What the measured FRFs connect.
 
     Returns
     -------
@@ -77,7 +72,7 @@ def target_rows(updated: UpdatedModel, pairs: Pairs, labels: Sequence[FrfLabel])
     hertz, ratios = natural_frequency_hz(values.astype(complex)), damping_ratio(values.astype(complex))
     return [
         Target(
-            name=root_name(pair.kind, pair.measured, str(labels[pair.frf]) if pair.frf >= 0 else ""),
+            name=root_name(pair.kind, pair.measured, str(pairs.labels[pair.frf]) if pair.frf >= 0 else ""),
             kind=pair.kind,
             measured_hz=float(hertz[0, place]),
             before_hz=float(hertz[1, place]),

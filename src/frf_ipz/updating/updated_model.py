@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.structure import ReducedModel
 
 
@@ -22,7 +23,7 @@ class UpdateStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class UpdatedModel:
+class UpdatedModel(Tabulated, Drawn):
     """A reduced model after updating.
 
     Parameters
@@ -61,6 +62,10 @@ class UpdatedModel:
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     parts: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.after)} targets, {len(self.history)} iterations"
+        return f"UpdatedModel: {self.method}, {self.status.value}, {counts}, {len(self.model.dofs)} DOFs"
 
 
 def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:

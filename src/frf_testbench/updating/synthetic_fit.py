@@ -194,7 +194,7 @@ def pair_in_order(fit: ModalFit, computed_poles: ComplexArray, computed_zeros: C
                     reason="in order",
                 )
             )
-    return Pairs(rows=tuple(rows))
+    return Pairs(rows=tuple(rows), labels=fit.labels)
 
 
 def select_zeros(values: ComplexArray, band_hz: tuple[float, float]) -> tuple[list[complex], list[str]]:
@@ -240,7 +240,15 @@ def make_modal_fit(
         value_std=np.zeros((N_LINES, len(labels))),
         stabilization=pd.DataFrame(),
         decisions=pd.DataFrame(),
-        modes=pd.DataFrame(),
+        modes=pd.DataFrame(
+            {
+                "pole_id": np.arange(1, n_modes + 1),
+                "frequency_hz": natural_frequency_hz(model.poles),
+                "damping_ratio": damping_ratio(model.poles),
+                "quality": "good",
+                "remarks": "",
+            }
+        ),
         misfit=pd.DataFrame(),
         noise_from="recordings",
         gain=np.ones(len(labels)),

@@ -22,7 +22,7 @@ def curve(ax, label):
 def calls(results):
     """Every plot function with what it takes."""
     frfs, fit, labels = results["ingest"].frfs, results["fit"], results["fit"].labels
-    targets = target_rows(results["update"], results["pair"], labels)
+    targets = target_rows(results["update"], results["pair"])
     return {
         "plot_coherence": (frfs,),
         "plot_convergence": (results["update"],),
@@ -32,7 +32,7 @@ def calls(results):
         "plot_levels": (results["levels"],),
         "plot_misfit": (frfs, fit),
         "plot_mismatch": (results["diagnose"],),
-        "plot_pairs": (results["pair"], labels),
+        "plot_pairs": (results["pair"],),
         "plot_phases": (frfs,),
         "plot_pole_zero_map": (fit,),
         "plot_prediction": (results["predict"],),

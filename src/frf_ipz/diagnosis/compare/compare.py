@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Diagnosis
 from frf_ipz.diagnosis.verdict.decision import CONSISTENT
+from frf_ipz.display import Concise
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 MASS_LOSS = f"{Path(mass_loss.__file__)}:MassLoss"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Comparison(Concise):
     """What changed.
 
     Parameters

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.display import Concise
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations
@@ -19,8 +20,8 @@ ROUGH_MODEL = DiagnoseOptions(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MachineState:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class MachineState(Concise):
     """A state of a machine: what was measured in it, and what is known of it.
 
     Parameters

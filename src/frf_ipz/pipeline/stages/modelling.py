@@ -6,9 +6,6 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from frf_ipz.arrays import ComplexArray
 from frf_ipz.diagnosis.parameters import make_diagnosed_basis
 from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.errors import InputError
@@ -115,11 +112,7 @@ def pair(runner: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pai
         "pair",
         {"after": runner.after("fit", "reduce")},
         lambda _: pair_roots(modal_fit, reduced),
-        lambda result: {
-            "pairs.parquet": partial(
-                write_table, tables.pair_table(result, modal_fit.labels, _unknown_roots(len(result.targets)))
-            )
-        },
+        lambda result: {"pairs.parquet": partial(write_table, tables.pair_table(result))},
     )
 
 
@@ -193,7 +186,7 @@ def update(
         {"options": asdict(options), "sensors": repr(sensors), "tolerance": tolerance, "after": runner.after("pair")},
         compute,
         lambda result: {
-            "pairs.parquet": partial(write_table, tables.pair_table(pairs, modal_fit.labels, result.after)),
+            "pairs.parquet": partial(write_table, tables.pair_table(pairs, result.after)),
             "parameters.parquet": partial(write_table, tables.history_table(result)),
             "updated_model.npz": partial(write_reduced_model, result.model),
         },
@@ -202,8 +195,3 @@ def update(
 
 def _once(dofs: Iterable[Dof]) -> tuple[Dof, ...]:
     return tuple(dict.fromkeys(dofs))
-
-
-def _unknown_roots(count: int) -> ComplexArray:
-    """Roots that are not known yet."""
-    return np.full(count, complex(np.nan, np.nan))
