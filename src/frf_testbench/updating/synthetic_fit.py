@@ -18,7 +18,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.rational import PoleResidueModel, ZeroSet, underdamped_poles
+from frf_ipz.rational import PoleResidueModel, ZeroSet, damping_ratio, natural_frequency_hz, underdamped_poles
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

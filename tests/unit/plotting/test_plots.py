@@ -21,7 +21,7 @@ def curve(ax, label):
 
 def calls(results):
     """Every plot function with what it takes."""
-    frfs, fit, labels = results["ingest"].frfs, results["fit"], results["fit"].labels
+    frfs, fit = results["ingest"].frfs, results["fit"]
     targets = target_rows(results["update"], results["pair"])
     return {
         "plot_coherence": (frfs,),
