@@ -22,6 +22,7 @@ from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
+from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
 from frf_ipz.structure import ReducedModel, StructuralModel
@@ -29,7 +30,6 @@ from frf_ipz.structure import ReducedModel, StructuralModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.fe.reduction.options import ReduceOptions
     from frf_ipz.frf import Measured
 
 DEFAULT_DAMPING_RATIO = 0.005  # where neither model nor test states one: a bolted metal structure
