@@ -74,12 +74,13 @@ def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Prog
     Examples
     --------
     >>> import frf_ipz
-    >>> lines = np.arange(1, 200.0, 0.1)
+    >>> lines = np.arange(60, 100.0, 0.1)
     >>> s, pole = 2j * np.pi * lines, 2 * np.pi * 80 * (-0.01 + 1j)
-    >>> accelerance = s**2 * (1 / (s - pole) - 1 / (s - pole.conj())) / 2j
+    >>> accelerance = s**2 * (1 / (s - pole) - 1 / (s - pole.conjugate())) / 2j
     >>> frfs = frf_ipz.FrfSet.from_arrays(lines, accelerance[:, None, None], outputs=["1:+x"], inputs=["1:+x"])
-    >>> frf_ipz.fit_modes(frfs).model.natural_frequency_hz.round(3)
-    array([80.004])
+    >>> frf_ipz.fit_modes(frfs).modes[["frequency_hz", "damping_ratio"]].round(3)
+       frequency_hz  damping_ratio
+    0        80.004           0.01
     """
     chosen = options or FitOptions()
     fitted = find_modes(frfs, chosen, progress=progress)
