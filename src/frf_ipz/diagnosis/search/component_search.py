@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     search_neighbourhoods,
 )
 from frf_ipz.diagnosis.search.robust_refinement import Start, refine_halfway, refine_starts, select_apart
-from frf_ipz.diagnosis.search.score_test import run_score_test
+from frf_ipz.diagnosis.search.score_tests import run_score_test
 
 N_SCORED = 14  # hypotheses that are fitted after the score test
 MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hypothesis is not fitted

@@ -29,7 +29,7 @@ from frf_ipz.diagnosis.search.component_search import (
 )
 from frf_ipz.diagnosis.search.pair_search import search_pair
 from frf_ipz.diagnosis.search.robust_refinement import Start
-from frf_ipz.diagnosis.search.score_test import run_score_test
+from frf_ipz.diagnosis.search.score_tests import run_score_test
 from frf_ipz.diagnosis.verdict.decision import decide
 from frf_ipz.diagnosis.verdict.goodness import LIMITS, assess_goodness
 from frf_ipz.diagnosis.verdict.out_of_catalogue import describe_implausibility

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit, LawStart
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import start_from_force
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import linear_location_motion
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
-from frf_ipz.diagnosis.nonlinear.fitting.score_test import score_laws
+from frf_ipz.diagnosis.nonlinear.fitting.score_tests import score_laws
 from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
 
 if TYPE_CHECKING:
