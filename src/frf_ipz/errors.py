@@ -7,7 +7,7 @@
     │   ├── ShapeError                     an array has the wrong shape, or holds NaN or infinity
     │   ├── QuantityError                  a unit or a quantity does not fit
     │   └── FileFormatError                a file cannot be read as what it should be
-    └── NumericalError (RuntimeError)      the computation cannot give a result
+    └── NumericalError (RuntimeError)      the computation cannot give a result: exit status 1
         ├── ConvergenceError               an iteration stopped without reaching its goal; carries ``result``
         ├── PairingError                   measured and computed poles or zeros cannot be matched
         └── IllConditionedError            a matrix is too close to singular to be used

@@ -22,7 +22,8 @@ EPILOG = """
   frf-ipz run FOLDER/pipeline.toml --out RESULTS
   frf-ipz show RESULTS                   opens the results as a page to look at and to work on
 
-[bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 a fault of the program.
+[bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 no result could be
+computed, or a fault of the program.
 """
 
 # Of linear algebra: on small matrices more than one only wait for each other.
@@ -140,7 +141,7 @@ def show(
 
 def main() -> None:
     """Run the command line; the exit status says how it went."""
-    from frf_ipz.errors import FrfIpzError
+    from frf_ipz.errors import FrfIpzError, NumericalError
 
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
@@ -148,7 +149,7 @@ def main() -> None:
         app()
     except FrfIpzError as error:
         print(f"frf-ipz: {error}", file=sys.stderr)
-        sys.exit(2)
+        sys.exit(1 if isinstance(error, NumericalError) else 2)
     except KeyboardInterrupt:
         print("frf-ipz: stopped; what was in the folder is untouched", file=sys.stderr)
         sys.exit(130)
