@@ -77,6 +77,7 @@ CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explana
 MIN_RECORDS = 2  # at one excited point, to compare levels
 AMBIGUOUS = 5.0  # log Bayes factor: effects nearer to the best than that are not distinguished
 MAX_ALTERNATIVES = 6
+SEED_WARNING = "[diagnose] seed has no effect: nothing in a diagnosis is drawn at random; leave it out"
 
 
 def diagnose(
@@ -135,7 +136,10 @@ def diagnose(
     observations = _as_observations(data, frfs, ingest, fit)
     catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=Path(folder), own=tuple(effects))
     with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
-        return _diagnose(fe_model, observations, catalogue, progress)
+        diagnosis = _diagnose(fe_model, observations, catalogue, progress)
+    if catalogue.options.seed is None:
+        return diagnosis
+    return replace(diagnosis, warnings=(*diagnosis.warnings, SEED_WARNING))
 
 
 def _as_observations(

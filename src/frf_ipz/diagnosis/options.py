@@ -12,6 +12,9 @@ from frf_ipz.toml_files import STRICT, check_values
 class DiagnoseOptions:
     """What may be missing, and what a nominal model may be wrong by without anything missing.
 
+    A tolerance is a half width: what it stands for has the standard deviation of a value that is uniform between minus
+    and plus the tolerance, which is the tolerance over the square root of 3.
+
     Parameters
     ----------
     apply : bool
@@ -20,16 +23,18 @@ class DiagnoseOptions:
         Search for these effects only, force laws among them; all of the contract's table where it is empty.
     extra_effects : tuple of str
         Further effects and force laws as ``file.py:ClassName``.
-    stiffness_tolerance, frequency_tolerance : float
-        Relative standard deviation of local stiffness, and of natural frequencies.
+    stiffness_tolerance : float
+        Half width of the relative deviation of local stiffness, 1; that of local mass is half of it.
+    frequency_tolerance : float
+        Half width of the relative deviation of natural frequencies beyond what local stiffness explains, 1.
     damping_tolerance : float
-        Relative tolerance of each modal damping ratio.
+        Half width of the relative deviation of each modal damping ratio, 1.
     gain_tolerance : float
-        Relative tolerance of sensor gains.
+        Half width of the relative deviation of each channel's gain, 1.
     position_tolerance_m_per_m : float
-        Tolerance of positions of sensors and excited points, as a part of the structure's length.
-    seed : int
-        Of everything that is drawn at random.
+        Half width of the deviation of positions of sensors and excited points, m per m of the structure's extent.
+    seed : int, optional
+        Has no effect, since nothing is drawn at random; accepted, with a warning, for files of earlier versions.
     """
 
     __pydantic_config__ = STRICT
@@ -42,7 +47,7 @@ class DiagnoseOptions:
     damping_tolerance: NotNegative = 0.3
     gain_tolerance: NotNegative = 5e-3
     position_tolerance_m_per_m: NotNegative = 1e-3
-    seed: CountOrNone = 0
+    seed: CountOrNone | None = None
 
     def __post_init__(self) -> None:
         check_values(self)

@@ -17,7 +17,7 @@ class RejectedPole:
     Parameters
     ----------
     hz : float
-        Its frequency.
+        Its frequency, Hz.
     why : str
         The reason, stored with the results.
     """
@@ -38,7 +38,7 @@ class PinnedPole:
     Parameters
     ----------
     hz : float
-        The frequency.
+        The frequency, Hz.
     why : str
         The reason, stored with the results; may be empty.
     """
@@ -59,9 +59,9 @@ class FitOptions:
     Parameters
     ----------
     band_hz : pair of float, optional
-        Band to fit; without it the whole measured band that carries signal.
+        Band to fit, Hz; without it the whole measured band that carries signal.
     exclude_hz : tuple of pairs of float
-        Bands to leave out: mains lines, low coherence.
+        Bands to leave out, Hz: mains lines, low coherence.
     pin_hz : tuple of float or PinnedPole
         Frequencies at which a mode must be, with or without the reason: never dropped.
     strike : tuple of RejectedPole
@@ -69,7 +69,8 @@ class FitOptions:
     modes : str
         ``complex`` or ``real`` (normal modes: proportional damping).
     max_order : int, optional
-        Highest model order of the start; without it chosen from band and lines.
+        Highest model order of the stabilisation diagram that the start is taken from; without it chosen from the number
+        of references. Too few lines in the band lower it.
     delay : bool
         Fit a pure delay for each output channel too.
     gain : tuple of str

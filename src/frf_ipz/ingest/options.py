@@ -18,10 +18,11 @@ class IngestOptions:
     estimator : str
         H1 (noise on the responses), H2 (noise on the force) or Hv (on both).
     force_window_s : float, optional
-        Length of the force that is kept, from the impact on, s; chosen from the pulse where it is left out.
+        Length of the force that is kept, from the impact on, s; 0 for no window. Where it is left out, it is chosen
+        from the pulse and its ringing.
     exponential_window_s : float, optional
         Time constant of an exponential window on force and response, s; 0 for none. Where it is left out, one is used
-        only if decays are cut off, and just as strong as that needs.
+        only if a hammer's decays are cut off, and just as strong as that needs.
     segment_s : float, optional
         Length of segments under Hann windows (kind ``random``), s; where it is left out, records are used whole or in
         sub-records, and the transients at both ends are removed.

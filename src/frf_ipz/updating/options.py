@@ -1,4 +1,8 @@
-"""What a user may choose in ``[update]`` of a pipeline."""
+"""What a user may choose in ``[update]`` of a pipeline.
+
+[Dorosti2018] M. Dorosti, R. H. B. Fey, M. F. Heertjes, H. Nijmeijer, Iterative Pole-Zero model updating: A combined
+sensitivity approach, Control Engineering Practice 71, 2018, 164-174, doi:10.1016/j.conengprac.2017.11.002.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +31,8 @@ class UpdateOptions:
     max_iterations : int, optional
         Largest number of iterations; by default that of the method.
     alpha, beta, delta : float
-        Regularisation, step and stop of ``ipz``, eqs. (15), (19) and (20) of the paper.
+        Regularisation (where the normal matrix is ill-conditioned), step and stop of ``ipz``, eqs. (15), (19) and (20)
+        of [Dorosti2018].
     delta_damping : float
         Stop of ``ipz`` when it changes the damping.
     cross_sensitivities : bool

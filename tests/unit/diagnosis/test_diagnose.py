@@ -9,7 +9,7 @@ import pytest
 from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
-from frf_ipz.diagnosis.diagnose import diagnose
+from frf_ipz.diagnosis.diagnose import SEED_WARNING, diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
@@ -40,6 +40,13 @@ def nominal(tmp_path_factory):
 def with_mass(nominal):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     return diagnose(observed(frfs), nominal, options=FEW)
+
+
+def test_a_seed_changes_nothing_and_a_warning_says_so(nominal, with_mass):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    diagnosis = diagnose(observed(frfs), nominal, options=replace(FEW, seed=7))
+    assert set(diagnosis.warnings) - set(with_mass.warnings) == {SEED_WARNING}
+    assert diagnosis.findings[0].parameters == with_mass.findings[0].parameters
 
 
 def test_nothing_missing_is_consistent(nominal):
