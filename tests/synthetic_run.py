@@ -196,7 +196,13 @@ def with_tables(fit, frfs):
         }
         for place, label in enumerate(fit.labels)
     ]
-    modes = {"pole_id": range(len(hertz)), "frequency_hz": hertz, "damping_ratio": ratio, "mpc": 0.99, "quality": "good"}
+    modes = {
+        "pole_id": range(len(hertz)),
+        "frequency_hz": hertz,
+        "damping_ratio": ratio,
+        "mpc": 0.99,
+        "quality": "good",
+    }
     used = frfs.select_lines(fit.used_lines)
     return replace(
         fit,

@@ -62,6 +62,7 @@ from .ingest.campaign import Recording as Recording
 from .ingest.campaign import VibrationTest as VibrationTest
 from .ingest.campaign_file import read_test as read_test
 from .ingest.estimate import estimate_frfs as estimate_frfs
+from .ingest.estimation.frf_files import read_frfs as read_frfs
 from .ingest.frf_estimate import FrfEstimate as FrfEstimate
 from .ingest.options import IngestOptions as IngestOptions
 from .modes import ModeSet as ModeSet

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.dofs import Dof, as_dof
-from frf_ipz.errors import InputError, QuantityError, ShapeError, did_you_mean
-from frf_ipz.quantities import FrfQuantity
+from frf_ipz.errors import InputError, ShapeError
+from frf_ipz.quantities import FrfQuantity, as_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -205,7 +205,7 @@ class FrfSet(Tabulated, Drawn):
         measured = np.argwhere(~np.isnan(blocks["values"]).all(axis=0))
         if not len(measured):
             raise InputError("the FRFs' values are NaN throughout; give at least one FRF that was measured")
-        kind = _quantity(quantity)
+        kind = as_quantity(quantity)
         labels = tuple(
             FrfLabel(outputs_given[row], inputs_given[column], kind, f"output {outputs_given[row]}",
                      f"input {inputs_given[column]}")
@@ -357,11 +357,3 @@ def _require_lines(frequency_hz: FloatArray) -> None:
     require_finite("the frequencies", frequency_hz)
     if len(frequency_hz) < 2 or frequency_hz[0] < 0 or (np.diff(frequency_hz) <= 0).any():
         raise ShapeError("the frequencies must ascend from 0 Hz or above, each once; sort the lines")
-
-
-def _quantity(quantity: FrfQuantity | str) -> FrfQuantity:
-    try:
-        return FrfQuantity(quantity)
-    except ValueError:
-        known = [kind.value for kind in FrfQuantity]
-        raise QuantityError(f"'{quantity}' is no quantity of FRFs; {did_you_mean(str(quantity), known)}") from None

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+from frf_ipz.errors import QuantityError, did_you_mean
+
 
 class FrfQuantity(Enum):
     """The kind of response in an FRF (response per force or moment)."""
@@ -64,6 +66,31 @@ class FrfQuantity(Enum):
 
 
 RESPONSES = ("displacement", "velocity", "acceleration")
+
+
+def as_quantity(quantity: FrfQuantity | str) -> FrfQuantity:
+    """Take a quantity of FRFs by its name.
+
+    Parameters
+    ----------
+    quantity : FrfQuantity or str
+        Such as ``"accelerance"``.
+
+    Returns
+    -------
+    FrfQuantity
+        The quantity.
+
+    Raises
+    ------
+    QuantityError
+        If there is none of that name.
+    """
+    try:
+        return FrfQuantity(quantity)
+    except ValueError:
+        known = [kind.value for kind in FrfQuantity]
+        raise QuantityError(f"'{quantity}' is no quantity of FRFs; {did_you_mean(str(quantity), known)}") from None
 
 
 def frf_quantity_of(response: str) -> FrfQuantity:

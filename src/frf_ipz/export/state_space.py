@@ -241,6 +241,31 @@ def to_control(model: StateSpaceModel) -> control.StateSpace:
     )
 
 
+def from_control(system: control.StateSpace) -> StateSpaceModel:
+    """Take a state space of python-control, with its names.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Continuous, or sampled at a stated time.
+
+    Returns
+    -------
+    StateSpaceModel
+        Without units, which python-control does not keep.
+    """
+    arrays = {name: np.array(getattr(system, name), float) for name in ARRAYS}
+    return StateSpaceModel(
+        **arrays,
+        dt=float(system.dt or 0.0),
+        input_names=tuple(system.input_labels),
+        output_names=tuple(system.output_labels),
+        state_names=tuple(system.state_labels),
+        input_units=("",) * system.ninputs,
+        output_units=("",) * system.noutputs,
+    )
+
+
 def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]

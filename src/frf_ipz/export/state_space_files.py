@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +16,11 @@ from scipy.io import loadmat, savemat
 from scipy.io.matlab import MatReadError
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, matrix_shapes, to_control
+from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     import control
 
@@ -30,14 +30,14 @@ SUFFIXES = (".json", ".mat")
 UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
 
 
-def write_state_space(model: StateSpaceModel, path: Path) -> None:
+def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | Path) -> None:
     """Write a state space as JSON or for MATLAB.
 
     Parameters
     ----------
-    model : StateSpaceModel
-        The state space.
-    path : Path
+    system : control.StateSpace or StateSpaceModel
+        The state space, with the names of its inputs, outputs and states; only the latter has units.
+    path : str or Path
         Ends in ``.json`` or ``.mat``.
 
     Raises
@@ -47,20 +47,21 @@ def write_state_space(model: StateSpaceModel, path: Path) -> None:
     OSError
         If it cannot be written.
     """
+    model = system if isinstance(system, StateSpaceModel) else from_control(system)
     values: dict[str, Any] = asdict(model)
     if _suffix(path) == ".json":
         plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
-        path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+        Path(path).write_text(json.dumps(plain, indent=1), encoding="utf-8")
     else:
         savemat(path, {**values, **_names_for_matlab(model)})
 
 
-def read_state_space_arrays(path: Path) -> StateSpaceModel:
+def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
     """Read what `write_state_space` wrote.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Ends in ``.json`` or ``.mat``.
 
     Returns
@@ -74,7 +75,7 @@ def read_state_space_arrays(path: Path) -> StateSpaceModel:
         If the file is no such state space.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
+        values = json.loads(Path(path).read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
         names = _names_in(values)
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
@@ -86,12 +87,12 @@ def read_state_space_arrays(path: Path) -> StateSpaceModel:
     return StateSpaceModel(**fields)
 
 
-def read_state_space(path: Path) -> control.StateSpace:
+def read_state_space(path: str | Path) -> control.StateSpace:
     """Read a state space for python-control.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Ends in ``.json`` or ``.mat``.
 
     Returns
@@ -107,14 +108,14 @@ def read_state_space(path: Path) -> control.StateSpace:
     return to_control(read_state_space_arrays(path))
 
 
-def write_reduced_model(model: ReducedModel, path: Path) -> None:
+def write_reduced_model(model: ReducedModel, path: str | Path) -> None:
     """Write the matrices of a reduced model.
 
     Parameters
     ----------
     model : ReducedModel
         The model.
-    path : Path
+    path : str or Path
         An ``.npz`` file: ``M``, ``B``, ``K`` and ``dofs`` (labels of the rows).
 
     Raises
@@ -123,18 +124,18 @@ def write_reduced_model(model: ReducedModel, path: Path) -> None:
         If it cannot be written.
     """
     names = np.array([dof.name for dof in model.dofs])
-    with path.open("wb") as stream:
+    with Path(path).open("wb") as stream:
         np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
 
 
-def write_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
+def write_ensemble(models: Sequence[StateSpaceModel], path: str | Path) -> None:
     """Write members of the posterior for MATLAB and for `read_ensemble`.
 
     Parameters
     ----------
     models : sequence of StateSpaceModel
         As from `make_state_space_ensemble`: inputs, outputs and states have the same names in all.
-    path : Path
+    path : str or Path
         A ``.mat`` file. ``A``, ``B``, ``C``, ``D`` have the members on a third axis, as model arrays of MATLAB have;
         names, units and ``dt`` are as in the file of one state space.
 
@@ -154,12 +155,12 @@ def write_ensemble(models: Sequence[StateSpaceModel], path: Path) -> None:
     savemat(path, {**values, **_names_for_matlab(models[0]), "dt": models[0].dt})
 
 
-def read_ensemble_arrays(path: Path) -> tuple[StateSpaceModel, ...]:
+def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
     """Read what `write_ensemble` wrote.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A ``.mat`` file.
 
     Returns
@@ -190,12 +191,12 @@ def read_ensemble_arrays(path: Path) -> tuple[StateSpaceModel, ...]:
         ) from error
 
 
-def read_ensemble(path: Path) -> list[control.StateSpace]:
+def read_ensemble(path: str | Path) -> list[control.StateSpace]:
     """Read members of the posterior for python-control.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A ``.mat`` file.
 
     Returns
@@ -211,14 +212,14 @@ def read_ensemble(path: Path) -> list[control.StateSpace]:
     return [to_control(model) for model in read_ensemble_arrays(path)]
 
 
-def write_uncertainty_weights(weights: UncertaintyWeights, path: Path) -> None:
+def write_uncertainty_weights(weights: UncertaintyWeights, path: str | Path) -> None:
     """Write the multiplicative uncertainty of every output as JSON.
 
     Parameters
     ----------
     weights : UncertaintyWeights
         The relative errors and the weights that bound them.
-    path : Path
+    path : str or Path
         A ``.json`` file with the fields of `UncertaintyWeights`.
 
     Raises
@@ -228,15 +229,15 @@ def write_uncertainty_weights(weights: UncertaintyWeights, path: Path) -> None:
     """
     values = asdict(weights)
     plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-    path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+    Path(path).write_text(json.dumps(plain, indent=1), encoding="utf-8")
 
 
-def read_uncertainty_weights(path: Path) -> UncertaintyWeights:
+def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     """Read what `write_uncertainty_weights` wrote.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A ``.json`` file.
 
     Returns
@@ -250,7 +251,7 @@ def read_uncertainty_weights(path: Path) -> UncertaintyWeights:
         If the file holds no such weights.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(Path(path).read_text(encoding="utf-8"))
         names = tuple(str(name) for name in values.pop("output_names"))
         return UncertaintyWeights(
             output_names=names, **{name: np.array(value, float) for name, value in values.items()}
@@ -298,10 +299,11 @@ def _names_in(values: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     return {name: tuple(str(_text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
 
 
-def _suffix(path: Path) -> str:
-    if path.suffix not in SUFFIXES:
+def _suffix(path: str | Path) -> str:
+    suffix = Path(path).suffix
+    if suffix not in SUFFIXES:
         raise InputError(f"{path}: a state space is written as .json or .mat; give one of these endings")
-    return path.suffix
+    return suffix
 
 
 def _text_in(text: object) -> object:

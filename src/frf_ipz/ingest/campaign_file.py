@@ -12,7 +12,7 @@ from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_m
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
-from frf_ipz.ingest.formats.registry import read_frfs
+from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.option_types import CountOrNone, NotNegative, Ratio
 from frf_ipz.quantities import FrfQuantity
@@ -204,7 +204,7 @@ def read_test(path: Path) -> VibrationTest:
 def _labels_of_source(source: FrfSource) -> list[FrfLabel]:
     if source.output_dof is not None and source.input_dof is not None:
         return [frf_label(source.output_dof, source.input_dof, source.quantity)]
-    return [frf.label for frf in read_frfs(source)]
+    return [frf.label for frf in read_frf_file(source)]
 
 
 def _check_sections(path: Path, keys: CampaignFileKeys) -> None:

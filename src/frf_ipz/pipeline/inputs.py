@@ -11,8 +11,8 @@ from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.estimation.frf_files import read_frfs
 from frf_ipz.pipeline.config import StageOptions, read_pipeline
-from frf_ipz.pipeline.reference import read_reference
 from frf_ipz.pipeline.sensors import without_sensors
 from frf_ipz.runs.digests import digest_file
 
@@ -122,7 +122,7 @@ def read_inputs(path: Path) -> PipelineInputs:
         digests={str(file): digest_file(file) for file in dict.fromkeys(files)},
         measurement_names=tuple(str(file) for file in test.files),
         model_names=tuple(str(file) for file in files_of_model),
-        reference=None if aside is None else read_reference(aside, test.labels[0].quantity),
+        reference=None if aside is None else read_frfs(aside, quantity=test.labels[0].quantity),
         reference_name="" if aside is None else str(aside),
     )
 

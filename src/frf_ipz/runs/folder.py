@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.runs.codec import load_result, save_result
 
@@ -303,13 +304,21 @@ def read_run(path: Path) -> RunFolder:
     Raises
     ------
     InputError
-        If no run has been made there.
+        If no run has been made there, or another version made it, whose results have another form.
     """
     if not (path / MANIFEST).is_file():
         raise InputError(
             f"{path}: there is no run here (no {MANIFEST}); make one with 'frf-ipz run PIPELINE --out {path}'"
         )
-    return RunFolder(path=path, staging=path / STAGING, manifest=read_manifest(path))
+    manifest = read_manifest(path)
+    made_by = str(manifest.get("frf_ipz", __version__))
+    if made_by.split(".")[:2] != __version__.split(".")[:2]:
+        pipeline = manifest.get("pipeline", "PIPELINE")
+        raise InputError(
+            f"{path}: these results were made by frf_ipz {made_by}, and this is {__version__}: make them again with "
+            f"'frf-ipz run {pipeline} --out {path}'; its tables can still be read as Parquet"
+        )
+    return RunFolder(path=path, staging=path / STAGING, manifest=manifest)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.io import loadmat
 
+import frf_ipz
 from chains import chain, label, updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, InputError
@@ -258,3 +259,15 @@ def test_the_reduced_model_is_written_with_its_dofs(tmp_path):
 def test_a_state_space_needs_a_measurement():
     with pytest.raises(InputError, match="at least one measured FRF"):
         make_state_space(measured(()), updated(MODELS["chain"]), points=())
+
+
+@pytest.mark.parametrize("suffix", [".json", ".mat"])
+def test_what_python_control_holds_is_written_and_read(tmp_path, suffix):
+    options = ExportOptions(sample_time_s=1 / 3000)
+    space = make_state_space(measured(LABELS), updated(MODELS["chain"]), points=(POINT,), options=options)
+    path = str(tmp_path / f"statespace{suffix}")
+    frf_ipz.write_state_space(to_control(space), path)
+    back = frf_ipz.read_state_space(path)
+    assert np.array_equal(back.A, space.A)
+    assert (back.dt, back.input_labels) == (space.dt, list(space.input_names))
+    assert (back.output_labels, back.state_labels) == (list(space.output_names), list(space.state_names))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import pyuff
 
+import frf_ipz
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -327,3 +328,30 @@ def test_a_direction_of_a_universal_file_may_be_given(tmp_path):
     frfs = read(tmp_path, entry("frf.uff", output_dof="9:+y")).frfs
     assert str(frfs.labels[0]) == "9:+y / 4:+x"
     assert frfs.labels[0].quantity is FrfQuantity.ACCELERANCE
+
+
+def test_a_file_is_read_alone(tmp_path):
+    path = tmp_path / "frf.csv"
+    lines = "\n".join(f"{hertz},1:+z,2:+z,{hertz / 10},0.5" for hertz in (1.0, 2.0, 4.0))
+    path.write_text(f"frequency_hz,output_dof,input_dof,real,imag\n{lines}\n", encoding="utf-8")
+    frfs = frf_ipz.read_frfs(str(path))
+    assert [str(label) for label in frfs.labels] == ["1:+z / 2:+z"]
+    np.testing.assert_array_equal(frfs.values[:, 0], [0.1 + 0.5j, 0.2 + 0.5j, 0.4 + 0.5j])
+    in_g = frf_ipz.read_frfs(path, quantity="accelerance", unit="g_0/N")
+    np.testing.assert_allclose(in_g.values, 9.80665 * frfs.values)
+    with pytest.raises(frf_ipz.QuantityError, match="did you mean 'mobility'"):
+        frf_ipz.read_frfs(path, quantity="mobilit")
+    with pytest.raises(frf_ipz.FileFormatError, match="no such file"):
+        frf_ipz.read_frfs(tmp_path / "gone.csv")
+
+
+def test_every_line_of_uneven_lines_is_taken_from_where_it_is(tmp_path):
+    hertz = np.geomspace(1.0, 1000.0, 61)
+    for file, output in (("a.csv", "1:+z"), ("b.csv", "3:+z")):
+        lines = "\n".join(f"{value!r},{output},2:+z,{value!r},0.0" for value in hertz.tolist())
+        (tmp_path / file).write_text(f"frequency_hz,output_dof,input_dof,real,imag\n{lines}\n", encoding="utf-8")
+    entries = '[[frf]]\nfile = "a.csv"\nquantity = "accelerance"\n[[frf]]\nfile = "b.csv"\nquantity = "accelerance"\n'
+    (tmp_path / "test.toml").write_text(f'[test]\nkind = "frf"\n{entries}', encoding="utf-8")
+    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(tmp_path / "test.toml")).frfs
+    np.testing.assert_array_equal(frfs.frequency_hz, hertz)
+    np.testing.assert_array_equal(frfs.values.real, np.column_stack([hertz, hertz]))

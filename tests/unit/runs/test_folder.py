@@ -1,12 +1,14 @@
 """A run's folder: everything or nothing, and nothing twice."""
 
 import errno
+import json
 import os
 import subprocess
 import sys
 
 import pytest
 
+import frf_ipz
 from frf_ipz.errors import InputError
 from frf_ipz.runs.digests import digest, digest_file
 from frf_ipz.runs.folder import STAGING, open_run, read_manifest, read_run
@@ -146,3 +148,13 @@ def test_digests_follow_the_content(tmp_path):
     first = digest_file(tmp_path / "file")
     (tmp_path / "file").write_text("2")
     assert digest_file(tmp_path / "file") != first
+
+
+def test_results_of_another_version_are_refused_with_what_to_do(tmp_path):
+    manifest = {"frf_ipz": "0.1.0", "pipeline": "p.toml", "stages": {}}
+    (tmp_path / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+    with pytest.raises(InputError, match=r"made by frf_ipz 0\.1\.0, .*frf-ipz run p\.toml --out") as refused:
+        read_run(tmp_path)
+    assert "\n" not in str(refused.value)
+    (tmp_path / "run.json").write_text(json.dumps({**manifest, "frf_ipz": frf_ipz.__version__}), encoding="utf-8")
+    assert read_run(tmp_path).manifest["pipeline"] == "p.toml"

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.dofs import as_dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimation.record_table import empty_record_table
-from frf_ipz.ingest.formats.registry import read_frfs
+from frf_ipz.ingest.formats.frf_file import FrfSource
+from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.units import frf_factor
+from frf_ipz.quantities import FrfQuantity, as_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import FloatArray, IntArray
+    from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
@@ -57,25 +62,83 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     frfs: list[MeasuredFrf] = []
     for position, source in enumerate(test.frf_sources):
         progress(position / len(test.frf_sources), f"reading {source.path.name}")
-        frfs += [_to_si(frf) for frf in read_frfs(source) if frf.label in test.labels]
+        frfs += [_to_si(frf) for frf in read_frf_file(source) if frf.label in test.labels]
+    joined, warnings = _join(frfs)
+    return FrfEstimate(
+        frfs=replace(joined, unknown_scale=test.unknown_scale), records=empty_record_table(), warnings=warnings
+    )
+
+
+def read_frfs(
+    path: str | Path,
+    *,
+    quantity: FrfQuantity | str = FrfQuantity.ACCELERANCE,
+    unit: str = "",
+    output: Dof | str | None = None,
+    input: Dof | str | None = None,
+    columns: Sequence[str] = (),
+    skip_rows: int = 0,
+) -> FrfSet:
+    """Read the FRFs of one file: CSV, text with named columns, or UFF 58.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    quantity : FrfQuantity or str
+        What its FRFs are: ``accelerance``, ``mobility`` or ``receptance``.
+    unit : str
+        Unit of the values, such as ``"g/N"``; what the file states where it is left out, and else SI.
+    output, input : Dof or str, optional
+        What the FRF connects, for a file that does not say so.
+    columns : sequence of str
+        What the columns of a text file are, as `columns` of ``[[frf]]`` in ``test.toml``.
+    skip_rows : int
+        Lines before the numbers of a text file.
+
+    Returns
+    -------
+    FrfSet
+        In SI, on the lines that all FRFs of the file share.
+
+    Raises
+    ------
+    FileFormatError
+        If the file cannot be read, or its FRFs share too few lines.
+    QuantityError
+        If the unit is none of the quantity.
+
+    Examples
+    --------
+    >>> frfs = read_frfs("data/reference/cantilever_49.csv", quantity="accelerance")  # doctest: +SKIP
+    """
+    source = FrfSource(
+        path=Path(path),
+        quantity=as_quantity(quantity),
+        unit=unit,
+        output_dof=None if output is None else as_dof(output),
+        input_dof=None if input is None else as_dof(input),
+        columns=tuple(columns),
+        skip_rows=skip_rows,
+    )
+    return _join([_to_si(frf) for frf in read_frf_file(source)])[0]
+
+
+def _join(frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:
+    """Bring FRFs to the lines that all of them have; with what is to be said about it."""
     labels = tuple(frf.label for frf in frfs)
     _check_frfs(frfs, labels)
     lines, warnings = _common_lines(frfs)
-    rows = [np.clip(np.searchsorted(frf.frequency_hz, lines - 0.5 * _spacing(lines)), 0, None) for frf in frfs]
-    pairs = list(zip(frfs, rows, strict=True))
-    return FrfEstimate(
-        frfs=FrfSet(
-            frequency_hz=lines,
-            values=np.column_stack([frf.values[row] for frf, row in pairs]),
-            labels=labels,
-            variance=np.column_stack([_values_or_nan(frf, frf.variance)[row] for frf, row in pairs]),
-            coherence=np.column_stack([_values_or_nan(frf, frf.coherence)[row] for frf, row in pairs]),
-            averages=np.zeros(len(frfs), np.int64),
-            unknown_scale=test.unknown_scale,
-        ),
-        records=empty_record_table(),
-        warnings=warnings,
+    pairs = [(frf, _nearest(frf.frequency_hz, lines)) for frf in frfs]
+    joined = FrfSet(
+        frequency_hz=lines,
+        values=np.column_stack([frf.values[row] for frf, row in pairs]),
+        labels=labels,
+        variance=np.column_stack([_values_or_nan(frf, frf.variance)[row] for frf, row in pairs]),
+        coherence=np.column_stack([_values_or_nan(frf, frf.coherence)[row] for frf, row in pairs]),
+        averages=np.zeros(len(frfs), np.int64),
     )
+    return joined, warnings
 
 
 def _values_or_nan(frf: MeasuredFrf, values: FloatArray | None) -> FloatArray:
@@ -111,10 +174,6 @@ def _check_frfs(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None
                 raise FileFormatError(path, f"the FRF {label} has a negative {name}", where=f"column '{name}'")
 
 
-def _spacing(frequency_hz: FloatArray) -> float:
-    return float(np.median(np.diff(frequency_hz))) if len(frequency_hz) > 1 else 0.0
-
-
 def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, ...]]:
     """Find the lines that all FRFs have."""
     lines = frfs[0].frequency_hz
@@ -148,8 +207,13 @@ def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
 
 
 def _contains(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
-    """Tell which of some lines an FRF has, to within a small part of its spacing."""
-    tolerance = SAME_LINE * _spacing(frequency_hz)
+    """Tell which of some lines an FRF has, to within a small part of its spacing there: lines may be uneven."""
     above = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
-    nearest = np.minimum(np.abs(frequency_hz[above] - lines), np.abs(frequency_hz[above - 1] - lines))
-    return np.asarray(nearest <= tolerance)
+    spacing = frequency_hz[above] - frequency_hz[above - 1]
+    return np.asarray(np.abs(frequency_hz[_nearest(frequency_hz, lines)] - lines) <= SAME_LINE * spacing)
+
+
+def _nearest(frequency_hz: FloatArray, lines: FloatArray) -> IntArray:
+    above = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
+    is_below = lines - frequency_hz[above - 1] < frequency_hz[above] - lines
+    return np.asarray(above - is_below)

@@ -49,7 +49,7 @@ def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
     raise FileFormatError(path, "is of no known format for recordings; export it as CSV")
 
 
-def read_frfs(source: FrfSource) -> tuple[MeasuredFrf, ...]:
+def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     """Read the FRFs of a file of any format.
 
     Parameters
