@@ -18,7 +18,15 @@ from .diagnosis.observations import observe as observe
 from .diagnosis.options import DiagnoseOptions as DiagnoseOptions
 from .diagnosis.parameters import make_diagnosed_basis as make_diagnosed_basis
 from .diagnosis.position_uncertainty import propagate_position_tolerance as propagate_position_tolerance
+from .diagnosis.result import Ambiguity as Ambiguity
+from .diagnosis.result import Curves as Curves
+from .diagnosis.result import DataCheck as DataCheck
 from .diagnosis.result import Diagnosis as Diagnosis
+from .diagnosis.result import Estimate as Estimate
+from .diagnosis.result import Finding as Finding
+from .diagnosis.result import LawInTime as LawInTime
+from .diagnosis.result import LinearisedLaw as LinearisedLaw
+from .diagnosis.result import Misfit as Misfit
 from .dofs import Dof as Dof
 from .dofs import parse_dof as parse_dof
 from .errors import ConvergenceError as ConvergenceError
@@ -32,6 +40,7 @@ from .errors import QuantityError as QuantityError
 from .errors import ShapeError as ShapeError
 from .export.frequency_response_data import to_frd as to_frd
 from .export.options import ExportOptions as ExportOptions
+from .export.state_space import StateSpaceModel as StateSpaceModel
 from .export.state_space import to_state_space as to_state_space
 from .export.state_space import to_state_space_ensemble as to_state_space_ensemble
 from .export.state_space_files import read_ensemble as read_ensemble
@@ -58,7 +67,9 @@ from .identification.options import FitOptions as FitOptions
 from .identification.options import PinnedPole as PinnedPole
 from .identification.options import RejectedPole as RejectedPole
 from .identification.results.gains import estimate_gains as estimate_gains
+from .ingest.campaign import Channel as Channel
 from .ingest.campaign import Recording as Recording
+from .ingest.campaign import TestSetup as TestSetup
 from .ingest.campaign import VibrationTest as VibrationTest
 from .ingest.campaign_file import read_test as read_test
 from .ingest.estimate import estimate_frfs as estimate_frfs
@@ -69,6 +80,7 @@ from .modes import ModeSet as ModeSet
 from .pairing.pair import pair_roots as pair_roots
 from .pairing.pairs import Pair as Pair
 from .pairing.pairs import Pairs as Pairs
+from .pairing.pairs import PairVerdict as PairVerdict
 from .pipeline.campaign import Campaign as Campaign
 from .pipeline.run import run_pipeline as run_pipeline
 from .prediction.agreement import Agreement as Agreement
@@ -90,6 +102,7 @@ from .structure import StructuralModel as StructuralModel
 from .updating.options import UpdateOptions as UpdateOptions
 from .updating.parameters import ParameterBasis as ParameterBasis
 from .updating.parameters import make_structural_basis as make_structural_basis
+from .updating.position_uncertainty import PositionUncertainty as PositionUncertainty
 from .updating.update import update_model as update_model
 from .updating.updated_model import UpdatedModel as UpdatedModel
 from .updating.updated_model import UpdateStatus as UpdateStatus

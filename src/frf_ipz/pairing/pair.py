@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_zeros
-from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
+from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.pairing.poles import PolePairing, pair_poles
 from frf_ipz.pairing.zeros import ZeroPairing, in_band, pair_zeros
 
@@ -90,23 +90,23 @@ def _zero_rows(
     return rows
 
 
-def _verdict(matching: Matching, row: int, computed: np.ndarray, what: str) -> tuple[Verdict, str]:
+def _verdict(matching: Matching, row: int, computed: np.ndarray, what: str) -> tuple[PairVerdict, str]:
     partner, rival = int(matching.partner[row]), int(matching.rival[row])
     if partner < 0:
-        return Verdict.MISSING_IN_MODEL, f"the model has no {what} near enough in frequency, kind and shape"
+        return PairVerdict.MISSING_IN_MODEL, f"the model has no {what} near enough in frequency, kind and shape"
     if matching.margin[row] >= MIN_MARGIN:
-        return Verdict.PAIRED, f"the next best choice is worse by {matching.margin[row]:.1f} squared deviations"
+        return PairVerdict.PAIRED, f"the next best choice is worse by {matching.margin[row]:.1f} squared deviations"
     alternative = "no partner" if rival < 0 else f"the one at {abs(computed[rival]) / (2 * np.pi):.5g} Hz"
-    return Verdict.AMBIGUOUS, f"{alternative} would be as likely (worse by {matching.margin[row]:.1f})"
+    return PairVerdict.AMBIGUOUS, f"{alternative} would be as likely (worse by {matching.margin[row]:.1f})"
 
 
-def _exclusion(fit: ModalFit, zero: int) -> tuple[Verdict, str] | None:
-    """Verdict and reason for a measured zero that must not become a target; None for one that may."""
+def _exclusion(fit: ModalFit, zero: int) -> tuple[PairVerdict, str] | None:
+    """PairVerdict and reason for a measured zero that must not become a target; None for one that may."""
     zeros = fit.zeros
     if not zeros.identifiable[zero]:
-        return Verdict.AMBIGUOUS, f"not identifiable: {zeros.reason[zero]}"
+        return PairVerdict.AMBIGUOUS, f"not identifiable: {zeros.reason[zero]}"
     if zeros.kind[zero] == "real":
-        return Verdict.AMBIGUOUS, "a real zero: no measured line shows where it is"
+        return PairVerdict.AMBIGUOUS, "a real zero: no measured line shows where it is"
     start = 2 * (fit.n_modes + zero)
     std = float(np.sqrt(max(fit.covariance[start + 1, start + 1], 0.0)))
     poles = fit.model.poles[: fit.n_modes]
@@ -114,7 +114,7 @@ def _exclusion(fit: ModalFit, zero: int) -> tuple[Verdict, str] | None:
     if len(poles) and distance.min() < CANCELLING * std:
         pole_hz = abs(poles[np.argmin(distance)]) / (2 * np.pi)
         return (
-            Verdict.AMBIGUOUS,
+            PairVerdict.AMBIGUOUS,
             f"it nearly cancels the pole at {pole_hz:.5g} Hz: the sensor or the excitation is at a node of the mode",
         )
     return None
@@ -128,7 +128,7 @@ def _row(
     value: complex,
     computed: np.ndarray,
     pairing: PolePairing | ZeroPairing,
-    verdict: Verdict,
+    verdict: PairVerdict,
     reason: str,
     *,
     row: int | None = None,
@@ -156,7 +156,7 @@ def _unmeasured(kind: str, frf: int, computed: int, value: complex, reason: str)
         measured_value=NO_ROOT,
         computed_value=complex(value),
         distance=float("nan"),
-        verdict=Verdict.MISSING_IN_MEASUREMENT,
+        verdict=PairVerdict.MISSING_IN_MEASUREMENT,
         reason=reason,
     )
 
@@ -173,13 +173,13 @@ def _paired_logs(rows: list[Pair]) -> tuple[FloatArray, FloatArray]:
 def _warnings(rows: list[Pair], pairing: PolePairing, labels: Sequence[FrfLabel]) -> list[str]:
     texts = []
     poles = [row for row in rows if row.kind == "pole"]
-    unpaired = [row for row in poles if row.verdict is Verdict.MISSING_IN_MODEL]
+    unpaired = [row for row in poles if row.verdict is PairVerdict.MISSING_IN_MODEL]
     if unpaired:
         where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in unpaired)
         texts.append(
             f"the model has no counterpart of the measured modes at {where} Hz: something may be missing in it"
         )
-    if not any(row.verdict is Verdict.PAIRED for row in poles):
+    if not any(row.verdict is PairVerdict.PAIRED for row in poles):
         texts.append("no measured mode could be paired: check units, materials and supports of the FE model")
     flipped = np.flatnonzero(pairing.gains < 0)
     if len(flipped):

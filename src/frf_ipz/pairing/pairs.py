@@ -9,7 +9,7 @@ from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfLabel
 
 
-class Verdict(Enum):
+class PairVerdict(Enum):
     """Result of pairing a pole or zero."""
 
     PAIRED = "paired"
@@ -35,7 +35,7 @@ class Pair:
         rad/s; NaN where there is none.
     distance : float
         Cost that the assignment minimised: of the frequency, and of the mode shape or the slope.
-    verdict : Verdict
+    verdict : PairVerdict
         Result of the pairing.
     reason : str
         Why, in words.
@@ -48,7 +48,7 @@ class Pair:
     measured_value: complex
     computed_value: complex
     distance: float
-    verdict: Verdict
+    verdict: PairVerdict
     reason: str
 
 
@@ -74,11 +74,11 @@ class Pairs(Tabulated, Drawn):
         counts = []
         for kind in ("pole", "zero"):
             measured = [row for row in self.rows if row.kind == kind and row.measured >= 0]
-            paired = sum(row.verdict is Verdict.PAIRED for row in measured)
+            paired = sum(row.verdict is PairVerdict.PAIRED for row in measured)
             counts.append(f"{paired} of {len(measured)} measured {kind}s")
         return f"Pairs: {', '.join(counts)} have a counterpart in the model"
 
     @property
     def targets(self) -> tuple[Pair, ...]:
         """The paired ones, which updating has to meet."""
-        return tuple(row for row in self.rows if row.verdict is Verdict.PAIRED)
+        return tuple(row for row in self.rows if row.verdict is PairVerdict.PAIRED)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
+from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.plotting.ellipses import error_ellipses, root_covariances, shown_zeros
 from frf_ipz.plotting.picture import (
     Areas,
@@ -42,11 +42,11 @@ STABILITY: tuple[tuple[str, Colour, float, str, bool, float], ...] = (
     ("stable in frequency and damping", 0, 1.0, "diamond", True, 7),
     ("stable in frequency, damping and shape", 2, 1.0, "circle", True, 8),
 )
-VERDICTS: Mapping[Verdict, tuple[Colour, str, bool]] = {
-    Verdict.PAIRED: (Role.GOOD, "circle", True),
-    Verdict.MISSING_IN_MODEL: (Role.BAD, "cross", True),
-    Verdict.MISSING_IN_MEASUREMENT: (Role.MUTED, "triangle-up", False),
-    Verdict.AMBIGUOUS: (4, "diamond", False),
+VERDICTS: Mapping[PairVerdict, tuple[Colour, str, bool]] = {
+    PairVerdict.PAIRED: (Role.GOOD, "circle", True),
+    PairVerdict.MISSING_IN_MODEL: (Role.BAD, "cross", True),
+    PairVerdict.MISSING_IN_MEASUREMENT: (Role.MUTED, "triangle-up", False),
+    PairVerdict.AMBIGUOUS: (4, "diamond", False),
 }
 MOST_ELLIPSES = 400  # drawn; more would make a page large
 MOST_LANES = 40  # FRFs drawn; more would be too low to tell apart
@@ -226,7 +226,7 @@ def describe_pairs(pairs: Pairs, *, band_hz: tuple[float, float] | None = None) 
     names = ["poles" if frf < 0 else str(labels[frf]) for frf in lanes]
     heights = {frf: float(len(lanes) - lane) for lane, frf in enumerate(lanes)}
     rows = [row for row in pairs.rows if row.frf in heights]
-    layers: list[Layer] = [_links([row for row in rows if row.verdict is Verdict.PAIRED], heights)]
+    layers: list[Layer] = [_links([row for row in rows if row.verdict is PairVerdict.PAIRED], heights)]
     for verdict in VERDICTS:
         layers += _pair_ends([row for row in rows if row.verdict is verdict], verdict, heights, labels)
     hertz = np.array([_hertz(value) for row in rows for value in (row.measured_value, row.computed_value)])
@@ -256,7 +256,7 @@ def _links(rows: Sequence[Pair], heights: Mapping[int, float]) -> Line:
 
 
 def _pair_ends(
-    rows: Sequence[Pair], verdict: Verdict, heights: Mapping[int, float], labels: Sequence[FrfLabel]
+    rows: Sequence[Pair], verdict: PairVerdict, heights: Mapping[int, float], labels: Sequence[FrfLabel]
 ) -> list[Layer]:
     ends = [(row, "measured", row.measured_value, SHIFT) for row in rows if row.measured >= 0]
     ends += [(row, "model", row.computed_value, -SHIFT) for row in rows if row.computed >= 0]

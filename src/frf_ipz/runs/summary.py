@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:
     """
     counts = {
         kind: (
-            sum(row.kind == kind and row.verdict is Verdict.PAIRED for row in pairs.rows),
+            sum(row.kind == kind and row.verdict is PairVerdict.PAIRED for row in pairs.rows),
             sum(row.kind == kind and row.measured >= 0 for row in pairs.rows),
         )
         for kind in ("pole", "zero")

@@ -16,7 +16,7 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.pencils import damped_zeros
-from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
+from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet, damping_ratio, natural_frequency_hz, underdamped_poles
 
@@ -190,7 +190,7 @@ def pair_in_order(fit: ModalFit, computed_poles: ComplexArray, computed_zeros: C
                     measured_value=complex(measured),
                     computed_value=complex(computed),
                     distance=0.0,
-                    verdict=Verdict.PAIRED,
+                    verdict=PairVerdict.PAIRED,
                     reason="in order",
                 )
             )

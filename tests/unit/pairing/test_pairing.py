@@ -13,7 +13,7 @@ from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.pairing.model_roots import ModelZeros, model_poles, model_zeros
 from frf_ipz.pairing.pair import pair_roots
-from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet
@@ -60,7 +60,7 @@ def complex_zeros(model, frf_label):
 def test_a_model_is_paired_with_itself_throughout():
     model = chain()
     pairs = pair_roots(measured(model), model)
-    assert {row.verdict for row in pairs.rows} == {Verdict.PAIRED}
+    assert {row.verdict for row in pairs.rows} == {PairVerdict.PAIRED}
     assert pairs.warnings == ()
     for row in pairs.rows:
         assert_allclose(row.computed_value, row.measured_value, rtol=1e-12)
@@ -89,10 +89,10 @@ def test_a_common_factor_on_all_frequencies_is_no_obstacle():
     for factor in (0.7, 0.85, 1.2, 1.4):
         stiffer = replace(model, stiffness=factor * model.stiffness, damping=np.sqrt(factor) * model.damping)
         pairs = pair_roots(measured(stiffer), model)
-        assert all(row.verdict is Verdict.PAIRED for row in pairs.rows if row.kind == "pole")
+        assert all(row.verdict is PairVerdict.PAIRED for row in pairs.rows if row.kind == "pole")
         assert [row.computed for row in pairs.rows if row.kind == "pole"] == list(range(5))
         zeros = [row for row in pairs.rows if row.kind == "zero" and row.measured >= 0]
-        assert all(row.verdict is Verdict.PAIRED for row in zeros)
+        assert all(row.verdict is PairVerdict.PAIRED for row in zeros)
         ratios = [abs(row.measured_value / row.computed_value) for row in zeros]
         assert_allclose(ratios, np.sqrt(factor), rtol=1e-4)
 
@@ -117,13 +117,13 @@ def test_a_reversed_polarity_is_found_and_reported():
     fit = measured(model, LABELS)
     pairs = pair_roots(replace(fit, labels=turned), model)
     assert f"polarity of {turned[0]}, {turned[1]} is opposite" in pairs.warnings[-1]
-    assert all(row.verdict is Verdict.PAIRED for row in pairs.rows)
+    assert all(row.verdict is PairVerdict.PAIRED for row in pairs.rows)
 
 
 def test_a_mode_that_was_not_measured_is_missing_in_the_measurement():
     model = chain()
     pairs = pair_roots(measured(model, poles=[0, 1, 3, 4], zeros=False), model)
-    missing = [row for row in pairs.rows if row.kind == "pole" and row.verdict is Verdict.MISSING_IN_MEASUREMENT]
+    missing = [row for row in pairs.rows if row.kind == "pole" and row.verdict is PairVerdict.MISSING_IN_MEASUREMENT]
     assert [row.computed for row in missing] == [2]
     assert [row.computed for row in pairs.targets] == [0, 1, 3, 4]
 
@@ -139,7 +139,7 @@ def test_a_mode_that_the_model_lacks_is_reported_and_is_no_target():
         larger, LABELS, (5.0, 250.0), np.zeros(0, complex), np.zeros(0, int), [], np.eye(12), np.zeros((6, 2, 2, 2))
     )
     pairs = pair_roots(more, model)
-    lonely = [row for row in pairs.rows if row.verdict is Verdict.MISSING_IN_MODEL]
+    lonely = [row for row in pairs.rows if row.verdict is PairVerdict.MISSING_IN_MODEL]
     assert [row.measured for row in lonely] == [5]
     assert "200 Hz" in pairs.warnings[0]
     assert len(pairs.targets) == 5
@@ -161,7 +161,7 @@ def test_a_zero_that_is_not_identifiable_is_no_target():
     reasons = ("too far out", *[""] * (len(known) - 1))
     pairs = pair_roots(replace(fit, zeros=replace(fit.zeros, identifiable=known, reason=reasons)), model)
     row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
-    assert row.verdict is Verdict.AMBIGUOUS
+    assert row.verdict is PairVerdict.AMBIGUOUS
     assert "too far out" in row.reason
 
 
@@ -173,7 +173,7 @@ def test_a_zero_that_cancels_a_pole_is_no_target():
     pairs = pair_roots(replace(fit, zeros=replace(fit.zeros, values=values)), model)
     row = next(row for row in pairs.rows if row.kind == "zero" and row.measured == 0)
     assert "cancels the pole" in row.reason
-    assert row.verdict is Verdict.AMBIGUOUS
+    assert row.verdict is PairVerdict.AMBIGUOUS
 
 
 def test_a_real_zero_is_no_target():
@@ -182,7 +182,7 @@ def test_a_real_zero_is_no_target():
     zeros = ZeroSet(values=values, frf=np.array([0]), kind=("real",), identifiable=np.array([True]), reason=("",))
     with_zero = replace(fit, zeros=zeros, covariance=np.eye(12))
     row = next(row for row in pair_roots(with_zero, chain()).rows if row.kind == "zero" and row.measured == 0)
-    assert row.verdict is Verdict.AMBIGUOUS
+    assert row.verdict is PairVerdict.AMBIGUOUS
 
 
 def test_quadruples_are_listed_once():

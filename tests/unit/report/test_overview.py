@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import number
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.report.sections.overview import build, verdict
@@ -49,7 +49,7 @@ def test_the_verdict_counts_poles_and_zeros(run):
 
 def test_roots_that_the_model_lacks_are_counted(run):
     rows = tuple(
-        replace(row, verdict=Verdict.MISSING_IN_MODEL, computed=-1) if place < 2 else row
+        replace(row, verdict=PairVerdict.MISSING_IN_MODEL, computed=-1) if place < 2 else row
         for place, row in enumerate(run.pairs.rows)
     )
     figure = card(with_results(run, pairs=replace(run.pairs, rows=rows)), "Missing in the model").figure

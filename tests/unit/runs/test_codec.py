@@ -9,7 +9,7 @@ from scipy import sparse
 
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
-from frf_ipz.pairing.pairs import Pair, Pairs, Verdict
+from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import ZeroSet
 from frf_ipz.runs.codec import load_result, save_result
@@ -46,7 +46,7 @@ def test_our_dataclasses_come_back_as_themselves(tmp_path):
         measured_value=-1 + 100j,
         computed_value=-1 + 101j,
         distance=0.01,
-        verdict=Verdict.AMBIGUOUS,
+        verdict=PairVerdict.AMBIGUOUS,
         reason="two are as near",
     )
     pairs = Pairs(rows=(pair,), warnings=("look",))

@@ -11,7 +11,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.numerics.pencils import damped_poles
-from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.show.shapes import REACH, Motion, Shape, draw_shape, mode_shape, operating_shape
 from frf_ipz.structure import Geometry
@@ -48,7 +48,7 @@ def measured_run(model, nominal):
     residues = (shapes * signs[:, None]).T * roots.values[:, None] ** powers
     fit = SimpleNamespace(n_modes=5, labels=LABELS, model=SimpleNamespace(poles=roots.values, residues=residues))
     targets = [
-        SimpleNamespace(kind="pole", measured=k, computed_value=value, verdict=Verdict.PAIRED)
+        SimpleNamespace(kind="pole", measured=k, computed_value=value, verdict=PairVerdict.PAIRED)
         for k, value in enumerate(nominal_roots.values)
     ]
     updated = SimpleNamespace(model=model, nominal=nominal, after=roots.values)

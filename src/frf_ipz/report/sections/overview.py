@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.pairing.pairs import Verdict
+from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
@@ -183,10 +183,10 @@ def _missing_card(run: Results) -> Card:
         figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
     rows = () if run.pairs is None else run.pairs.rows
-    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
-    lacking = counts[Verdict.MISSING_IN_MODEL]
+    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in PairVerdict}
+    lacking = counts[PairVerdict.MISSING_IN_MODEL]
     figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "nothing seen"
-    unsure = counts[Verdict.AMBIGUOUS]
+    unsure = counts[PairVerdict.AMBIGUOUS]
     meaning = "measured without a counterpart" if lacking else "all identifiable poles and zeros are paired"
     meaning += f"; {unsure} are not identifiable" if unsure else ""
     return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.pairing.pairs import Pair, Verdict
+from frf_ipz.pairing.pairs import Pair, PairVerdict
 from frf_ipz.plotting.poles import pair_name
 from frf_ipz.plotting.wording import number, percent
 from frf_ipz.rational import natural_frequency_hz
@@ -34,7 +34,7 @@ def build(run: Results) -> Section | None:
     if run.pairs is None:
         return None
     rows = run.pairs.rows
-    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
+    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in PairVerdict}
     text = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
     lead = f"Poles and zeros of measurement and model: {text}." if text else "There is nothing to pair."
     return Section(
@@ -62,7 +62,7 @@ def _table(run: Results, rows: Sequence[Pair]) -> Table:
             ]
         )
     columns = ("root", "measured, Hz", "model, Hz", "difference", "distance", "verdict", "why")
-    marked = frozenset(np.flatnonzero([row.verdict is not Verdict.PAIRED for row in rows]).tolist())
+    marked = frozenset(np.flatnonzero([row.verdict is not PairVerdict.PAIRED for row in rows]).tolist())
     return Table(caption="Pairs", columns=columns, rows=cells, marked=marked, file="pairs.parquet")
 
 
