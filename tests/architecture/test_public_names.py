@@ -38,6 +38,15 @@ def test_public_name_is_documented(name):
         assert not [parameter for parameter in parameters if parameter not in text.split("Returns\n")[0]]
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_path_may_be_a_text(name):
+    thing = getattr(frf_ipz, name)
+    methods = [method for method_name, method in inspect.getmembers(thing, callable) if method_name[0] != "_"]
+    hints = [getattr(function, "__annotations__", {}) for function in (methods if inspect.isclass(thing) else [thing])]
+    paths = [str(hint) for of_one in hints for argument, hint in of_one.items() if argument != "return"]
+    assert not [hint for hint in paths if "Path" in hint and "str" not in hint]
+
+
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_in_docstrings_hold(name):
     module = importlib.import_module(name)

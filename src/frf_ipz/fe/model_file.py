@@ -5,6 +5,7 @@ from __future__ import annotations
 import pkgutil
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from frf_ipz.errors import FileFormatError, did_you_mean
@@ -14,7 +15,6 @@ from frf_ipz.toml_files import read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from frf_ipz.structure import StructuralModel
 
@@ -75,12 +75,12 @@ class _Head:
     model: ModelSection
 
 
-def read_model(path: Path) -> StructuralModel:
+def read_model(path: str | Path) -> StructuralModel:
     """Read an FE model.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Its ``model.toml``.
 
     Returns
@@ -93,6 +93,7 @@ def read_model(path: Path) -> StructuralModel:
     FileFormatError
         If a file is missing or something in it does not fit: says which file, where, and what to do.
     """
+    path = Path(path)
     kind, file = _read_options(path)
     return kind.read(file, path)
 

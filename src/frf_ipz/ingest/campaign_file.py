@@ -155,12 +155,12 @@ class CampaignFileKeys:
     frf: tuple[FrfKeys, ...] = ()
 
 
-def read_test(path: Path) -> VibrationTest:
+def read_test(path: str | Path) -> VibrationTest:
     """Read a test.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         ``test.toml``.
 
     Returns
@@ -175,7 +175,7 @@ def read_test(path: Path) -> VibrationTest:
     QuantityError
         If a unit is none of its quantity.
     """
-    path = path.resolve()
+    path = Path(path).resolve()
     keys = read_toml(path, CampaignFileKeys, required="test")
     _check_sections(path, keys)
     channels = _read_channels(path, keys)
