@@ -6,10 +6,12 @@ has succeeded. A reader never sees half a file, and a run that fails leaves what
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import json
 import os
 import shutil
+import sys
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
 MANIFEST = "run.json"
 STAGES = "stages"
 STAGING = ".partial-"
+
+# Names of the Windows interface to processes
+SYNCHRONIZE, WAIT_TIMEOUT, ACCESS_DENIED = 0x00100000, 0x102, 5
 
 Result = TypeVar("Result")
 Writers: TypeAlias = "Mapping[str, Callable[[Path], None]]"
@@ -237,18 +242,32 @@ class RunFolder:
         files = sorted(file for file in self.staging.rglob("*") if file.is_file())
         files.sort(key=lambda file: file.name == MANIFEST)
         for file in files:
-            with file.open("rb") as stream:
+            with file.open("r+b") as stream:  # Windows syncs only what is open for writing
                 os.fsync(stream.fileno())
+        self._invalidate_stored_stages()
         for file in files:
-            target = self.path / file.relative_to(self.staging)
-            try:
+            with _reporting_write_errors(self.path / file.relative_to(self.staging)) as target:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 file.replace(target)
-            except OSError as error:
-                raise _cannot_write(target, error) from None
         written = {file for stage in self.manifest.get("stages", {}).values() for file in stage.get("files", [])}
         for name in self.abandoned - written:  # a file that its stage no longer writes would tell of an older result
-            (self.path / Path(name).name).unlink(missing_ok=True)
+            with _reporting_write_errors(self.path / Path(name).name) as target:
+                target.unlink(missing_ok=True)
+
+    def _invalidate_stored_stages(self) -> None:
+        """Drop the keys of stages whose files are about to change, in the `run.json` that is in place.
+
+        Where the files cannot all be moved, because one is open in another program or the process is killed, new
+        results would otherwise stand under old keys.
+        """
+        stored = read_manifest(self.path)
+        outdated = [name for name in self.computed if "key" in stored.get("stages", {}).get(name, {})]
+        for name in outdated:
+            del stored["stages"][name]["key"]
+        if outdated:
+            self.write_text(MANIFEST + ".invalid", json.dumps(stored, indent=1, ensure_ascii=False) + "\n")
+            with _reporting_write_errors(self.path / MANIFEST) as target:
+                (self.staging / (MANIFEST + ".invalid")).replace(target)
 
 
 @contextmanager
@@ -350,6 +369,8 @@ def _sweep(path: Path) -> None:
 
 
 def _is_running(process: int) -> bool:
+    if sys.platform == "win32":  # there, signal 0 is no question but Ctrl-C for all that share the console
+        return _is_running_on_windows(process)
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -359,8 +380,29 @@ def _is_running(process: int) -> bool:
     return True
 
 
+def _is_running_on_windows(process: int) -> bool:
+    kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined,unused-ignore]
+    kernel.OpenProcess.restype = ctypes.c_void_p
+    handle = kernel.OpenProcess(SYNCHRONIZE, 0, process)
+    if not handle:
+        return bool(ctypes.get_last_error() == ACCESS_DENIED)  # type: ignore[attr-defined,unused-ignore]
+    try:
+        return bool(kernel.WaitForSingleObject(ctypes.c_void_p(handle), 0) == WAIT_TIMEOUT)
+    finally:
+        kernel.CloseHandle(ctypes.c_void_p(handle))
+
+
+@contextmanager
+def _reporting_write_errors(path: Path) -> Iterator[Path]:
+    try:
+        yield path
+    except OSError as error:
+        raise _cannot_write(path, error) from None
+
+
 def _cannot_write(path: Path, error: OSError) -> InputError:
     advice = {
+        errno.EACCES: f"{error.strerror}; close it where another program has it open, or choose another --out",
         errno.ENOSPC: "the disk is full; free some space or choose another --out",
         errno.EDQUOT: "the quota is used up; free some space or choose another --out",
     }.get(error.errno or 0, f"{error.strerror}; choose another --out that can be written to")

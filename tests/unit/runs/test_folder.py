@@ -1,10 +1,14 @@
 """A run's folder: everything or nothing, and nothing twice."""
 
+import ctypes
 import errno
 import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -101,6 +105,86 @@ def test_what_a_killed_run_left_is_swept(tmp_path):
         pass
     assert not (tmp_path / f"{STAGING}{dead.pid}").exists()
     assert alive.exists()
+
+
+def test_on_windows_no_signal_is_sent_to_ask_whether_a_process_runs(tmp_path, monkeypatch):
+    """There, signal 0 is Ctrl-C. Process 11 has ended but is still known, 12 runs, 13 is another user's, 14 is none."""
+    handles, closed = {11: 111, 12: 112}, []
+    kernel = SimpleNamespace(
+        OpenProcess=Mock(side_effect=lambda *arguments: handles.get(arguments[2])),
+        WaitForSingleObject=lambda *arguments: 0x102 if arguments[0].value == 112 else 0,
+        CloseHandle=lambda handle: closed.append(handle.value),
+    )
+
+    def last_error():
+        return 5 if kernel.OpenProcess.call_args.args[2] == 13 else 87
+
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(ctypes, "WinDLL", Mock(return_value=kernel), raising=False)
+    monkeypatch.setattr(ctypes, "get_last_error", last_error, raising=False)
+    monkeypatch.delattr(os, "kill")
+    for process in (11, 12, 13, 14):
+        (tmp_path / f"{STAGING}{process}").mkdir()
+    with open_run(tmp_path):
+        pass
+    assert {path.name for path in tmp_path.glob(f"{STAGING}*")} == {f"{STAGING}12", f"{STAGING}13"}
+    assert sorted(closed) == [111, 112]
+
+
+def test_files_are_synced_as_windows_wants_it(tmp_path, monkeypatch):
+    synced = []
+
+    def sync(descriptor):
+        os.write(descriptor, b"")  # fails for what is open for reading only, as does Windows' fsync
+        synced.append(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    assert len(synced) == 3
+
+
+@pytest.fixture
+def open_elsewhere(monkeypatch):
+    """Files that are open in another program, as Windows sees it: nothing can take their place, nor can they go."""
+    held = set()
+    replace, unlink = Path.replace, Path.unlink
+
+    def replace_if_free(self, target):
+        if target in held:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return replace(self, target)
+
+    def unlink_if_free(self, missing_ok=False):
+        if self in held:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        unlink(self, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "replace", replace_if_free)
+    monkeypatch.setattr(Path, "unlink", unlink_if_free)
+    return held
+
+
+def test_a_table_that_is_open_elsewhere_is_said_and_no_new_result_stands_under_an_old_key(tmp_path, open_elsewhere):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    open_elsewhere.add(tmp_path / "fit.txt")
+    with pytest.raises(InputError, match=r"fit\.txt: cannot be written: .*close it"), open_run(tmp_path) as folder:
+        folder.stage("fit", "b", lambda: 2, lambda _: {"a.txt": write_text("2"), "fit.txt": write_text("2")})
+    assert (tmp_path / "a.txt").read_text() == "2"  # it took its place before
+    assert not list(tmp_path.glob(f"{STAGING}*"))
+    open_elsewhere.clear()
+    with open_run(tmp_path) as folder:
+        assert stage(folder, "a", 3) == 3
+    assert (tmp_path / "fit.txt").read_text() == "3"
+
+
+def test_an_abandoned_table_that_is_open_elsewhere_is_said(tmp_path, open_elsewhere):
+    with open_run(tmp_path) as folder:
+        folder.stage("fit", "a", lambda: 1, lambda _: {"more.txt": write_text("1")})
+    open_elsewhere.add(tmp_path / "more.txt")
+    with pytest.raises(InputError, match=r"more\.txt: cannot be written: .*close it"), open_run(tmp_path) as folder:
+        stage(folder, "b", 2)
 
 
 def test_a_full_disk_is_said_in_one_line_and_loses_nothing(tmp_path):
