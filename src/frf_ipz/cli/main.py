@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -145,6 +146,8 @@ def main() -> None:
 
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
+    if isinstance(sys.stdout, TextIOWrapper):  # a console or a pipe may know fewer letters than a user's names have
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         app()
     except FrfIpzError as error:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from io import BytesIO, TextIOWrapper
 
 import pytest
 
@@ -45,3 +46,15 @@ def test_an_error_is_one_line_and_says_by_its_status_whose_it_is(monkeypatch, ca
         main()
     assert stopped.value.code == status
     assert capsys.readouterr().err == f"frf-ipz: {error}\n"
+
+
+def test_a_name_that_the_console_has_no_letters_for_stops_nothing(monkeypatch):
+    narrow = TextIOWrapper(BytesIO(), encoding="cp1252", write_through=True)
+    monkeypatch.setattr(sys, "stdout", narrow)
+    monkeypatch.setattr(sys, "argv", ["frf-ipz", "check", "pipeline.toml"])
+    monkeypatch.setattr("frf_ipz.pipeline.inputs.read_inputs", lambda path: path)
+    monkeypatch.setattr("frf_ipz.pipeline.check.describe_setup", lambda inputs: f"Träger \u6881 of {inputs}")
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert not stopped.value.code
+    assert narrow.buffer.getvalue().decode("cp1252").split() == ["Träger", "\\u6881", "of", "pipeline.toml"]
