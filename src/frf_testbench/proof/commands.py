@@ -68,7 +68,7 @@ def compute_code_digest() -> str:
     root = Path(frf_ipz.__file__).parent
     total = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
-        total.update(str(path.relative_to(root)).encode())
+        total.update(path.relative_to(root).as_posix().encode())
         total.update(path.read_bytes())
     return total.hexdigest()[:16]
 

@@ -74,7 +74,9 @@ def make_sealed_case(order: Order, folders: Folders) -> None:
     unfinished = folders.cases / f".{order.name}"
     shutil.rmtree(unfinished, ignore_errors=True)
     case.write(unfinished, folders.sealed / f"{order.name}.json")
-    unfinished.rename(folders.cases / order.name)
+    case_folder = folders.cases / order.name
+    shutil.rmtree(case_folder, ignore_errors=True)  # of a case whose answer is gone: nothing may stand in the way
+    unfinished.rename(case_folder)
 
 
 def _draw_case(order: Order) -> Case:

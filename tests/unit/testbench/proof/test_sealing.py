@@ -7,6 +7,7 @@ import sys
 import tomllib
 from itertools import pairwise
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -83,6 +84,20 @@ def test_a_case_holds_nothing_of_the_truth(made):
         assert not re.search(rf"(?<!\d){truth['seed']}(?!\d)", words)  # digits of a longer number are none of it
         assert "seed" not in words
     assert not [path for path in folders.cases.rglob("*") if path.is_symlink()]
+
+
+def test_a_case_whose_answer_is_gone_is_made_again_as_it_was(made, tmp_path):
+    folders = Folders.inside(tmp_path)
+    copytree(made[0].root, folders.root, dirs_exist_ok=True)
+    name = plan_cases(COUNTS)[0].name
+    answer = folders.sealed / f"{name}.json"
+    expected = answer.read_bytes()
+    answer.unlink()
+    (folders.cases / name / "test.toml").write_text("half", encoding="utf-8")
+    make_cases(plan_cases(COUNTS), folders, workers=1, step=lambda: None)
+    assert answer.read_bytes() == expected
+    assert (folders.cases / name / "test.toml").read_bytes() == (made[0].cases / name / "test.toml").read_bytes()
+    check_seal(folders, [name])
 
 
 def test_what_is_made_is_not_made_again(made):
