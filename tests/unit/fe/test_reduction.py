@@ -256,6 +256,12 @@ def test_rounding_in_the_matrices_is_noticed(monkeypatch):
         reduce(model, ReduceOptions(modes=4, dofs=tuple(f"{node}:z" for node in (2, 5, 8, 11, 14))))
 
 
+def test_rounding_that_makes_the_mass_matrix_indefinite_is_noticed():
+    # which of the two it is depends on LAPACK
+    with pytest.raises(IllConditionedError, match="not positive definite; use fewer modes"):
+        reduction._require_modes(np.diag([1.0, -1e-9]), np.eye(2), ritz=None)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

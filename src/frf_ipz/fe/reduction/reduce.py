@@ -327,7 +327,13 @@ def _required_rows(model: StructuralModel, rows: IntArray, plan: ReductionPlan, 
 
 def _require_modes(mass: FloatArray, stiffness: FloatArray, ritz: _Ritz) -> None:
     """Check that rounding in the reduced matrices does not change the modes."""
-    eigenvalues = linalg.eigh(stiffness, mass, eigvals_only=True)
+    try:
+        eigenvalues = linalg.eigh(stiffness, mass, eigvals_only=True)
+    except linalg.LinAlgError:
+        raise IllConditionedError(
+            "rounding leaves the reduced mass matrix not positive definite; use fewer modes, "
+            "or DOFs that are farther apart ([reduce] modes, dofs)"
+        ) from None
     elastic = slice(ritz.n_rigid, ritz.n_modes)
     error = np.abs(eigenvalues[elastic] / ritz.eigenvalues[elastic] - 1).max(initial=0.0)
     if error > EIGENVALUE_TOLERANCE:
