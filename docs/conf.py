@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import frf_ipz
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
-
-import frf_ipz
 
 project = "frf_ipz"
 author = "the frf_ipz authors"

@@ -397,6 +397,65 @@ class Diagnosis(Tabulated, Drawn):
         }
 
 
+# Every key of diagnosis.json, as `Diagnosis.to_json` gives it: [] is each entry of a list, * a name of the catalogue.
+_FINDING_KEYS = {
+    "effect": "name in the catalogue",
+    "location": "what applies of `nodes`, `elements`, `springs`, `channels`, `end`, `groups`",
+    "parameters.*": "a text (`kind`), else the four figures that follow",
+    "parameters.*.value": "most probable value, in the unit at the end of the parameter's name",
+    "parameters.*.std": "standard deviation",
+    "parameters.*.ci95": "ends of the 95 % interval",
+    "probability": "probability of this effect, at any location, among all that were tried",
+    "log_evidence_gain": "natural log Bayes factor over the explanation without this effect",
+    "statement": "a sentence",
+    "location_set": "all locations that hold 95 % of the effect's probability, the most probable first",
+    "significant": "false where it was detected and lies within the tolerances",
+}
+_MISFIT_KEYS = {
+    "training": "norm of measured minus model over the norm of measured, on what the model was fitted to",
+    "held_out": "the same on what was held out of the fit",
+    "training_over_noise": "the same norms over what noise and tolerances make one expect",
+    "held_out_over_noise": "the same on what was held out of the fit",
+}
+JSON_KEYS = {
+    "verdict": "`consistent`, `explained` or `unexplained`",
+    "statement": "the verdict in a few sentences",
+    **{f"findings[].{name}": text for name, text in _FINDING_KEYS.items()},
+    "alternatives[]": "other explanations, the most probable first, each with the keys of a finding",
+    "mismatch.frequency_hz": "frequencies at which the nominal model disagrees with the measurement, Hz",
+    "mismatch.where": "which FRFs, bands and DOFs disagree, and by how much",
+    "mismatch.location": "where it sits, with the keys of a finding's location; may be empty",
+    **{f"fit.before.{name}": f"model as it is: {text}" for name, text in _MISFIT_KEYS.items()},
+    "fit.updated_without_findings": "the same four figures of the model with what its tolerances allow",
+    "fit.after": "the same four figures of the model with the findings",
+    "fit.held_out_is": "what was held out of the fit: `records` or `lines`",
+    "ambiguity[].effects": "effects that these data do not tell apart, the most probable first",
+    "ambiguity[].log_bayes_factor": "natural log Bayes factor of the first over the last",
+    "ambiguity[].resolve_by": "the sensor or excitation that would distinguish them",
+    "data_checks[].name": "`homogeneity`, `reciprocity` or `coherence`",
+    "data_checks[].value": "mean squared difference over its expected square; null where it could not be checked",
+    "data_checks[].limit": "what the value stays below where nothing is wrong",
+    "data_checks[].passed": "true where nothing is wrong, or nothing could be checked",
+    "data_checks[].statement": "a sentence",
+    "detectability.*": "smallest detectable size of each effect where it shows best, by parameter",
+    "numbers.log_bayes_factor": "natural log Bayes factor of the best explanation over nothing missing",
+    "numbers.hypotheses": "number of explanations that were tried",
+    "numbers.null_misfit": "mean square of the misfit over noise of the model as its tolerances allow",
+    "numbers.null_nuisance_chi2": "how far that model uses its tolerances: chi squared of the nuisance parameters",
+    "numbers.null_worst_subband": "largest mean square of that misfit in one subband of one FRF",
+    "numbers.misfit": "the same as null_misfit, of the model with the best explanation",
+    "numbers.nuisance_chi2": "the same as null_nuisance_chi2, of the model with the best explanation",
+    "numbers.worst_subband": "the same as null_worst_subband, of the model with the best explanation",
+    "warnings": "what the user has to know",
+    "linear_model.between": "DOFs between which the force law acts; one DOF: against the ground",
+    "linear_model.stiffness_N_m": "spring that stands for the law at the level of the test; only with a force law",
+    "linear_model.damping_Ns_m": "damper that stands for the law at the level of the test",
+    "linear_model.motion_rms_m": "root mean square motion there in each record, ascending",
+    "linear_model.stiffness_at_N_m": "that spring in each of these records alone",
+    "linear_model.damping_at_Ns_m": "that damper in each of these records alone",
+}
+
+
 def _finding_to_json(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,

@@ -37,12 +37,20 @@ class StateSpaceModel(Concise):
 
     Parameters
     ----------
-    A, B, C, D : arrays
-        (n_states, n_states), (n_states, n_inputs), (n_outputs, n_states), (n_outputs, n_inputs), SI units.
+    A : (n_states, n_states) array
+        Dynamics, SI units.
+    B : (n_states, n_inputs) array
+        Inputs, SI units.
+    C : (n_outputs, n_states) array
+        Outputs, SI units.
+    D : (n_outputs, n_inputs) array
+        Feedthrough, SI units.
     dt : float
         Sample time in s; 0 for continuous time.
-    input_names, output_names, state_names : tuple of str
-        Inputs and outputs are DOF labels with the signs of the test.
+    input_names, output_names : tuple of str
+        DOF labels with the signs of the test.
+    state_names : tuple of str
+        Names of the states.
     input_units, output_units : tuple of str
         SI units.
     """

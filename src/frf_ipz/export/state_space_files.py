@@ -27,6 +27,18 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
 
 SUFFIXES = (".json", ".mat")
+REDUCED_MODEL = {  # arrays of updated_model.npz
+    "M": "(r, r) mass matrix, SI",
+    "B": "(r, r) damping matrix, SI",
+    "K": "(r, r) stiffness matrix, SI",
+    "dofs": "(r,) DOF label of each row",
+}
+ENSEMBLE = {  # what is different in the file of an ensemble
+    "A": "(n_states, n_states, n_members), SI units",
+    "B": "(n_states, n_inputs, n_members)",
+    "C": "(n_outputs, n_states, n_members)",
+    "D": "(n_outputs, n_inputs, n_members)",
+}
 UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
 
 
@@ -125,7 +137,10 @@ def write_reduced_model(model: ReducedModel, path: str | Path) -> None:
     """
     names = np.array([dof.name for dof in model.dofs])
     with Path(path).open("wb") as stream:
-        np.savez(stream, M=model.mass, B=model.damping, K=model.stiffness, dofs=names)
+        arrays: dict[str, Any] = dict(
+            zip(REDUCED_MODEL, (model.mass, model.damping, model.stiffness, names), strict=True)
+        )
+        np.savez(stream, **arrays)
 
 
 def write_ensemble(models: Sequence[StateSpaceModel], path: str | Path) -> None:

@@ -43,9 +43,9 @@ class UncertaintyWeights(Concise):
     Parameters
     ----------
     output_names : tuple of str
-        DOF labels.
+        DOF labels of the outputs.
     frequency_hz : (n_lines,) array
-        Hz.
+        Lines on which the errors are given, Hz.
     relative_error : (n_lines, n_outputs) array
         Norm over all inputs of (member minus model) over that of the model: the 95 % quantile over the members.
     numerators, denominators : (n_outputs, 3) array

@@ -20,12 +20,13 @@ Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_as_list), Field(min_lengt
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelSection:
-    """``[model]``.
+    """``[model]``: what it is.
 
     Parameters
     ----------
     kind : str
-        Kind of model; the module of that name in `fe.kinds` reads the rest of the file.
+        Kind of model, which determines the rest of the file: ``beam``, ``lumped``, ``matrices``, or a module that was
+        added to `fe.kinds`.
     name : str
         As the user calls it.
     """
@@ -42,8 +43,10 @@ class RayleighDamping:
 
     Parameters
     ----------
-    alpha_1_s, beta_s : float
-        1/s and s.
+    alpha_1_s : float
+        Factor on the mass matrix.
+    beta_s : float
+        Factor on the stiffness matrix.
     """
 
     __pydantic_config__ = STRICT
@@ -60,7 +63,7 @@ class DampingSection:
     ----------
     modal_ratio : tuple of float
         Damping ratios of the modes that are no rigid-body motion, by ascending frequency; the last one holds for all
-        further modes, so that one number is one ratio for all. May be empty.
+        further modes, so that one number is one ratio for all.
     rayleigh : RayleighDamping, optional
         Damping matrix made of mass and stiffness.
 

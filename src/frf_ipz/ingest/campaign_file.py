@@ -23,18 +23,19 @@ ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestKeys:
-    """The section ``[test]``.
+    """``[test]``: what the test is called, and of which kind it is.
 
     Parameters
     ----------
     name : str
         What the user calls it.
     kind : str
-        ``hammer``, ``random`` or ``frf``.
+        Impacts of a hammer, long records of a shaker, or FRFs that were estimated elsewhere.
     nominal_damping_ratio : float, optional
-        For models that state no damping.
+        Damping ratio of all modes, for models that state no damping.
     unknown_scale : str
-        ``none``, ``common`` or ``per_channel``.
+        Absolute scale that is not known: of no channel, of all together, or of each; such gains are fitted, not
+        diagnosed.
     """
 
     __pydantic_config__ = STRICT
@@ -47,24 +48,24 @@ class TestKeys:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelKeys:
-    """One ``[[channel]]``.
+    """``[[channel]]``: one column of the recordings, and what it measures.
 
     Parameters
     ----------
     column : str
         Header of its column; in files without a header its number, the time being column 1.
     role : str
-        ``input`` or ``output``.
+        The input is the force; there is one.
     quantity : str
-        ``force``, ``acceleration``, ``velocity`` or ``displacement``.
+        What is measured; at a rotation, force stands for the moment, and the others for angular motion.
     unit : str, optional
-        Of the column; not needed where the files have a row of units.
+        Of the column: anything that pint reads. Not needed where the files have a row of units.
     sensitivity : str, optional
-        Instead of the unit.
+        Instead of the unit, for example ``"10.2 mV/g_0"``: the column is then in the numerator's unit.
     dof : str, optional
         Where an output sits; a ``[[hit]]`` or ``[[record]]`` may say otherwise.
     mass_kg : float
-        The sensor's own mass.
+        The sensor's own mass, where it is known: part of the model while the sensor sits there.
     """
 
     __pydantic_config__ = STRICT
@@ -80,12 +81,12 @@ class ChannelKeys:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupKeys:
-    """One ``[[hit]]`` or ``[[record]]``.
+    """``[[hit]]`` of a hammer or ``[[record]]`` of a shaker: one entry for each excited DOF.
 
     Parameters
     ----------
     dof : str
-        Where the force acts.
+        Where the force acts, with its sign.
     files : tuple of str
         Globs, relative to the file or absolute.
     output_dofs : dict of str to str
@@ -101,20 +102,21 @@ class SetupKeys:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrfKeys:
-    """One ``[[frf]]``.
+    """``[[frf]]``: a file of FRFs.
 
     Parameters
     ----------
     file : str
-        Path of the file.
+        Its path.
     quantity : str
-        ``receptance``, ``mobility`` or ``accelerance``.
+        Displacement, velocity or acceleration over force.
     unit : str, optional
         Of the values; SI where it is left out and the file does not say.
     output_dof, input_dof : str, optional
         Needed for a file that does not say what it connects.
     columns : tuple of str
-        What the columns of a text file are.
+        What the columns of a text file with one FRF are: ``frequency_hz``; ``real`` and ``imag``, or ``magnitude`` or
+        ``magnitude_db`` with ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``, ``skip``.
     skip_rows : int
         Lines before the numbers of a text file; further lines of text are skipped without being counted.
     """

@@ -26,8 +26,10 @@ class IngestOptions:
     segment_s : float, optional
         Length of segments under Hann windows (kind ``random``), s; where it is left out, records are used whole or in
         sub-records, and the transients at both ends are removed.
-    keep, drop : tuple of str
-        Files, or ``file#2`` for the second impact in a file, that are used or left out whatever the checks say.
+    keep : tuple of str
+        Files, or ``file#2`` for the second impact in a file, that are used whatever the checks say.
+    drop : tuple of str
+        Files, or ``file#2``, that are left out whatever the checks say.
     hide : tuple of str
         DOFs of sensors whose FRFs are left out, of whatever sign. A known mass of the sensor stays in the model.
     """

@@ -31,6 +31,21 @@ STAGING = ".partial-"
 
 # Names of the Windows interface to processes
 SYNCHRONIZE, WAIT_TIMEOUT, ACCESS_DENIED = 0x00100000, 0x102, 5
+# Every key of run.json; * stands for a name of the user's or the program's.
+JSON_KEYS = {
+    "frf_ipz": "version of frf_ipz",
+    "python": "version of Python",
+    "packages.*": "version of each package that numbers depend on",
+    "when": "start of the run, UTC, ISO 8601",
+    "pipeline": "path of the pipeline file; what was given in Python otherwise",
+    "name": "name of the run",
+    "configuration": "every option of the run, defaults included, by section of pipeline.toml",
+    "inputs.*": "SHA-256 digest of each input file, by its path relative to the pipeline file",
+    "stages.*.key": "digest of everything that the result of the stage depends on",
+    "stages.*.seconds": "computing time, s",
+    "stages.*.files": "files that the stage has written",
+    "stages.*.stale": "true where an earlier stage has been run anew since",
+}
 
 Result = TypeVar("Result")
 Writers: TypeAlias = "Mapping[str, Callable[[Path], None]]"

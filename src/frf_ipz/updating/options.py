@@ -30,9 +30,12 @@ class UpdateOptions:
         Change the damping after the stiffness.
     max_iterations : int, optional
         Largest number of iterations; by default that of the method.
-    alpha, beta, delta : float
-        Regularisation (where the normal matrix is ill-conditioned), step and stop of ``ipz``, eqs. (15), (19) and (20)
-        of [Dorosti2018].
+    alpha : float
+        Regularisation of ``ipz`` where the normal matrix is ill-conditioned, eq. (15) of [Dorosti2018].
+    beta : float
+        Step of ``ipz``, eq. (19).
+    delta : float
+        Stop of ``ipz``, eq. (20).
     delta_damping : float
         Stop of ``ipz`` when it changes the damping.
     cross_sensitivities : bool

@@ -42,7 +42,7 @@ class BeamSection:
     elements : pair of int
         First and last element, both included.
     thickness_m, width_m : float, optional
-        m; by default that of the beam.
+        Of these elements; by default that of the beam.
     """
 
     __pydantic_config__ = STRICT
@@ -60,8 +60,10 @@ class BeamPointMass:
     ----------
     node : int
         Its node.
-    mass_kg, rotary_inertia_kgm2 : float
-        kg and kg m^2.
+    mass_kg : float
+        The mass.
+    rotary_inertia_kgm2 : float
+        Its moment of inertia about y.
     """
 
     __pydantic_config__ = STRICT
@@ -79,8 +81,10 @@ class BeamPointSpring:
     ----------
     node : int
         Its node.
-    stiffness_N_m, rotational_stiffness_Nm_rad : float
-        N/m and N m/rad.
+    stiffness_N_m : float
+        Against its displacement z.
+    rotational_stiffness_Nm_rad : float
+        Against its rotation ry.
     """
 
     __pydantic_config__ = STRICT
@@ -92,18 +96,22 @@ class BeamPointSpring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeamOptions:
-    """``[beam]``.
+    """``[beam]``: a rectangular cross-section that bends about its width.
 
     Parameters
     ----------
-    length_m, width_m, thickness_m : float
-        m; the beam bends about its width.
+    length_m : float
+        Length along x.
+    width_m, thickness_m : float
+        Of the cross-section: its second moment of area is width thickness^3 / 12.
     elements : int
         Elements of equal length; nodes are 1 to elements + 1 from the left.
     formulation : str
         ``timoshenko`` or ``euler-bernoulli``.
-    youngs_modulus_Pa, density_kg_m3, poisson_ratio : float
-        Material. Poisson's ratio matters for Timoshenko only; 0.3 is that of most metals.
+    youngs_modulus_Pa, density_kg_m3 : float
+        Of the material.
+    poisson_ratio : float
+        Of the material; matters for Timoshenko only. 0.3 is that of most metals.
     left, right : str
         Support of an end: ``clamped`` (z, ry), ``pinned`` (z), ``sliding`` (ry) or ``free``.
     section : tuple of BeamSection

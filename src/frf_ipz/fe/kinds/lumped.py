@@ -28,14 +28,14 @@ DIFFERENCE = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LumpedMass:
-    """``[[lumped.mass]]``.
+    """``[[lumped.mass]]``: a node and its mass.
 
     Parameters
     ----------
     node : int
         Its number.
     mass_kg : float
-        kg.
+        Its mass.
     """
 
     __pydantic_config__ = STRICT
@@ -54,8 +54,10 @@ class LumpedSpring:
         Its name.
     nodes : pair of int
         The nodes it joins; 0 is the ground.
-    stiffness_N_m, damping_Ns_m : float
-        N/m and N s/m.
+    stiffness_N_m : float
+        Of the spring.
+    damping_Ns_m : float
+        Of the damper.
     """
 
     __pydantic_config__ = STRICT
@@ -68,7 +70,7 @@ class LumpedSpring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LumpedOptions:
-    """``[lumped]``.
+    """``[lumped]``: nodes that move in one direction.
 
     Parameters
     ----------

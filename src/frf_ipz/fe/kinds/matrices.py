@@ -53,18 +53,18 @@ class MatrixGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatricesOptions:
-    """``[matrices]``.
+    """``[matrices]``: files with the matrices and with what their rows are.
 
     Parameters
     ----------
     mass, stiffness : str
-        Matrix Market files.
+        Matrix Market file.
     dofs : str
         CSV file that names the rows.
     damping : str, optional
         Matrix Market file of viscous damping.
     group : tuple of MatrixGroup
-        Additive parts.
+        Additive parts of the matrices, which may be softer, stiffer, lighter or heavier than they should be.
     """
 
     __pydantic_config__ = STRICT
