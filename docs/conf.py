@@ -27,7 +27,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "generated_reference",
 ]
-exclude_patterns = ["_build", "gallery/README.rst"]
+exclude_patterns = ["_build", "_templates", "gallery/README.rst", "reference/generated"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

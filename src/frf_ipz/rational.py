@@ -84,12 +84,12 @@ class PoleResidueModel(Concise):
 
     @property
     def natural_frequency_hz(self) -> FloatArray:
-        """|p| / 2 pi."""
+        """``|p| / 2 pi``."""
         return natural_frequency_hz(self.poles)
 
     @property
     def damping_ratio(self) -> FloatArray:
-        """-Re p / |p|."""
+        """``-Re p / |p|``."""
         return damping_ratio(self.poles)
 
 
@@ -143,7 +143,7 @@ def partial_fractions(s: ComplexArray, poles: ComplexArray) -> ComplexArray:
 
 
 def natural_frequency_hz(poles: ComplexArray) -> FloatArray:
-    """Undamped natural frequency of poles, |p| / 2 pi.
+    """Undamped natural frequency of poles, ``|p| / 2 pi``.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def natural_frequency_hz(poles: ComplexArray) -> FloatArray:
 
 
 def damping_ratio(poles: ComplexArray) -> FloatArray:
-    """Damping ratio of poles, -Re p / |p|.
+    """Damping ratio of poles, ``-Re p / |p|``.
 
     Parameters
     ----------
