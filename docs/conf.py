@@ -41,6 +41,7 @@ intersphinx_mapping: dict[str, tuple[str, None]] = {}  # no page of others is fe
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"frf_ipz {release}"
+templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["frf_ipz.css"]
 html_show_sourcelink = False
