@@ -3,9 +3,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 PARALLEL := -n auto --dist loadfile
+LOCK := $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	--custom-compile-command "make lock" pyproject.toml
 
-.PHONY: help demo test slow check docs bench proof clean
+.PHONY: help demo test slow check docs bench proof lock clean
 
 help:
 	@echo "make demo    run the cantilever in pipelines/ and show what came out (results/cantilever)"
@@ -15,24 +18,26 @@ help:
 	@echo "make docs    the documentation into docs/_build/html; warnings are errors"
 	@echo "make bench   speed against peers and physical limits"
 	@echo "make proof   blind cases: made, diagnosed, then opened and scored"
+	@echo "make lock    newest versions within the ranges of pyproject.toml into requirements/"
 	@echo "make clean   remove .venv, results and what the documentation is built into"
 
-.venv/run: pyproject.toml
+.venv/run: pyproject.toml requirements/run.txt
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Python 3.11 or later is needed')"
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(PIP) --require-hashes -r requirements/run.txt
+	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
-.venv/test: .venv/run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test]"
+.venv/test: .venv/run requirements/test.txt
+	$(PIP) --require-hashes -r requirements/test.txt
+	@touch $@
+
+.venv/docs: .venv/run requirements/docs.txt
+	$(PIP) --require-hashes -r requirements/docs.txt
 	@touch $@
 
 .venv/peers: .venv/test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,peers]"
-	@touch $@
-
-.venv/docs: .venv/run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
+	$(PIP) --no-build-isolation -e ".[peers]"
 	@touch $@
 
 demo: .venv/run
@@ -55,6 +60,12 @@ bench: .venv/peers
 
 proof: .venv/run
 	$(BIN)/frf-testbench prove
+
+lock: .venv/run
+	$(PIP) "uv>=0.6"
+	$(LOCK) --group build -o requirements/run.txt
+	$(LOCK) --group build --extra test -c requirements/run.txt -o requirements/test.txt
+	$(LOCK) --group build --extra docs -c requirements/test.txt -o requirements/docs.txt
 
 clean:
 	rm -rf .venv results docs/_build docs/auto_gallery docs/reference/api docs/reference/generated
