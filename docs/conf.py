@@ -21,11 +21,11 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.intersphinx",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "generated_reference",
+    "mathml",
 ]
 exclude_patterns = ["_build", "_templates", "gallery/README.rst", "reference/generated"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
@@ -40,6 +40,7 @@ numpydoc_xref_param_type = False
 intersphinx_mapping: dict[str, tuple[str, None]] = {}  # no page of others is fetched: the documentation builds offline
 
 html_theme = "pydata_sphinx_theme"
+html_math_renderer = "mathml"
 html_title = f"frf_ipz {release}"
 templates_path = ["_templates"]
 html_static_path = ["_static"]
@@ -55,7 +56,6 @@ html_theme_options = {
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
-# MathJax is fetched by browsers only where there is a formula to show; the text of it stands there without, too.
 
 sphinx_gallery_conf = {
     "examples_dirs": str(HERE / "gallery"),
