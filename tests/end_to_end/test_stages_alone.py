@@ -2,10 +2,10 @@
 
 import json
 import sys
-from html import escape
 
 import numpy as np
 import pytest
+from markupsafe import escape
 
 from frf_ipz.cli import main as command
 from frf_ipz.export.state_space_files import read_ensemble, read_state_space, read_uncertainty_weights
