@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frf_ipz.progress import Progress
 
 app = typer.Typer(
     help="What frf_ipz is judged by: simulated machines with sealed answers, and structures that are known.",
@@ -111,6 +117,46 @@ def updating(
     from frf_testbench.updating.study import COUNT, FIRST_SEED, print_study
 
     print_study(FIRST_SEED if first_seed is None else first_seed, COUNT if count is None else count)
+
+
+@app.command()
+def study(
+    name: Annotated[
+        str, typer.Argument(help="beam_physics, cantilever_masses, double_beam_ringdown, left_out, silverbox.")
+    ],
+    folder: Annotated[Path, typer.Argument(help="Folder of its recordings, which are not part of the repository.")],
+) -> None:
+    """Say what frf_ipz finds in measurements by others, as tables."""
+    from frf_ipz.errors import FrfIpzError
+    from frf_testbench.studies.recordings import StudyError
+    from frf_testbench.studies.run import run_study
+
+    try:
+        with _progress_bar() as progress:
+            tables = run_study(name, folder, progress=progress)
+    except (StudyError, FrfIpzError) as error:
+        print(f"frf-testbench: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    for title, table in tables.items():
+        print(f"{title}\n{table.to_string(float_format='{:.4g}'.format)}\n")
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Progress]:
+    """Show how far the work is, where there is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def show(fraction: float, text: str) -> None:
+            bar.update(task, completed=fraction, description=text[:60].ljust(60))
+
+        yield show
 
 
 @app.command()

@@ -2,15 +2,12 @@
 
 import numpy as np
 
-import frf_ipz
-from real_beams import leave_out
+from frf_testbench.studies.left_out import predict_left_out, read_beam
 
 
 def test_the_fourth_sensor_of_a_steel_beam_is_predicted(recordings):
     """The beam's ends are bent, which its model does not know: frequencies are a quarter off to begin with."""
-    folder = recordings / "steel_beam_5x3"
-    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(folder / "test.toml"), options=frf_ipz.IngestOptions()).frfs
-    table = leave_out(frfs, frf_ipz.read_model(folder / "model.toml"), (20.0, 600.0), "output", 70)
+    table = predict_left_out(read_beam(recordings / "steel_beam_5x3"), 70)
     updated, trivial = table.loc["updated"], table.loc["measured poles, nominal shapes"]
     assert table.loc["nominal", "X_S"] < 0.05
     assert updated["X_S"] > 0.8

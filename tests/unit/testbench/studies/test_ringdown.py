@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from frf_ipz.errors import InputError
-from frf_testbench.ringdown import fit_amplitude_law, name_family, track_ringdown
+from frf_testbench.studies.ringdown import fit_amplitude_law, name_family, track_ringdown
 
 FREQUENCY_HZ, RATIO = 10.0, 0.002
 OMEGA = 2 * np.pi * FREQUENCY_HZ

@@ -1,0 +1,1 @@
+"""What frf_ipz does on measurements by others, whose recordings are not part of the repository."""

@@ -1,0 +1,136 @@
+"""Predict what was left out of real measurements, and compare.
+
+``frf-testbench study left_out FOLDER`` leaves out each sensor of the steel beam in turn, or each struck point of the
+free beam: its FRFs are kept from the fit and the update, and predicted. Scales of real channels are rarely known, so
+X_A and dB are given after one real factor for what was left out, which is stated; X_S needs none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+import frf_ipz
+from frf_ipz.progress import silent
+from frf_testbench.studies.recordings import require_recordings
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.progress import Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeamTest:
+    """A measured beam with its model.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        What was measured.
+    fe_model : StructuralModel
+        The beam as drawn.
+    band_hz : pair of float
+        Where the measurement is good.
+    side : str
+        What is left out: ``output`` for sensors, ``input`` for struck points.
+    """
+
+    frfs: frf_ipz.FrfSet
+    fe_model: frf_ipz.StructuralModel
+    band_hz: tuple[float, float]
+    side: str
+
+    def dof(self, label: frf_ipz.FrfLabel) -> frf_ipz.Dof:
+        """DOF of the side that is left out."""
+        return label.output_dof if self.side == "output" else label.input_dof
+
+
+BANDS_AND_SIDES = {"steel_beam_5x3": ((20.0, 600.0), "output"), "freefree_beam": ((50.0, 1000.0), "input")}
+
+
+def read_beam(folder: Path) -> BeamTest:
+    """Read one of both beams; `StudyError` where the folder does not hold one."""
+    band_hz, side = BANDS_AND_SIDES[require_recordings(folder, *BANDS_AND_SIDES)]
+    frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(folder / "test.toml")).frfs
+    return BeamTest(frfs=frfs, fe_model=frf_ipz.read_model(folder / "model.toml"), band_hz=band_hz, side=side)
+
+
+def study_left_out(folder: Path, *, progress: Progress = silent) -> dict[str, pd.DataFrame]:
+    """Leave out every sensor or struck point of a beam in turn.
+
+    Parameters
+    ----------
+    folder : Path
+        ``steel_beam_5x3`` or ``freefree_beam``.
+    progress : Progress
+        Receives the progress.
+
+    Returns
+    -------
+    dict of str to DataFrame
+        How well each was predicted, one row a node and model.
+
+    Raises
+    ------
+    StudyError
+        If the folder does not hold the recordings.
+    """
+    beam = read_beam(folder)
+    nodes = sorted({beam.dof(label).node for label in beam.frfs.labels})
+    tables = {}
+    for number, node in enumerate(nodes):
+        progress(number / len(nodes), f"predicting node {node} from the others")
+        tables[node] = predict_left_out(beam, node)
+    return {f"FRFs with their {beam.side} at a node, predicted from all others": pd.concat(tables, names=["node"])}
+
+
+def predict_left_out(beam: BeamTest, node: int) -> pd.DataFrame:
+    """Predict the FRFs of one node from all others.
+
+    Parameters
+    ----------
+    beam : BeamTest
+        Measurement and model.
+    node : int
+        A sensor or a struck point.
+
+    Returns
+    -------
+    DataFrame
+        One row a model: X_S, factor, X_A, dB, status of the update, and number of its targets.
+    """
+    at_node = [beam.dof(label).node == node for label in beam.frfs.labels]
+    left_out = beam.frfs.select_frfs(np.flatnonzero(at_node).tolist())
+    left_out = left_out.select_lines(left_out.in_band(beam.band_hz))
+    remaining = beam.frfs.select_frfs(np.flatnonzero(~np.array(at_node)).tolist())
+    fit = frf_ipz.fit_modes(remaining, options=frf_ipz.FitOptions(band_hz=beam.band_hz))
+    reduced_model = frf_ipz.reduce_model(fit, beam.fe_model, points=[beam.dof(left_out.labels[0])])
+    pairs = frf_ipz.pair_roots(fit, reduced_model)
+    updated = frf_ipz.update_model(fit, reduced_model, pairs=pairs, fe_model=beam.fe_model)
+    models = {
+        "nominal": reduced_model,
+        "measured poles, nominal shapes": frf_ipz.shift_to_measured_poles(pairs, reduced_model),
+        "updated": updated.model,
+    }
+    rows = {
+        name: assess_agreement(left_out.values, frf_ipz.compute_frfs(model, left_out.labels, left_out.s))
+        for name, model in models.items()
+    }
+    return pd.DataFrame(rows).T.rename_axis("model").assign(status=updated.status.name, targets=len(pairs.targets))
+
+
+def assess_agreement(measured: ComplexArray, predicted: ComplexArray) -> dict[str, float]:
+    """Medians over the FRFs that were left out."""
+    factor = float(np.vdot(predicted, measured).real / np.vdot(predicted, predicted).real)
+    unscaled, scaled = (frf_ipz.compare_frfs(measured, scale * predicted) for scale in (1.0, factor))
+    return {
+        "X_S": float(np.median(unscaled.shape)),
+        "factor": factor,
+        "X_A": float(np.median(scaled.amplitude)),
+        "dB": float(np.median(scaled.median_db)),
+    }
