@@ -1,0 +1,125 @@
+"""The tutorial's commands and Python lines run as they stand, and print what its pages say."""
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BLOCK = re.compile(r"```(?P<language>sh|python)\n(?P<code>.*?)```\n(?:```text\n(?P<output>.*?)```\n)?", re.DOTALL)
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+TIMES = re.compile(r"  \([\d.]+ s of computing\)")
+TOLERANCE = 0.02  # of numbers that are rounded on the page
+
+
+def page(name):
+    return (ROOT / "docs" / "tutorial" / f"{name}.md").read_text(encoding="utf-8")
+
+
+def toml_blocks(name):
+    return re.findall(r"```toml\n(.*?)```", page(name), re.DOTALL)
+
+
+def run_commands(code):
+    """Run the lines of a shell; what they print."""
+    command = code.replace("frf-ipz", f"'{sys.executable}' -m frf_ipz.cli.main")
+    environment = os.environ | {"COLUMNS": "1000", "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(["sh", "-ec", command], capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def run_python(code, names):
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, "tutorial", "exec"), names)
+    return printed.getvalue()
+
+
+def run_page(name, after=()):
+    """Run the blocks of a page; after some of them what the reader is told to do. Expected and printed texts."""
+    steps, names, texts = dict(after), {}, []
+    for number, block in enumerate(BLOCK.finditer(page(name))):
+        code = block["code"]
+        printed = run_commands(code) if block["language"] == "sh" else run_python(code, names)
+        if block["output"] is not None:
+            texts.append((block["output"], TIMES.sub("", printed)))
+        if number in steps:
+            steps[number]()
+    return texts
+
+
+def assert_same(expected, printed):
+    """Words are equal; numbers are, but for the last digits that another machine may round otherwise."""
+    assert NUMBER.sub("#", expected).split() == NUMBER.sub("#", printed).split()
+    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (expected, printed)]
+    assert numbers[0] == pytest.approx(numbers[1], rel=TOLERANCE, abs=1e-6)
+
+
+def correct_settings():
+    """What the page tells the reader to write, after `init`."""
+    sensor, pipeline = toml_blocks("campaign")
+    test = Path("beam/test.toml")
+    text = test.read_text(encoding="utf-8")
+    assert text.count('\ndof = "1:+z" ') == 1
+    test.write_text(text.replace('\ndof = "1:+z" ', f"\n{sensor.strip()} "), encoding="utf-8")
+    Path("beam/pipeline.toml").write_text(pipeline, encoding="utf-8")
+
+
+def state_damping():
+    """What the page tells the reader to write, after the first diagnosis."""
+    damping = toml_blocks("diagnosis")[0].strip()
+    model = Path("beam/model.toml")
+    text = model.read_text(encoding="utf-8")
+    assert text.count("modal_ratio = 0.001") == 1
+    model.write_text(text.replace("modal_ratio = 0.001", damping), encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory):
+    """A folder with the data of the repository, where the campaign was set up and run; with what that printed."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    shutil.copytree(ROOT / "data", folder / "data")
+    with contextlib.chdir(folder):
+        texts = run_page("campaign", {1: correct_settings})
+    return folder, texts
+
+
+def test_campaign(repository):
+    _, texts = repository
+    assert len(texts) == 3
+    for expected, printed in texts:
+        assert_same(expected, printed)
+
+
+@pytest.mark.parametrize(("name", "count"), [("report", 1), ("python", 7)])
+def test_page(repository, name, count):
+    folder, _ = repository
+    with contextlib.chdir(folder):
+        texts = run_page(name)
+    assert len(texts) == count
+    for expected, printed in texts:
+        assert_same(expected, printed)
+
+
+@pytest.mark.slow
+def test_diagnosis(repository):
+    folder, _ = repository
+    with contextlib.chdir(folder):
+        texts = run_page("diagnosis", {0: state_damping})
+    assert len(texts) == 3
+    for expected, printed in texts:
+        assert_same(expected, printed)
+
+
+def test_a_wrong_number_or_word_is_seen():
+    assert_same("4 modes: 16.25 Hz", "4 modes:  16.251 Hz\n")
+    for wrong in ("5 modes: 16.25 Hz", "4 modes: 17.25 Hz", "4 poles: 16.25 Hz"):
+        with pytest.raises(AssertionError):
+            assert_same("4 modes: 16.25 Hz", wrong)
