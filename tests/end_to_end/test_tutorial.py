@@ -1,21 +1,15 @@
 """The tutorial's commands and Python lines run as they stand, and print what its pages say."""
 
 import contextlib
-import io
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from page_blocks import assert_same, run_page
+
 ROOT = Path(__file__).parents[2]
-BLOCK = re.compile(r"```(?P<language>sh|python)\n(?P<code>.*?)```\n(?:```text\n(?P<output>.*?)```\n)?", re.DOTALL)
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-TIMES = re.compile(r"  \([\d.]+ s of computing\)")
-TOLERANCE = 0.02  # of numbers that are rounded on the page
 
 
 def page(name):
@@ -24,42 +18,6 @@ def page(name):
 
 def toml_blocks(name):
     return re.findall(r"```toml\n(.*?)```", page(name), re.DOTALL)
-
-
-def run_commands(code):
-    """Run the lines of a shell; what they print."""
-    command = code.replace("frf-ipz", f"'{sys.executable}' -m frf_ipz.cli.main")
-    environment = os.environ | {"COLUMNS": "1000", "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(["sh", "-ec", command], capture_output=True, text=True, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def run_python(code, names):
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(code, "tutorial", "exec"), names)
-    return printed.getvalue()
-
-
-def run_page(name, after=()):
-    """Run the blocks of a page; after some of them what the reader is told to do. Expected and printed texts."""
-    steps, names, texts = dict(after), {}, []
-    for number, block in enumerate(BLOCK.finditer(page(name))):
-        code = block["code"]
-        printed = run_commands(code) if block["language"] == "sh" else run_python(code, names)
-        if block["output"] is not None:
-            texts.append((block["output"], TIMES.sub("", printed)))
-        if number in steps:
-            steps[number]()
-    return texts
-
-
-def assert_same(expected, printed):
-    """Words are equal; numbers are, but for the last digits that another machine may round otherwise."""
-    assert NUMBER.sub("#", expected).split() == NUMBER.sub("#", printed).split()
-    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (expected, printed)]
-    assert numbers[0] == pytest.approx(numbers[1], rel=TOLERANCE, abs=1e-6)
 
 
 def correct_settings():
@@ -87,7 +45,7 @@ def repository(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tutorial")
     shutil.copytree(ROOT / "data", folder / "data")
     with contextlib.chdir(folder):
-        texts = run_page("campaign", {1: correct_settings})
+        texts = run_page(page("campaign"), {1: correct_settings})
     return folder, texts
 
 
@@ -102,7 +60,7 @@ def test_campaign(repository):
 def test_page(repository, name, count):
     folder, _ = repository
     with contextlib.chdir(folder):
-        texts = run_page(name)
+        texts = run_page(page(name))
     assert len(texts) == count
     for expected, printed in texts:
         assert_same(expected, printed)
@@ -112,7 +70,7 @@ def test_page(repository, name, count):
 def test_diagnosis(repository):
     folder, _ = repository
     with contextlib.chdir(folder):
-        texts = run_page("diagnosis", {0: state_damping})
+        texts = run_page(page("diagnosis"), {0: state_damping})
     assert len(texts) == 3
     for expected, printed in texts:
         assert_same(expected, printed)
