@@ -7,7 +7,6 @@ of one thread (set OPENBLAS_NUM_THREADS=1), ours and the peers' in the same run.
 import contextlib
 import importlib.util
 import io
-import resource
 import time
 
 import numpy as np
@@ -71,6 +70,7 @@ def sdypy_seconds(truth, order, *, select):
 @pytest.mark.filterwarnings("ignore")  # of the peer
 @pytest.mark.parametrize("name", ["b", "c"])
 def test_against_sdypy(benchmark, truth_sets, name):
+    resource = pytest.importorskip("resource", reason="Windows does not tell the peak of a process's memory so")
     truth = truth_sets[name]
     frfs = of_bench(truth)
     peer = sdypy_seconds(truth, ORDERS[name], select=False)
