@@ -9,24 +9,27 @@ variables separate, SIAM J. Numerical Analysis 10, 1973, 413-432, doi:10.1137/07
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import CompressedSystem, compress
 from frf_ipz.identification.measured_lines import WeightedLines
+from frf_ipz.numerics.levenberg_marquardt import LeastSquaresStatus, LevenbergMarquardt, NormalEquations, minimise
 from frf_ipz.rational import damping_ratio
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
 
 MAX_ITERATIONS = 30
-SMALL_GAIN = 0.02  # of minus twice the log likelihood: less is no gain that data could show
+SETTINGS = LevenbergMarquardt(
+    steps=MAX_ITERATIONS,
+    initial_damping=1e-4,
+    predicted_decrease=0.02,  # of minus twice the log likelihood: less is no gain that data could show
+)
 MAX_STEP = 0.7  # of a pole's distance from the imaginary axis, or of a line where that is larger
-FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-4, 1e-10, 1e8  # of the step, by the diagonal of the information
 MAX_RATIO = 0.4  # damping ratio above which a pole is no mode but background
 MERGED = 0.02  # of the distance from the axis: two poles closer than this are one
 POLE_BAND = (0.7, 1.1)  # of the edges of the band: how far a pole may leave it
@@ -78,59 +81,63 @@ def refine_poles(
     terms : SmoothTerms
         Terms for modes out of band.
     iterations : int
-        Largest number of steps.
+        Largest number of steps, those that are rejected included.
 
     Returns
     -------
     RefinedPoles
         The optimum.
     """
-    line = float(np.median(np.diff(data.s.imag)))
-    band = float(data.s.imag[0]), float(data.s.imag[-1])
-    discarded: list[complex] = []
-    system, poles = _compress_valid(data, poles, terms, band, discarded)
-    damping, count, has_converged = FIRST_DAMPING, 0, False
-    information, gradient = normal_equations(system)
-    while count < iterations and len(system.poles):
-        count += 1
-        step, gain = _damped_step(information, gradient, damping)
-        if gain < SMALL_GAIN:
-            has_converged = True
-            break
-        trial = compress(data, _stepped_poles(system.poles, step, line), terms)
-        if np.sum(trial.misfit) > np.sum(system.misfit):
-            damping *= 10
-            if damping > MAX_DAMPING:
-                break
-            continue
-        damping = max(damping / 10, MIN_DAMPING)
-        system = trial
-        if _is_invalid(system.poles, band).any():
-            system, _ = _compress_valid(data, system.poles, terms, band, discarded)
-        information, gradient = normal_equations(system)
+    refinement = _Refinement(
+        data=data,
+        terms=terms,
+        line=float(np.median(np.diff(data.s.imag))),
+        band=(float(data.s.imag[0]), float(data.s.imag[-1])),
+        discarded=[],
+    )
+    settings = replace(SETTINGS, steps=iterations, trials=iterations)
+    optimum = minimise(refinement, refinement.compress_valid(poles), settings, revise=refinement.discard_invalid)
     return RefinedPoles(
-        system=system, information=information, discarded=np.array(discarded, complex), has_converged=has_converged
+        system=optimum.point,
+        information=optimum.linearise().matrix,
+        discarded=np.array(refinement.discarded, complex),
+        has_converged=optimum.status is LeastSquaresStatus.CONVERGED,
     )
 
 
-def normal_equations(system: CompressedSystem) -> tuple[FloatArray, FloatArray]:
-    """Information and gradient of the poles, residues eliminated.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Refinement:
+    """What is minimised over the poles; those that are no modes are discarded on the way."""
 
-    Parameters
-    ----------
-    system : CompressedSystem
-        The data around the poles.
+    data: WeightedLines
+    terms: SmoothTerms
+    line: float
+    band: tuple[float, float]
+    discarded: list[complex]
 
-    Returns
-    -------
-    information : (2 n_poles, 2 n_poles) array
-        Of all real parts, then all imaginary parts, (s/rad)^2.
-    gradient : (2 n_poles,) array
-        Of the log likelihood, s/rad.
-    """
-    jacobian = pole_jacobian(system)
-    flat = jacobian.reshape(jacobian.shape[0] * jacobian.shape[1], jacobian.shape[2])
-    return flat.T @ flat, flat.T @ system.z[:, system.n_linear :].ravel()
+    def cost(self, system: CompressedSystem) -> float:
+        """Sum the weighted squares."""
+        return float(np.sum(system.misfit))
+
+    def linearise(self, system: CompressedSystem) -> NormalEquations:
+        """Give information and gradient of the poles, residues eliminated: all real parts, then all imaginary parts."""
+        jacobian = pole_jacobian(system)
+        flat = jacobian.reshape(jacobian.shape[0] * jacobian.shape[1], jacobian.shape[2])
+        return NormalEquations(matrix=flat.T @ flat, right=flat.T @ system.z[:, system.n_linear :].ravel())
+
+    def move(self, system: CompressedSystem, _equations: NormalEquations, step: FloatArray) -> CompressedSystem:
+        """Compress the data around the poles that a step leads to."""
+        return compress(self.data, _stepped_poles(system.poles, step, self.line), self.terms)
+
+    def discard_invalid(self, system: CompressedSystem) -> CompressedSystem:
+        """Drop the poles that are no modes, if there are any."""
+        return self.compress_valid(system.poles) if _is_invalid(system.poles, self.band).any() else system
+
+    def compress_valid(self, poles: ComplexArray) -> CompressedSystem:
+        """Compress the data around the poles that may be modes."""
+        invalid = _is_invalid(poles, self.band)
+        self.discarded.extend(poles[invalid].tolist())
+        return compress(self.data, poles[~invalid], self.terms)
 
 
 def pole_jacobian(system: CompressedSystem) -> FloatArray:
@@ -154,14 +161,6 @@ def pole_jacobian(system: CompressedSystem) -> FloatArray:
     return np.concatenate([real * a + imag * b, imag * a - real * b], axis=2)
 
 
-def _damped_step(information: FloatArray, gradient: FloatArray, damping: float) -> tuple[FloatArray, float]:
-    scale = np.sqrt(np.diag(information))
-    scale = np.where(scale > 0, scale, 1.0)
-    matrix = information / np.outer(scale, scale) + damping * np.eye(len(scale))
-    step = linalg.solve(matrix, gradient / scale, assume_a="sym", check_finite=False) / scale
-    return step, float(2 * step @ gradient - step @ information @ step)
-
-
 def _stepped_poles(poles: ComplexArray, step: FloatArray, line: float) -> ComplexArray:
     n = len(poles)
     change = step[:n] + 1j * step[n:]
@@ -179,11 +178,3 @@ def _is_invalid(poles: ComplexArray, band: tuple[float, float]) -> BoolArray:
     distance = np.abs(poles[:, None] - poles)
     closest = np.where(np.tri(len(poles), dtype=bool), np.inf, distance).min(axis=1, initial=np.inf)
     return np.asarray(outside | (damping_ratio(poles) > MAX_RATIO) | (closest < MERGED * -poles.real))
-
-
-def _compress_valid(
-    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, band: tuple[float, float], discarded: list[complex]
-) -> tuple[CompressedSystem, ComplexArray]:
-    invalid = _is_invalid(poles, band)
-    discarded.extend(poles[invalid].tolist())
-    return compress(data, poles[~invalid], terms), poles[~invalid]
