@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from frf_ipz.errors import InputError
@@ -69,6 +70,36 @@ def as_dof(dof: Dof | str) -> Dof:
     return dof if isinstance(dof, Dof) else parse_dof(dof)
 
 
+def as_dofs(dofs: Sequence[Dof | str], *, name: str = "points") -> tuple[Dof, ...]:
+    """Take some DOFs, or read their labels.
+
+    Parameters
+    ----------
+    dofs : sequence of Dof or str
+        DOFs, or labels such as ``18:+z``.
+    name : str
+        What they are, for the message.
+
+    Returns
+    -------
+    tuple of Dof
+        The DOFs.
+
+    Raises
+    ------
+    InputError
+        If it is no sequence, or a text in it is no label.
+
+    Examples
+    --------
+    >>> [dof.name for dof in as_dofs(["18:z", Dof(20, "z")])]
+    ['18:z', '20:z']
+    """
+    if isinstance(dofs, str | Dof) or not isinstance(dofs, Iterable):
+        raise InputError(f"{name} = {dofs!r} is no list of DOFs; give one such as ['18:+z']")
+    return tuple(as_dof(dof) for dof in dofs)
+
+
 def parse_dof(text: str) -> Dof:
     """Read a label such as ``18:+z``, ``20:-z`` or ``7:rz``.
 
@@ -92,7 +123,7 @@ def parse_dof(text: str) -> Dof:
     >>> str(parse_dof("18:z"))
     '18:+z'
     """
-    match = _LABEL.match(text)
+    match = _LABEL.match(text) if isinstance(text, str) else None
     if match is None:
         raise InputError(f"'{text}' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'")
     node, sign, direction = match.groups()

@@ -13,6 +13,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dof
+from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
 from frf_ipz.export.realization import condense_high_modes, discretise, modal_form, to_first_order, with_delays
@@ -250,28 +251,36 @@ def to_control(model: StateSpaceModel) -> control.StateSpace:
 
 
 def from_control(system: control.StateSpace) -> StateSpaceModel:
-    """Take a state space of python-control, with its names.
+    """Take a state space of python-control, which knows no units.
 
     Parameters
     ----------
     system : control.StateSpace
-        Continuous, or sampled at a stated time.
+        The state space.
 
     Returns
     -------
     StateSpaceModel
-        Without units, which python-control does not keep.
+        With the names of inputs, outputs and states; its units are empty.
+
+    Raises
+    ------
+    InputError
+        If it is no state space.
     """
-    arrays = {name: np.array(getattr(system, name), float) for name in ARRAYS}
-    return StateSpaceModel(
-        **arrays,
-        dt=float(system.dt or 0.0),
-        input_names=tuple(system.input_labels),
-        output_names=tuple(system.output_labels),
-        state_names=tuple(system.state_labels),
-        input_units=("",) * system.ninputs,
-        output_units=("",) * system.noutputs,
-    )
+    try:
+        arrays = {name: np.array(getattr(system, name), float) for name in ARRAYS}
+        return StateSpaceModel(
+            **arrays,
+            dt=float(system.dt or 0.0),
+            input_names=tuple(system.input_labels),
+            output_names=tuple(system.output_labels),
+            state_names=tuple(system.state_labels),
+            input_units=("",) * system.ninputs,
+            output_units=("",) * system.noutputs,
+        )
+    except (AttributeError, TypeError, ValueError):
+        raise InputError(f"a state space is needed, as to_state_space gives it; given is {system!r:.60}") from None
 
 
 def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:

@@ -7,6 +7,7 @@ weight of every output. Nothing is lost on the way: what is read equals what was
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,19 +16,19 @@ import numpy as np
 from scipy.io import loadmat, savemat
 from scipy.io.matlab import MatReadError
 
+from frf_ipz.arguments import require_file
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import control
 
     from frf_ipz.structure import ReducedModel
 
-SUFFIXES = (".json", ".mat")
-REDUCED_MODEL = {  # arrays of updated_model.npz
+SUFFIREDUCED_MODEL = {  # arrays of updated_model.npz
     "M": "(r, r) mass matrix, SI",
     "B": "(r, r) damping matrix, SI",
     "K": "(r, r) stiffness matrix, SI",
@@ -39,11 +40,12 @@ ENSEMBLE = {  # what is different in the file of an ensemble
     "C": "(n_outputs, n_states, n_members)",
     "D": "(n_outputs, n_inputs, n_members)",
 }
-UNREADABLE = (MatReadError, NotImplementedError)  # no MATLAB file, or one of version 7.3
+UNREADABLE = (MatReadError, NotImplementedError, OSError)  # no MATLAB file, or one of version 7.3
 
 
 def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | Path) -> None:
-    """Write a state space as JSON or for MATLAB.
+ES = (".json", ".mat")
+X    """Write a state space as JSON or for MATLAB.
 
     Parameters
     ----------
@@ -55,17 +57,17 @@ def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | 
     Raises
     ------
     InputError
-        If it ends in something else.
-    OSError
-        If it cannot be written.
+        If it ends in something else, cannot be written, or what is given is no state space.
     """
-    model = system if isinstance(system, StateSpaceModel) else from_control(system)
-    values: dict[str, Any] = asdict(model)
-    if _suffix(path) == ".json":
-        plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
-        Path(path).write_text(json.dumps(plain, indent=1), encoding="utf-8")
-    else:
-        savemat(path, {**values, **_names_for_matlab(model)})
+    path = Path(path)
+    arrays = system if isinstance(system, StateSpaceModel) else from_control(system)
+    values: dict[str, Any] = asdict(arrays)
+    with _errors_of_writing(path):
+        if _suffix(path) == ".json":
+            plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
+            path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+        else:
+            savemat(path, {**values, **_names_for_matlab(arrays)})
 
 
 def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
@@ -86,8 +88,9 @@ def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
     InputError
         If the file is no such state space.
     """
+    path = require_file(path)
     try:
-        values = json.loads(Path(path).read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
+        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
         names = _names_in(values)
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
@@ -188,6 +191,7 @@ def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
     InputError
         If the file is no such ensemble.
     """
+    path = require_file(path)
     try:
         values = loadmat(path)
         fields: dict[str, Any] = {**_names_in(values)}
@@ -265,13 +269,14 @@ def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     InputError
         If the file holds no such weights.
     """
+    path = require_file(path)
     try:
-        values = json.loads(Path(path).read_text(encoding="utf-8"))
+        values = json.loads(path.read_text(encoding="utf-8"))
         names = tuple(str(name) for name in values.pop("output_names"))
         return UncertaintyWeights(
             output_names=names, **{name: np.array(value, float) for name, value in values.items()}
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
         raise FileFormatError(
             path, f"holds no uncertainty weights written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -314,11 +319,18 @@ def _names_in(values: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     return {name: tuple(str(_text_in(text)) for text in np.ravel(values[name])) for name in NAMES}
 
 
-def _suffix(path: str | Path) -> str:
-    suffix = Path(path).suffix
-    if suffix not in SUFFIXES:
+@contextmanager
+def _errors_of_writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _suffix(path: Path) -> str:
+    if path.suffix not in SUFFIXES:
         raise InputError(f"{path}: a state space is written as .json or .mat; give one of these endings")
-    return suffix
+    return path.suffix
 
 
 def _text_in(text: object) -> object:
