@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import require_finite, require_shape
-from frf_ipz.errors import FileFormatError, InputError, ShapeError
+from frf_ipz.errors import FileFormatError, InputError, ShapeError, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,6 +50,66 @@ def require_type(name: str, value: object, *kinds: type, optional: bool = False)
         return
     needed = " or ".join(kind.__name__ for kind in kinds)
     raise InputError(f"{name} is {describe(value)}; needed is a {needed}")
+
+
+def require_each(name: str, values: object, *kinds: type) -> None:
+    """Refuse what is no list of things of the needed kind.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the message.
+    values : object
+        What was given.
+    *kinds : type
+        What each may be.
+
+    Raises
+    ------
+    InputError
+        If it is no list, or holds something of another kind.
+
+    Examples
+    --------
+    >>> require_each("recordings", [1.5], str)
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.InputError: one of recordings is the float 1.5; needed is a str
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise InputError(
+            f"{name} is {describe(values)}; needed is a list of {' or '.join(kind.__name__ for kind in kinds)}"
+        )
+    for value in values:
+        require_type(f"one of {name}", value, *kinds)
+
+
+def require_choice(name: str, value: object, choices: Sequence[str]) -> None:
+    """Refuse a word that is not among those that are known.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the message.
+    value : object
+        What was given.
+    choices : sequence of str
+        The words.
+
+    Raises
+    ------
+    InputError
+        If it is none of them: names the closest.
+
+    Examples
+    --------
+    >>> require_choice("kind", "hamer", ("hammer", "random"))
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.InputError: kind = 'hamer' is not known; did you mean 'hammer'?
+    """
+    if value not in choices:
+        raise InputError(f"{name} = {value!r} is not known; {did_you_mean(str(value), choices)}")
 
 
 def describe(value: object) -> str:
@@ -133,7 +194,12 @@ def require_file(path: str | PathLike[str]) -> Path:
 
 
 def take_array(
-    name: str, values: ArrayLike, dtype: type[np.float64 | np.complex128], shape: Sequence[int | None] = (None,)
+    name: str,
+    values: ArrayLike,
+    dtype: type[np.float64 | np.complex128],
+    shape: Sequence[int | None] = (None,),
+    *,
+    is_finite: bool = True,
 ) -> NDArray[Any]:
     """Take numbers as an array, checked.
 
@@ -147,11 +213,13 @@ def take_array(
         Real or complex numbers of double precision.
     shape : sequence of int or None
         The required lengths; None stands for any length.
+    is_finite : bool
+        NaN and infinity are refused.
 
     Returns
     -------
     array
-        Of that shape and type, all finite.
+        Of that shape and type.
 
     Raises
     ------
@@ -173,5 +241,6 @@ def take_array(
             raise
         raise ShapeError(f"{name} are {describe(values)}; an array of numbers is needed") from None
     require_shape(name, array, shape)
-    require_finite(name, array)
+    if is_finite:
+        require_finite(name, array)
     return array

@@ -24,6 +24,13 @@ class Dof:
         One of x, y, z, rx, ry, rz.
     sign : int
         +1 or -1.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> dof = frf_ipz.Dof(18, "z", -1)
+    >>> str(dof), dof.name, str(dof.unsigned)
+    ('18:-z', '18:z', '18:+z')
     """
 
     node: int

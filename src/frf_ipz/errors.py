@@ -27,19 +27,57 @@ if TYPE_CHECKING:
 
 
 class FrfIpzError(Exception):
-    """Any error that frf_ipz raises on purpose."""
+    """Any error that frf_ipz raises on purpose.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> try:
+    ...     frf_ipz.parse_dof("18")
+    ... except frf_ipz.FrfIpzError as error:
+    ...     print(error)
+    '18' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'
+    """
 
 
 class InputError(FrfIpzError, ValueError):
-    """The input is wrong: says which file, where in it, what was expected, what to do."""
+    """The input is wrong: says which file, where in it, what was expected, what to do.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.parse_dof("18:q")
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.InputError: '18:q' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'
+    """
 
 
 class ShapeError(InputError):
-    """An array has the wrong shape, or holds values that are not finite."""
+    """An array has the wrong shape, or holds values that are not finite.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.FrfSet.from_arrays([1.0, 2.0], [[[1.0]]], outputs=["1:x"], inputs=["1:x"])
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.ShapeError: the FRFs' values [frequency, output, input] has the shape (1, 1, 1); needed is (2, 1, 1)
+    """
 
 
 class QuantityError(InputError):
-    """A unit or a physical quantity does not fit where it is used."""
+    """A unit or a physical quantity does not fit where it is used.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> values = [[[1.0]], [[1.0]]]
+    >>> frf_ipz.FrfSet.from_arrays([1.0, 2.0], values, outputs=["1:x"], inputs=["1:x"], quantity="mobilty")
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.QuantityError: 'mobilty' is no quantity of FRFs; did you mean 'mobility'?
+    """
 
 
 class FileFormatError(InputError):
@@ -53,6 +91,14 @@ class FileFormatError(InputError):
         What is wrong, what was expected and what to do, as one sentence.
     where : str, optional
         Where in the file: a line, a column or a key.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.read_model("missing.toml")
+    Traceback (most recent call last):
+        ...
+    frf_ipz.errors.FileFormatError: missing.toml: there is no such file
     """
 
     def __init__(self, path: Path | str, problem: str, *, where: str = "") -> None:
@@ -62,7 +108,14 @@ class FileFormatError(InputError):
 
 
 class NumericalError(FrfIpzError, RuntimeError):
-    """A computation cannot give a result."""
+    """A computation cannot give a result.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> issubclass(frf_ipz.NumericalError, RuntimeError)
+    True
+    """
 
 
 class ConvergenceError(NumericalError):
@@ -74,6 +127,13 @@ class ConvergenceError(NumericalError):
         Why it stopped.
     result : object
         What was reached, of the type that the function returns when it converges.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> error = frf_ipz.ConvergenceError("stopped after 30 iterations", result={"misfit": 0.2})
+    >>> error.result["misfit"], isinstance(error, frf_ipz.NumericalError)
+    (0.2, True)
     """
 
     def __init__(self, message: str, *, result: object = None) -> None:
@@ -82,11 +142,25 @@ class ConvergenceError(NumericalError):
 
 
 class PairingError(NumericalError):
-    """Measured and computed poles or zeros cannot be matched."""
+    """Measured and computed poles or zeros cannot be matched.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> issubclass(frf_ipz.PairingError, frf_ipz.NumericalError)
+    True
+    """
 
 
 class IllConditionedError(NumericalError):
-    """A matrix is too close to singular to be used."""
+    """A matrix is too close to singular to be used.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> issubclass(frf_ipz.IllConditionedError, frf_ipz.NumericalError)
+    True
+    """
 
 
 @contextmanager

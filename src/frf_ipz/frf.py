@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from frf_ipz.arguments import describe, require_choice, require_type, take_array
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
 from frf_ipz.display import Drawn, Tabulated
-from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+SCALES = ("none", "common", "per_channel")
 ARRAYS = ("frequency_hz", "values", "variance", "coherence", "averages")
 
 
@@ -37,6 +39,14 @@ class FrfLabel:
         What was measured.
     output_channel, input_channel : str
         Columns of the recordings that it comes from.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> sensor, force = frf_ipz.parse_dof("20:-z"), frf_ipz.parse_dof("18:+z")
+    >>> label = frf_ipz.FrfLabel(sensor, force, frf_ipz.FrfQuantity.ACCELERANCE)
+    >>> str(label), label.unit, label.sign
+    ('20:-z / 18:+z', 'm/s^2/N', -1)
     """
 
     output_dof: Dof
@@ -75,6 +85,23 @@ class Measured(Protocol):
         """Lowest and highest frequency, Hz."""
 
 
+def require_measured(measured: object) -> None:
+    """Refuse what does not say which FRFs were measured.
+
+    Parameters
+    ----------
+    measured : object
+        What was given.
+
+    Raises
+    ------
+    InputError
+        If it is neither a `FrfSet` nor a `ModalFit`.
+    """
+    if not isinstance(getattr(measured, "labels", None), tuple):
+        raise InputError(f"what was measured is {describe(measured)}; needed is a FrfSet or a ModalFit")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrfSet(Tabulated, Drawn):
     """Measured FRFs on common frequency lines.
@@ -110,6 +137,25 @@ class FrfSet(Tabulated, Drawn):
     ------
     ShapeError
         If shapes disagree or a value is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> frfs
+    FrfSet: 2 FRFs (accelerance) on 790 lines from 5 to 399.5 Hz, 6:+z, 11:+z / 11:+z
+    >>> frfs.select_frfs([1]).select_lines(frfs.in_band((10.0, 100.0))).values.shape
+    (181, 1)
     """
 
     frequency_hz: FloatArray
@@ -193,8 +239,12 @@ class FrfSet(Tabulated, Drawn):
         >>> FrfSet.from_arrays(f, np.ones((3, 2, 1)), outputs=["1:+x", "2:+x"], inputs=["2:+x"]).n_frfs
         2
         """
-        lines = np.atleast_1d(np.asarray(frequency_hz, float))
-        outputs_given, inputs_given = [[as_dof(dof) for dof in side] for side in (outputs, inputs)]
+        lines = take_array("the frequencies", np.atleast_1d(frequency_hz), np.float64)
+        outputs_given, inputs_given = as_dofs(outputs, name="outputs"), as_dofs(inputs, name="inputs")
+        require_choice("unknown_scale", unknown_scale, SCALES)
+        require_type("averages", averages, int, np.integer)
+        if averages < 0:
+            raise InputError(f"averages is {averages}; it is the number of records behind each FRF, or 0")
         shape = (len(lines), len(outputs_given), len(inputs_given))
         blocks = {
             "values": _block("values", values, shape, np.complex128),
@@ -348,9 +398,9 @@ def _block(
     name: str, values: ArrayLike | None, shape: tuple[int, int, int], dtype: type[np.complex128 | np.float64]
 ) -> npt.NDArray[Any]:
     """Take an array of the shape of the FRFs; NaN where there is none."""
-    block = np.full(shape, np.nan, dtype) if values is None else np.asarray(values, dtype)
-    require_shape(f"the FRFs' {name} [frequency, output, input]", block, shape)
-    return block
+    if values is None:
+        return np.full(shape, np.nan, dtype)
+    return take_array(f"the FRFs' {name} [frequency, output, input]", values, dtype, shape, is_finite=False)
 
 
 def _require_lines(frequency_hz: FloatArray) -> None:

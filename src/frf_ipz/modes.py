@@ -29,6 +29,17 @@ class ModeSet(Concise):
         Mass-normalised where the scale is known.
     dofs : tuple of Dof
         Rows of the shapes.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> modes = frf_ipz.solve_modes(beam, n_modes=2)
+    >>> modes.shapes.shape, modes.damping_ratio.tolist()
+    ((20, 2), [0.01, 0.01])
     """
 
     natural_frequency_hz: FloatArray

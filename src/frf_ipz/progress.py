@@ -6,7 +6,17 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called now and then by a long computation."""
+    """Called now and then by a long computation.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> def report(fraction: float, text: str) -> None:
+    ...     print(f"{fraction:.0%} {text}")
+    >>> progress: frf_ipz.Progress = report
+    >>> progress(0.5, "fitting")
+    50% fitting
+    """
 
     def __call__(self, fraction: float, text: str) -> None:
         """Report the progress.

@@ -11,7 +11,14 @@ from frf_ipz.errors import QuantityError, did_you_mean
 
 
 class FrfQuantity(Enum):
-    """The kind of response in an FRF (response per force or moment)."""
+    """The kind of response in an FRF (response per force or moment).
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.FrfQuantity("mobility").power, frf_ipz.FrfQuantity.MOBILITY.response
+    (1, 'velocity')
+    """
 
     RECEPTANCE = "receptance"
     MOBILITY = "mobility"

@@ -39,6 +39,18 @@ class PoleResidueModel(Concise):
     ------
     ShapeError
         If shapes disagree.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> model = frf_ipz.PoleResidueModel(
+    ...     poles=np.array([-1.0 + 100.0j]), residues=np.array([[-0.005j]]), powers=(0,), coefficients=np.zeros((1, 1)),
+    ...     scale_rad_s=1.0, delay_s=np.zeros(1),
+    ... )
+    >>> model.natural_frequency_hz.round(2), model.damping_ratio.round(3)
+    (array([15.92]), array([0.01]))
+    >>> float(model(np.array([0.0j]))[0, 0].real.round(8))
+    9.999e-05
     """
 
     poles: ComplexArray
@@ -110,6 +122,26 @@ class ZeroSet(Concise):
         False where the data do not support the number.
     reason : tuple of str
         Why it is not identifiable; empty where it is.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> zeros = fit.zeros
+    >>> hertz = np.abs(zeros.values) / (2 * np.pi)
+    >>> hertz[zeros.identifiable].round(2)
+    array([100.94, 102.52, 292.4 ,  72.11, 233.56])
     """
 
     values: ComplexArray

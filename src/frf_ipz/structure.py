@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arguments import take_array
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
 from frf_ipz.display import Concise, Drawn
-from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
 from frf_ipz.numerics.neighbours import lines_between_neighbours
@@ -47,6 +48,17 @@ class Part(Concise):
     stiffness, mass : (k, k) array
         Its share of the matrices, N/m and kg (and their rotational counterparts); sparse for groups, which can be
         large.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> part = beam.parts[0]
+    >>> part.kind, part.name, part.nodes
+    ('element', '1', (1, 2))
     """
 
     kind: str
@@ -73,6 +85,16 @@ class Geometry(Concise):
         How a node is supported: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
     is_schematic : bool
         Coordinates are no positions: the masses of a lumped model drawn in a row.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> beam.geometry.coordinates_m[-1].round(6).tolist(), beam.geometry.supports
+    ([0.5, 0.0, 0.0], {1: 'clamped'})
     """
 
     nodes: IntArray
@@ -117,6 +139,18 @@ class StructuralModel(Drawn):
     ------
     InputError
         If sizes disagree or a DOF is named twice.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> beam
+    StructuralModel: beam (beam), 20 free DOFs, 11 nodes
+    >>> beam.index(frf_ipz.Dof(2, "z")), beam.stiffness.shape
+    (0, (20, 20))
     """
 
     name: str
@@ -197,7 +231,7 @@ class StructuralModel(Drawn):
         >>> [dof.name for dof in model.dofs]
         ['1:x', '2:x']
         """
-        rows = tuple(as_dof(dof).unsigned for dof in dofs)
+        rows = tuple(dof.unsigned for dof in as_dofs(dofs, name="dofs"))
         mass_matrix = _symmetric_matrix("mass", mass, len(rows))
         require_positive_definite_mass(mass_matrix, rows)
         stiffness_matrix = _symmetric_matrix("stiffness", stiffness, len(rows))
@@ -335,6 +369,27 @@ class ReducedModel:
     dashpots : (r, r) array
         The part of `damping` that the full model states as a matrix beside damping ratios of its modes; (0, 0) where it
         does not state both.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> reduced_model
+    ReducedModel: 6 DOFs (11:+z, 6:+z, 9:+z, 10:+z, 3:+z, 5:+z), 5 modes in its basis
+    >>> float(reduced_model.row(frf_ipz.Dof(9, "z", -1)).round(6).min())
+    -1.0
     """
 
     mass: FloatArray
@@ -408,10 +463,12 @@ def _positions(
     if coordinates is None:
         position_of = {node: (SPACING_M * place, 0.0, 0.0) for place, node in enumerate(sorted(named))}
     elif isinstance(coordinates, Mapping):
-        position_of = {int(node): tuple(map(float, position)) for node, position in coordinates.items()}  # type: ignore[misc]
+        position_of = {
+            int(node): tuple(take_array(f"the position of node {node}", position, np.float64, (3,)).tolist())
+            for node, position in coordinates.items()
+        }
     else:
-        table = np.asarray(coordinates, float)
-        require_shape("the coordinates", table, (len(named), 3))
+        table = take_array("the coordinates", coordinates, np.float64, (len(named), 3))
         position_of = dict(zip(named, map(tuple, table.tolist()), strict=True))
     missing = [node for node in named if len(position_of.get(node, ())) != 3]
     if missing:
@@ -423,7 +480,7 @@ def _positions(
 
 
 def _damping_ratios(ratios: float | Sequence[float]) -> FloatArray:
-    given = np.atleast_1d(np.asarray(ratios, float))
+    given = take_array("the damping ratios", np.atleast_1d(ratios), np.float64, is_finite=False)
     if not ((given >= 0) & (given < 1)).all():
         raise InputError(f"modal_damping is {ratios}; damping ratios lie from 0 to below 1")
     return given

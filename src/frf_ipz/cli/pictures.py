@@ -62,6 +62,6 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     figure = draw_pictures(describe(name, open_results(folder)))
     try:
         save_figure(figure, path, file_format=file_format)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --out") from None
+    except InputError as error:
+        raise InputError(f"{error}; choose another --out") from None
     return f"wrote {path}"

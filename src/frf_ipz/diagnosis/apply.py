@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arguments import require_type
 from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
@@ -16,15 +17,17 @@ from frf_ipz.diagnosis.model.basis import make_basis
 from frf_ipz.diagnosis.model.change import NO_CHANGE, Change, with_change
 from frf_ipz.diagnosis.model.layout import make_layout
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.diagnosis.result import Diagnosis
 from frf_ipz.dofs import Dof
+from frf_ipz.frf import FrfSet
+from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, LinearisedLaw
-    from frf_ipz.frf import FrfLabel, FrfSet
-    from frf_ipz.structure import StructuralModel
+    from frf_ipz.diagnosis.result import Curves, Finding, LinearisedLaw
+    from frf_ipz.frf import FrfLabel
 
 
 def correct_model(
@@ -45,7 +48,31 @@ def correct_model(
     -------
     StructuralModel
         The model with what it lacked; the same model where findings are in the measuring chain only, or none.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> frf_ipz.correct_model(diagnosis, model).mass.toarray().diagonal().round(2).tolist()
+    [2.0, 1.0, 1.2]
     """
+    require_type("diagnosis", diagnosis, Diagnosis)
+    require_type("fe_model", fe_model, StructuralModel)
     return prepare_correction(diagnosis, fe_model, effects)([finding.values for finding in diagnosis.findings])
 
 
@@ -129,7 +156,31 @@ def correct_frfs(frfs: FrfSet, diagnosis: Diagnosis, *, effects: Mapping[str, Ef
     -------
     FrfSet
         FRFs of a faultless measuring chain, its sensors where they really are.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> frf_ipz.correct_frfs(frfs, diagnosis) is frfs
+    True
     """
+    require_type("frfs", frfs, FrfSet)
+    require_type("diagnosis", diagnosis, Diagnosis)
     change = _chain_change(diagnosis, effects or shipped_effects())
     if not (change.channels or change.moved):
         return frfs

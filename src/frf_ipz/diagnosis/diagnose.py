@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from frf_ipz.arguments import as_path, require_each, require_type
+from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
 from frf_ipz.diagnosis.measured.preprocessing.residual_motion import remove_residual_motion
+from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
@@ -54,14 +57,13 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.progress import silent
+from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.evidence.fit import Data
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
-    from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.linearity import Linearity
     from frf_ipz.diagnosis.nonlinear.search import LawSearch
     from frf_ipz.diagnosis.result import DataCheck, Finding
@@ -71,7 +73,6 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
-    from frf_ipz.structure import StructuralModel
 
 CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
 MIN_RECORDS = 2  # at one excited point, to compare levels
@@ -127,14 +128,35 @@ def diagnose(
 
     Examples
     --------
-    >>> import frf_ipz
-    >>> test = frf_ipz.read_test("data/raw/cantilever/test.toml")  # doctest: +SKIP
-    >>> model = frf_ipz.read_model("data/raw/cantilever/model.toml")  # doctest: +SKIP
-    >>> frf_ipz.diagnose(test, model).verdict  # doctest: +SKIP
-    'unexplained'
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> diagnosis.verdict
+    'explained'
+    >>> diagnosis.findings[0].statement
+    'A mass of 200 g (+- 0.59 g) sits at node 3 (x = 2.000 m) that the model lacks.'
     """
+    require_type("data", data, VibrationTest, FrfSet, Observations)
+    require_type("fe_model", fe_model, StructuralModel)
+    require_type("frfs", frfs, FrfSet, optional=True)
+    require_type("options", options, DiagnoseOptions, optional=True)
+    require_each("effects", effects, Effect, Law)
     observations = _as_observations(data, frfs, ingest, fit)
-    catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=Path(folder), own=tuple(effects))
+    catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=as_path(folder), own=tuple(effects))
     with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
         diagnosis = _diagnose(fe_model, observations, catalogue, progress)
     if catalogue.options.seed is None:

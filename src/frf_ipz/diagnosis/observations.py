@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.records import read_records
 from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
     from frf_ipz.ingest import records as recorded
-    from frf_ipz.ingest.campaign import VibrationTest
 
 BLOCK = 128  # samples
 
@@ -132,6 +133,27 @@ class Observations(Concise):
         FRFs on lines: analysed where there are no records, or some did not start at rest.
     exclude_hz : tuple of pairs of float
         Parts of the band that are left out, Hz.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> observations = frf_ipz.observe(frf_ipz.VibrationTest.from_frfs(frfs), frfs=frfs)
+    >>> observations.kind, observations.band_hz, observations.start_at_rest
+    ('frf', (5.0, 99.5), False)
     """
 
     kind: str
@@ -250,7 +272,32 @@ def observe(
     ------
     InputError
         If a recording cannot be used, or too few lines are left in the band.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> estimate = frf_ipz.estimate_frfs(test)
+    >>> observations = frf_ipz.observe(test, frfs=estimate.frfs)
+    >>> len(observations.records), observations.start_at_rest
+    (3, True)
     """
+    require_type("test", test, VibrationTest)
+    require_type("frfs", frfs, FrfSet)
+    require_type("ingest", ingest, IngestOptions, optional=True)
+    require_type("fit", fit, FitOptions, optional=True)
     chosen = fit or FitOptions()
     band = measured_lines(frfs, chosen).band_hz
     records: tuple[ObservedRecord, ...] = ()

@@ -35,6 +35,12 @@ class DiagnoseOptions:
         Half width of the deviation of positions of sensors and excited points, m per m of the structure's extent.
     seed : int, optional
         Has no effect, since nothing is drawn at random; accepted, with a warning, for files of earlier versions.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.DiagnoseOptions(effects=("added_mass",), stiffness_tolerance=0.01).effects
+    ('added_mass',)
     """
 
     __pydantic_config__ = STRICT

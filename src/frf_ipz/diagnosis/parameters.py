@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arguments import require_type
 from frf_ipz.diagnosis.apply import prepare_correction
+from frf_ipz.diagnosis.result import Diagnosis
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import stated_damping_ratios
 from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.regions import motion_of_all_dofs
 
@@ -20,8 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.result import Diagnosis, Finding
-    from frf_ipz.structure import ReducedModel, StructuralModel
+    from frf_ipz.diagnosis.result import Finding
 
 STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly linear in it
 RIGID = 1e-9  # of the largest squared frequency: below it a mode is one of a rigid body
@@ -57,7 +59,34 @@ def make_diagnosed_basis(
     ------
     InputError
         If no finding is in the structure.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> corrected = frf_ipz.correct_model(diagnosis, model)
+    >>> reduced_model = frf_ipz.reduce_model(frfs, corrected)
+    >>> frf_ipz.make_diagnosed_basis(diagnosis, model, reduced_model).names
+    ('added_mass mass_kg',)
     """
+    require_type("diagnosis", diagnosis, Diagnosis)
+    require_type("fe_model", fe_model, StructuralModel)
+    require_type("reduced_model", reduced_model, ReducedModel)
     moving, corrected = [], prepare_correction(diagnosis, fe_model, effects)
     for number, finding in enumerate(diagnosis.findings):
         for index, name in enumerate(_value_names(finding)):

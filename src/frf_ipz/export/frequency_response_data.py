@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError
+from frf_ipz.frf import FrfSet
 
 if TYPE_CHECKING:
     import control
-
-    from frf_ipz.frf import FrfSet
 
 
 def to_frd(frfs: FrfSet) -> control.FRD:
@@ -32,7 +32,26 @@ def to_frd(frfs: FrfSet) -> control.FRD:
     ------
     InputError
         If an exponential window has added damping, which python-control cannot represent.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> response = frf_ipz.to_frd(frfs)
+    >>> response.ninputs, response.noutputs, response.output_labels
+    (1, 2, ['6:+z', '11:+z'])
     """
+    require_type("frfs", frfs, FrfSet)
     import control  # here, since it takes a second and loads pyplot
 
     if frfs.window_decay_1_s > 0:

@@ -25,6 +25,12 @@ class ExportOptions:
         0 for a continuous model, else the sample time of a discrete one (zero-order hold).
     ensemble : int
         Number of members of the posterior to write besides.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.ExportOptions(outputs="displacement", sample_time_s=1e-4)
+    ExportOptions(outputs='displacement', residual='dynamics', pade_order=0, sample_time_s=0.0001, ensemble=0)
     """
 
     __pydantic_config__ = STRICT

@@ -5,28 +5,31 @@ Sits after updating. Actuators are inputs; sensors and points of interest are ou
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.dofs import as_dof
+from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
 from frf_ipz.export.realization import condense_high_modes, discretise, modal_form, to_first_order, with_delays
+from frf_ipz.frf import require_measured
+from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import control
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import Measured
     from frf_ipz.structure import ReducedModel
-    from frf_ipz.updating.updated_model import UpdatedModel
 
 ARRAYS = ("A", "B", "C", "D")
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
@@ -123,6 +126,7 @@ def make_state_space(
         If nothing was measured, a channel or a point is not known, or residual flexibility is required as feedthrough
         of a velocity or an acceleration.
     """
+    _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
     return _to_state_space(updated_model.model, _ports(measured, points, chosen, delays_s), chosen)
 
@@ -160,6 +164,7 @@ def make_state_space_ensemble(
     InputError
         As for `make_state_space`.
     """
+    _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
     ports = _ports(measured, points, chosen, delays_s)
     members = updated_model.ensemble[: chosen.ensemble]
@@ -193,6 +198,29 @@ def to_state_space(
     ------
     InputError
         As for `make_state_space`.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> system = frf_ipz.to_state_space(fit, updated_model, points=["9:+z"])
+    >>> system.input_labels, system.output_labels
+    (['11:+z'], ['6:+z', '11:+z', '9:+z'])
+    >>> bool((system.poles().real < 0).all())
+    True
     """
     return to_control(make_state_space(measured, updated_model, points=points, options=options, delays_s=delays_s))
 
@@ -221,6 +249,27 @@ def to_state_space_ensemble(
     ------
     InputError
         As for `make_state_space`.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> options = frf_ipz.ExportOptions(ensemble=3)
+    >>> len(frf_ipz.to_state_space_ensemble(fit, updated_model, options=options))
+    3
     """
     members = make_state_space_ensemble(measured, updated_model, points=points, options=options, delays_s=delays_s)
     return [to_control(member) for member in members]
@@ -283,6 +332,15 @@ def from_control(system: control.StateSpace) -> StateSpaceModel:
         raise InputError(f"a state space is needed, as to_state_space gives it; given is {system!r:.60}") from None
 
 
+def _require_exported(
+    measured: Measured, updated_model: UpdatedModel, options: ExportOptions | None, delays_s: object
+) -> None:
+    require_measured(measured)
+    require_type("updated_model", updated_model, UpdatedModel)
+    require_type("options", options, ExportOptions, optional=True)
+    require_type("delays_s", delays_s, Mapping, optional=True)
+
+
 def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
     outputs = ports.outputs
     rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
@@ -314,4 +372,4 @@ def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -
 def _ports(
     measured: Measured, points: Sequence[Dof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
 ) -> Ports:
-    return choose_ports(measured.labels, [as_dof(point) for point in points], options, delays_s or {})
+    return choose_ports(measured.labels, list(as_dofs(points)), options, delays_s or {})

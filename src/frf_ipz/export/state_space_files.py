@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.structure import ReducedModel
 
-SUFFIREDUCED_MODEL = {  # arrays of updated_model.npz
+SUFFIXES = (".json", ".mat")
+REDUCED_MODEL = {  # arrays of updated_model.npz
     "M": "(r, r) mass matrix, SI",
     "B": "(r, r) damping matrix, SI",
     "K": "(r, r) stiffness matrix, SI",
@@ -44,8 +45,7 @@ UNREADABLE = (MatReadError, NotImplementedError, OSError)  # no MATLAB file, or 
 
 
 def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | Path) -> None:
-ES = (".json", ".mat")
-X    """Write a state space as JSON or for MATLAB.
+    """Write a state space as JSON or for MATLAB.
 
     Parameters
     ----------
@@ -58,6 +58,32 @@ X    """Write a state space as JSON or for MATLAB.
     ------
     InputError
         If it ends in something else, cannot be written, or what is given is no state space.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> system = frf_ipz.to_state_space(fit, updated_model)
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "statespace.mat"
+    ...     frf_ipz.write_state_space(system, path)
+    ...     bool((frf_ipz.read_state_space(path).A == system.A).all())
+    True
     """
     path = Path(path)
     arrays = system if isinstance(system, StateSpaceModel) else from_control(system)
@@ -119,6 +145,32 @@ def read_state_space(path: str | Path) -> control.StateSpace:
     ------
     InputError
         If the file is no such state space.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> system = frf_ipz.to_state_space(fit, updated_model, points=["9:+z"])
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "statespace.json"
+    ...     frf_ipz.write_state_space(system, path)
+    ...     frf_ipz.read_state_space(path).output_labels
+    ['6:+z', '11:+z', '9:+z']
     """
     return to_control(read_state_space_arrays(path))
 
@@ -227,6 +279,27 @@ def read_ensemble(path: str | Path) -> list[control.StateSpace]:
     ------
     InputError
         If the file is no such ensemble.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> from tempfile import TemporaryDirectory
+    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], export=frf_ipz.ExportOptions(ensemble=3))
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = campaign.run(folder, until="export")
+    ...     len(frf_ipz.read_ensemble(f"{folder}/statespace_ensemble.mat"))
+    3
     """
     return [to_control(model) for model in read_ensemble_arrays(path)]
 
@@ -268,6 +341,27 @@ def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     ------
     InputError
         If the file holds no such weights.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> from tempfile import TemporaryDirectory
+    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], export=frf_ipz.ExportOptions(ensemble=3))
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = campaign.run(folder, until="export")
+    ...     frf_ipz.read_uncertainty_weights(f"{folder}/uncertainty.json").output_names
+    ('6:+z', '11:+z', '9:+z')
     """
     path = require_file(path)
     try:

@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import minimize
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.dofs import as_dof
+from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
+from frf_ipz.frf import require_measured
 from frf_ipz.prediction.ensemble import ModelEnsemble
+from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +29,6 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import Measured
-    from frf_ipz.updating.updated_model import UpdatedModel
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the error of an output is bounded
 WIDEST = 1e4  # ratio of the ends of the band on which it is, where the band begins at 0
@@ -50,6 +52,27 @@ class UncertaintyWeights(Concise):
         Norm over all inputs of (member minus model) over that of the model: the 95 % quantile over the members.
     numerators, denominators : (n_outputs, 3) array
         Polynomials in s, highest power first, of the weight of each output.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> weights = frf_ipz.estimate_uncertainty_weights(fit, updated_model)
+    >>> weights.output_names, weights.numerators.shape
+    (('6:+z', '11:+z'), (2, 3))
     """
 
     output_names: tuple[str, ...]
@@ -101,7 +124,30 @@ def estimate_uncertainty_weights(
     ------
     InputError
         If the method of updating has drawn no ensemble.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> weights = frf_ipz.estimate_uncertainty_weights(fit, updated_model, points=["9:+z"])
+    >>> bool((weights.relative_error >= 0).all())
+    True
     """
+    require_measured(measured)
+    require_type("updated_model", updated_model, UpdatedModel)
     labels, updated = measured.labels, updated_model
     if frequency_hz is None:
         low, high = measured.band_hz
@@ -112,7 +158,7 @@ def estimate_uncertainty_weights(
             "method = 'minimal-change' with ensemble = 200"
         )
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *(as_dof(point) for point in points)]))
+    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *as_dofs(points)]))
     inputs = tuple(dict.fromkeys(label.input_dof for label in labels))
     errors = np.stack([_relative_error(updated, output, inputs, s) for output in outputs], axis=1)
     weights = [_bound(np.asarray(frequency_hz, float), error) for error in errors.T]

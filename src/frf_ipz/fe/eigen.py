@@ -14,16 +14,17 @@ import numpy as np
 from scipy import linalg
 from scipy.sparse import linalg as sparse_linalg
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
 from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
+from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
-    from frf_ipz.structure import StructuralModel
 
 EPS = float(np.finfo(float).eps)
 SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding
@@ -151,7 +152,20 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
         If the iteration for a large model ends without result.
     IllConditionedError
         If mass or stiffness is indefinite.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> frf_ipz.solve_modes(beam, n_modes=3).natural_frequency_hz.round(2)
+    array([ 16.45, 103.04, 288.36])
     """
+    require_type("model", model, StructuralModel)
+    require_type("n_modes", n_modes, int, np.integer, optional=True)
+    require_type("up_to_hz", up_to_hz, float, int, np.number, optional=True)
     basis = solve_basis(model, n_modes=n_modes, up_to_hz=up_to_hz)
     return ModeSet(
         natural_frequency_hz=basis.natural_frequency_hz,

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from frf_ipz.arguments import as_path
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.fe import kinds
 from frf_ipz.fe.model_options import ModelSection
@@ -92,8 +93,31 @@ def read_model(path: str | Path) -> StructuralModel:
     ------
     FileFormatError
         If a file is missing or something in it does not fit: says which file, where, and what to do.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import frf_ipz
+    >>> text = '''
+    ... [model]
+    ... kind = "beam"
+    ... [beam]
+    ... length_m = 0.5
+    ... width_m = 0.02
+    ... thickness_m = 0.005
+    ... youngs_modulus_Pa = 70e9
+    ... density_kg_m3 = 2700.0
+    ... elements = 10
+    ... left = "clamped"
+    ... '''
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "model.toml"
+    ...     _ = path.write_text(text)
+    ...     frf_ipz.read_model(path)
+    StructuralModel: model (beam), 20 free DOFs, 11 nodes
     """
-    path = Path(path)
+    path = as_path(path)
     kind, file = _read_options(path)
     return kind.read(file, path)
 

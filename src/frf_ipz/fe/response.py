@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_each, require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
+from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.frf import FrfLabel
 
 MODES_BEYOND = 3.0  # times the highest frequency: modes above follow in the series
 SERIES_TERMS = 5  # the last one is off by (1/3)^10 of the first mode beyond
@@ -56,7 +57,24 @@ def compute_frfs(model: StructuralModel | ReducedModel, labels: Sequence[FrfLabe
     ------
     InputError
         If the model lacks a DOF or holds it.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> tip = frf_ipz.Dof(11, "z")
+    >>> receptance = frf_ipz.FrfLabel(tip, tip, frf_ipz.FrfQuantity.RECEPTANCE)
+    >>> float(frf_ipz.compute_frfs(beam, [receptance], np.array([0.0]))[0, 0].real.round(6))
+    0.002857
+    >>> round(0.5**3 / (3 * 70e9 * 0.02 * 0.005**3 / 12), 6)
+    0.002857
     """
+    require_type("model", model, StructuralModel, ReducedModel)
+    require_each("labels", labels, FrfLabel)
+    s = take_array("the Laplace variable s", s, np.complex128)
     moduli = np.abs(s[s != 0])
     s = np.where(s == 0, NEAR_ZERO * (moduli.min() if moduli.size else 1.0), s).astype(np.complex128)
     if isinstance(model, ReducedModel):

@@ -7,13 +7,15 @@ support them. Then errors of everything, from the Fisher information at the opti
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from scipy import sparse
 
+from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, IntArray
+from frf_ipz.errors import InputError
+from frf_ipz.frf import FrfSet
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.refinement import refine_poles
@@ -40,9 +42,6 @@ from frf_ipz.identification.search.goodness_of_fit import assess_fit
 from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, unconfirmed_reasons
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
-
-if TYPE_CHECKING:
-    from frf_ipz.frf import FrfSet
 
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
@@ -82,6 +81,8 @@ def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Prog
        frequency_hz  damping_ratio
     0        80.004           0.01
     """
+    require_type("frfs", frfs, FrfSet)
+    require_type("options", options, FitOptions, optional=True)
     chosen = options or FitOptions()
     fitted = find_modes(frfs, chosen, progress=progress)
     halves = None
@@ -114,7 +115,32 @@ def fit_residues(frfs: FrfSet, *, poles: ComplexArray, options: FitOptions | Non
     ------
     InputError
         If too few lines remain to be fitted.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> one_frf = frfs.select_frfs([1])
+    >>> poles = fit.model.poles[: fit.n_modes]
+    >>> bool(np.allclose(frf_ipz.fit_residues(one_frf, poles=poles).model.poles[:3], poles))
+    True
     """
+    require_type("frfs", frfs, FrfSet)
+    require_type("options", options, FitOptions, optional=True)
+    poles = take_array("the poles", poles, np.complex128)
+    if not (len(poles) and (poles.imag > 0).all()):
+        raise InputError(f"the poles are {poles}; at least one is needed, each with an imaginary part above 0")
     options = options or FitOptions()
     lines = measured_lines(frfs, options)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)

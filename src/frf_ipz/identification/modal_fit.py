@@ -63,6 +63,29 @@ class ModalFit(Tabulated, Drawn):
         ``recordings`` or ``misfit``: where the covariance's sigma comes from.
     warnings : tuple of str
         What the user has to know.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> fit
+    ModalFit: 3 modes at 16.45, 103.04, 288.36 Hz, 5 zeros of 2 FRFs
+    >>> fit.modes[["frequency_hz", "damping_ratio"]].round(4)
+       frequency_hz  damping_ratio
+    0       16.4492           0.01
+    1      103.0400           0.01
+    2      288.3602           0.01
     """
 
     model: PoleResidueModel

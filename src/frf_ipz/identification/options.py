@@ -20,6 +20,12 @@ class RejectedPole:
         Its frequency, Hz.
     why : str
         The reason, stored with the results.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.FitOptions(strike=(frf_ipz.RejectedPole(hz=100.0, why="mains"),)).strike[0].hz
+    100.0
     """
 
     __pydantic_config__ = STRICT
@@ -41,6 +47,13 @@ class PinnedPole:
         The frequency, Hz.
     why : str
         The reason, stored with the results; may be empty.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> pin = frf_ipz.PinnedPole(hz=80.3, why="seen in another test")
+    >>> frf_ipz.FitOptions(pin_hz=(pin,)).pinned[0].why
+    'seen in another test'
     """
 
     __pydantic_config__ = STRICT
@@ -81,6 +94,12 @@ class FitOptions:
     ------
     InputError
         If a band ends below its start, or a channel is named twice.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.FitOptions(band_hz=(10.0, 700.0), pin_hz=(80.3,)).pinned
+    (PinnedPole(hz=80.3, why=''),)
     """
 
     __pydantic_config__ = STRICT

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray, read_only, require_finite, require_shape
+from frf_ipz.arguments import require_choice, require_each, require_type, take_array
+from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.display import Concise
-from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.dofs import Dof, as_dof, as_dofs
 from frf_ipz.errors import InputError, QuantityError, did_you_mean
-from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.frf import SCALES, FrfLabel, FrfSet
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.units import numerator_of
 from frf_ipz.quantities import RESPONSES, frf_quantity_of
@@ -133,20 +134,22 @@ class Recording(Concise):
     quantity: str = "acceleration"
 
     def __post_init__(self) -> None:
-        force, responses = np.asarray(self.force, float), np.atleast_2d(np.asarray(self.responses, float))
-        require_shape("the force of a recording", force, (None,))
-        require_shape("the responses of a recording", responses, (len(self.output_dofs), len(force)))
-        require_finite("the force of a recording", force)
-        require_finite("the responses of a recording", responses)
+        output_dofs = as_dofs(self.output_dofs, name="output_dofs")
+        force = take_array("the force of a recording", self.force, np.float64)
+        responses = np.atleast_2d(self.responses)
+        responses = take_array("the responses of a recording", responses, np.float64, (len(output_dofs), len(force)))
+        if not output_dofs:
+            raise InputError("output_dofs is empty; a recording has at least one response")
+        require_type("sample_rate_hz", self.sample_rate_hz, float, int, np.number)
         if self.quantity not in RESPONSES:
-            raise QuantityError(f"'{self.quantity}' is no response; {did_you_mean(self.quantity, RESPONSES)}")
+            raise QuantityError(f"'{self.quantity}' is no response; {did_you_mean(str(self.quantity), RESPONSES)}")
         if not 0 < self.sample_rate_hz < np.inf:
             raise InputError(f"the rate of a recording is {self.sample_rate_hz:g} Hz; it is positive")
         changed = {
             "force": read_only(force),
             "responses": read_only(responses),
             "input_dof": as_dof(self.input_dof),
-            "output_dofs": tuple(as_dof(dof) for dof in self.output_dofs),
+            "output_dofs": output_dofs,
         }
         for name, value in changed.items():
             object.__setattr__(self, name, value)
@@ -186,6 +189,25 @@ class VibrationTest(Concise):
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
         FRFs that are in memory.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> test.kind, [str(label) for label in test.labels]
+    ('hammer', ['1:+z / 1:+z'])
     """
 
     path: Path
@@ -234,9 +256,30 @@ class VibrationTest(Concise):
         ------
         InputError
             If there is no recording, there is no such kind, or the recordings do not fit each other.
+
+        Examples
+        --------
+        >>> import numpy as np, frf_ipz
+        >>> time = np.arange(4000) / 2000.0
+        >>> recordings = []
+        >>> for peak in (40.0, 60.0, 80.0):
+        ...     force = np.zeros(4000)
+        ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+        ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+        ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+        ...     recordings.append(
+        ...         frf_ipz.Recording(
+        ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+        ...         )
+        ...     )
+        >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+        >>> len(test.recordings)
+        3
         """
-        if kind not in {"hammer", "random"}:
-            raise InputError(f"'{kind}' is no kind of test; {did_you_mean(kind, ('hammer', 'random'))}")
+        require_each("recordings", recordings, Recording)
+        require_choice("unknown_scale", unknown_scale, SCALES)
+        if kind not in ("hammer", "random"):
+            raise InputError(f"'{kind}' is no kind of test; {did_you_mean(str(kind), ('hammer', 'random'))}")
         layouts = {(len(recording.output_dofs), recording.quantity) for recording in recordings}
         if len(layouts) != 1:
             raise InputError(
@@ -291,7 +334,25 @@ class VibrationTest(Concise):
         -------
         VibrationTest
             As if they had been read from a file.
+
+        Examples
+        --------
+        >>> import numpy as np, frf_ipz
+        >>> beam = frf_ipz.make_beam(
+        ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+        ...     left="clamped", modal_ratio=0.01,
+        ... )
+        >>> lines = np.arange(5, 400.0, 0.5)
+        >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+        >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+        >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+        >>> frfs = frf_ipz.FrfSet.from_arrays(
+        ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+        ... )
+        >>> frf_ipz.VibrationTest.from_frfs(frfs, name="beam").output_dofs == frfs.output_dofs
+        True
         """
+        require_type("frfs", frfs, FrfSet)
         return cls(
             path=Path(name),
             name=name,

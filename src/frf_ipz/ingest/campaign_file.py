@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from frf_ipz.arguments import as_path
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.frf import FrfLabel
@@ -176,8 +177,30 @@ def read_test(path: str | Path) -> VibrationTest:
         If a key is wrong or missing, a name is unknown or used twice, or no file fits a glob.
     QuantityError
         If a unit is none of its quantity.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import frf_ipz
+    >>> text = '''
+    ... [test]
+    ... kind = "frf"
+    ... [[frf]]
+    ... file = "tip.csv"
+    ... quantity = "accelerance"
+    ... '''
+    >>> table = '''frequency_hz,output_dof,input_dof,real,imag
+    ... 10,11:+z,6:+z,0.1,0.01
+    ... 20,11:+z,6:+z,0.3,0.02
+    ... '''
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "test.toml").write_text(text)
+    ...     _ = (Path(folder) / "tip.csv").write_text(table)
+    ...     [str(label) for label in frf_ipz.read_test(f"{folder}/test.toml").labels]
+    ['11:+z / 6:+z']
     """
-    path = Path(path).resolve()
+    path = as_path(path).resolve()
     keys = read_toml(path, CampaignFileKeys, required="test")
     _check_sections(path, keys)
     channels = _read_channels(path, keys)

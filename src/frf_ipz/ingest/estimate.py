@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from frf_ipz.arguments import require_type
+from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
 from frf_ipz.ingest.estimation.hammer import estimate_hammer
 from frf_ipz.ingest.estimation.random import estimate_random
@@ -11,7 +13,6 @@ from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
 
 KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
@@ -43,11 +44,25 @@ def estimate_frfs(
 
     Examples
     --------
-    >>> import frf_ipz
-    >>> test = frf_ipz.read_test("data/raw/cantilever/test.toml")  # doctest: +SKIP
-    >>> frf_ipz.estimate_frfs(test).frfs.n_frfs  # doctest: +SKIP
-    2
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> frf_ipz.estimate_frfs(test)
+    FrfEstimate: 3 of 3 records; FrfSet: 1 FRFs (accelerance) on 2001 lines from 0 to 1000 Hz, 1:+z / 1:+z
     """
+    require_type("test", test, VibrationTest)
+    require_type("options", options, IngestOptions, optional=True)
     result = KINDS[test.kind](test, options or IngestOptions(), progress)
     progress(1.0, "FRFs estimated")
     return result

@@ -54,6 +54,26 @@ class FrfEstimate(Tabulated, Drawn):
         What was chosen, and by what: windows, segments, lines.
     warnings : tuple of str
         Whatever the user has to know.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> estimate = frf_ipz.estimate_frfs(test)
+    >>> estimate.records["peak_force_N"].round(1).tolist()
+    [38.0, 57.1, 76.1]
     """
 
     frfs: FrfSet

@@ -32,6 +32,12 @@ class IngestOptions:
         Files, or ``file#2``, that are left out whatever the checks say.
     hide : tuple of str
         DOFs of sensors whose FRFs are left out, of whatever sign. A known mass of the sensor stays in the model.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.IngestOptions(estimator="Hv", drop=("hits/p18_03.csv",)).estimator
+    'Hv'
     """
 
     __pydantic_config__ = STRICT

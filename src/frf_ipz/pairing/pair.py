@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_type
+from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.pairing.poles import PolePairing, pair_poles
 from frf_ipz.pairing.zeros import ZeroPairing, in_band, pair_zeros
+from frf_ipz.structure import ReducedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.matching import Matching
-    from frf_ipz.structure import ReducedModel
 
 MIN_MARGIN = 1.0  # rise of the cost, in squared standard deviations, that a second-best assignment must have
 HARDLY_OBSERVABLE = 0.05  # amplitude over the mean amplitude, in every FRF, below which a mode need not show
@@ -43,7 +44,28 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     -------
     Pairs
         Every measured pole and zero and every one that the model has in the band, each with a verdict and its reason.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> frf_ipz.pair_roots(fit, reduced_model)
+    Pairs: 3 of 3 measured poles, 3 of 7 measured zeros have a counterpart in the model
     """
+    require_type("fit", fit, ModalFit)
+    require_type("reduced_model", reduced_model, ReducedModel)
     poles = model_poles(reduced_model, fit.labels)
     pole_pairing = pair_poles(fit, poles)
     rows = _pole_rows(fit, poles, pole_pairing)

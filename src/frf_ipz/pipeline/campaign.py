@@ -6,11 +6,19 @@ from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from frf_ipz.arguments import as_path, require_each, require_type
+from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.nonlinear.laws.law import Law
+from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.display import Concise
-from frf_ipz.dofs import as_dof
+from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
+from frf_ipz.export.options import ExportOptions
+from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.frf import FrfSet
+from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign import VibrationTest
+from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.pipeline.config import StageOptions
 from frf_ipz.pipeline.inputs import PipelineInputs, complete_model
 from frf_ipz.pipeline.run import run_chain, run_in_memory
@@ -19,23 +27,24 @@ from frf_ipz.progress import silent
 from frf_ipz.runs.digests import digest_arrays, digest_file
 from frf_ipz.runs.folder import open_run
 from frf_ipz.runs.results import open_results
+from frf_ipz.structure import StructuralModel
+from frf_ipz.updating.options import UpdateOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.nonlinear.laws.law import Law
-    from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.dofs import Dof
-    from frf_ipz.export.options import ExportOptions
-    from frf_ipz.fe.reduction.options import ReduceOptions
-    from frf_ipz.identification.options import FitOptions
-    from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
     from frf_ipz.runs.results import Results
-    from frf_ipz.structure import StructuralModel
-    from frf_ipz.updating.options import UpdateOptions
 
+OPTIONS = {
+    "ingest": IngestOptions,
+    "fit": FitOptions,
+    "diagnose": DiagnoseOptions,
+    "reduce": ReduceOptions,
+    "update": UpdateOptions,
+    "export": ExportOptions,
+}
 MEASUREMENT, MODEL, REFERENCE = "measurement", "FE model", "reference"  # names of what is in memory, for digests
 
 
@@ -96,6 +105,12 @@ class Campaign(Concise):
     export: ExportOptions | None = None
 
     def __post_init__(self) -> None:
+        require_type("data", self.data, FrfSet, VibrationTest)
+        require_type("fe_model", self.fe_model, StructuralModel, optional=True)
+        require_type("reference", self.reference, FrfSet, optional=True)
+        require_each("effects", self.effects, Effect, Law)
+        for stage, kind in OPTIONS.items():
+            require_type(stage, getattr(self, stage), kind, optional=True)
         self.inputs()
 
     def run(self, out: str | Path | None = None, *, until: str = "report", progress: Progress = silent) -> Results:
@@ -124,7 +139,7 @@ class Campaign(Concise):
         inputs = self.inputs()
         if out is None:
             return run_in_memory(inputs, until=until, progress=progress)
-        with open_run(Path(out)) as folder:
+        with open_run(as_path(out)) as folder:
             run_chain(inputs, folder, until=until, diagnosing=None, progress=progress)
         return open_results(out)
 
@@ -141,12 +156,11 @@ class Campaign(Concise):
         InputError
             If something does not fit.
         """
-        stages = ("ingest", "fit", "diagnose", "reduce", "update", "export")
-        chosen = {stage: getattr(self, stage) for stage in stages}
+        chosen = {stage: getattr(self, stage) for stage in OPTIONS}
         options = replace(StageOptions(), **{stage: value for stage, value in chosen.items() if value is not None})
         test = self.data if isinstance(self.data, VibrationTest) else VibrationTest.from_frfs(self.data, name=self.name)
         test = without_sensors(test, options.ingest.hide)
-        points = tuple(as_dof(point) for point in self.points)
+        points = as_dofs(self.points)
         if self.fe_model is None and points:
             raise InputError("points of interest need an FE model; hand it in as the second argument")
         digests = {str(file): digest_file(file) for file in test.files} | {MEASUREMENT: _digest_test(test)}

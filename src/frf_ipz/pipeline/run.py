@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from frf_ipz import __version__
+from frf_ipz.arguments import as_path
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.pipeline.chain import STAGES, chain
 from frf_ipz.pipeline.inputs import PipelineInputs, read_inputs
@@ -66,8 +67,8 @@ def run_pipeline(
     16
     """
     _require_stage(until)
-    inputs = read_inputs(Path(path))
-    with open_run(Path(out)) as folder:
+    inputs = read_inputs(as_path(path))
+    with open_run(as_path(out)) as folder:
         run_chain(inputs, folder, until=until, diagnosing=diagnosing, progress=progress)
     return open_results(out)
 

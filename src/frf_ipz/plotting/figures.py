@@ -19,6 +19,8 @@ from matplotlib.ticker import (
     NullLocator,
 )
 
+from frf_ipz.arguments import as_path
+from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.plotting.picture import (
     Areas,
     Axis,
@@ -164,25 +166,50 @@ def draw_panel(picture: Picture, ax: Axes | None = None, *, panel: int = 0) -> A
     return ax
 
 
-def save_figure(figure: Figure, path: Path, *, file_format: str) -> None:
+def save_figure(figure: Figure, path: str | Path, *, file_format: str) -> None:
     """Write a figure to a file, with text as text.
 
     Parameters
     ----------
     figure : Figure
         The figure.
-    path : Path
+    path : str or Path
         File to write.
     file_format : str
         ``svg``, ``pdf`` or ``png``.
 
     Raises
     ------
-    OSError
-        If it cannot be written.
+    InputError
+        If there is no such format, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> from tempfile import TemporaryDirectory
+    >>> ax = frf_ipz.plotting.plot_frfs(frfs)
+    >>> with TemporaryDirectory() as folder:
+    ...     frf_ipz.plotting.save_figure(ax.figure, f"{folder}/frfs.svg", file_format="svg")
     """
+    target = as_path(path)
+    if file_format not in FORMATS:
+        raise InputError(f"'{file_format}' is no format of pictures; {did_you_mean(str(file_format), FORMATS)}")
     with rc_context({"svg.fonttype": "none", "pdf.fonttype": 42, "savefig.dpi": 200}):  # text stays text
-        figure.savefig(path, format=file_format)
+        try:
+            figure.savefig(target, format=file_format)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written: {error.strerror}") from None
 
 
 def _draw_panels(part: SubFigure, picture: Picture) -> None:

@@ -59,6 +59,27 @@ def plot_records(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> estimate = frf_ipz.estimate_frfs(test)
+    >>> ax = frf_ipz.plotting.plot_records(estimate)
+    >>> ax.get_ylabel()
+    'force, N'
     """
     return _draw(describe_forces(estimate), ax, "no force was recorded")
 
@@ -82,6 +103,27 @@ def plot_responses(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> estimate = frf_ipz.estimate_frfs(test)
+    >>> ax = frf_ipz.plotting.plot_responses(estimate)
+    >>> ax.get_ylabel()
+    'output 1, m/s^2'
     """
     return _draw(describe_responses(estimate), ax, "no response was recorded")
 
@@ -100,6 +142,24 @@ def plot_frfs(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> ax = frf_ipz.plotting.plot_frfs(frfs)
+    >>> ax.get_ylabel()
+    'Accelerance, m/s^2/N'
     """
     return draw_panel(describe_frfs(frfs), ax)
 
@@ -118,6 +178,24 @@ def plot_phases(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> ax = frf_ipz.plotting.plot_phases(frfs)
+    >>> ax.get_ylabel()
+    'Phase, °'
     """
     return draw_panel(describe_frfs(frfs), ax, panel=1)
 
@@ -141,6 +219,27 @@ def plot_coherence(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> time = np.arange(4000) / 2000.0
+    >>> recordings = []
+    >>> for peak in (40.0, 60.0, 80.0):
+    ...     force = np.zeros(4000)
+    ...     force[200:206] = peak * np.sin(np.pi * np.arange(6) / 5)
+    ...     decay = np.exp(-20 * time) * np.sin(2 * np.pi * 80 * time)
+    ...     response = np.convolve(force, np.gradient(np.gradient(decay, 5e-4), 5e-4))[:4000] * 5e-4 * 1e-3
+    ...     recordings.append(
+    ...         frf_ipz.Recording(
+    ...             force=force, responses=response, sample_rate_hz=2000.0, input_dof="1:+z", output_dofs=["1:+z"]
+    ...         )
+    ...     )
+    >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
+    >>> estimate = frf_ipz.estimate_frfs(test)
+    >>> ax = frf_ipz.plotting.plot_coherence(estimate.frfs)
+    >>> ax.get_ylabel()
+    'Coherence'
     """
     picture = describe_frfs(frfs)
     if len(picture.panels) < 3:
@@ -164,6 +263,25 @@ def plot_fit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> ax = frf_ipz.plotting.plot_fit(frfs, fit)
+    >>> ax.get_ylabel()
+    'Accelerance, m/s^2/N'
     """
     return draw_panel(describe_fit(frfs, fit), ax)
 
@@ -184,6 +302,25 @@ def plot_misfit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> ax = frf_ipz.plotting.plot_misfit(frfs, fit)
+    >>> ax.get_ylabel()
+    'Misfit, m/s^2/N'
     """
     return draw_panel(describe_fit(frfs, fit), ax, panel=1)
 
@@ -204,6 +341,25 @@ def plot_stabilization(fit: ModalFit, frfs: FrfSet | None = None, *, ax: Axes | 
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> ax = frf_ipz.plotting.plot_stabilization(fit)
+    >>> ax.get_xlabel()
+    'Frequency, Hz'
     """
     return draw_panel(describe_stabilization(fit, frfs), ax)
 
@@ -222,6 +378,25 @@ def plot_pole_zero_map(fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> ax = frf_ipz.plotting.plot_pole_zero_map(fit)
+    >>> ax.get_xlabel()
+    'Frequency, Hz'
     """
     return draw_panel(describe_pole_zero_map(fit), ax)
 
@@ -240,6 +415,26 @@ def plot_pairs(pairs: Pairs, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         One lane for the poles and one for the zeros of each FRF.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> ax = frf_ipz.plotting.plot_pairs(frf_ipz.pair_roots(fit, reduced_model))
+    >>> ax.get_xlabel()
+    'Frequency, Hz'
     """
     return draw_panel(describe_pairs(pairs), ax)
 
@@ -286,6 +481,27 @@ def plot_convergence(updated: UpdatedModel, *, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> ax = frf_ipz.plotting.plot_convergence(updated_model)
+    >>> ax.get_xlabel()
+    'Iteration'
     """
     return _draw(describe_convergence(updated), ax, "the update took one step")
 
@@ -309,6 +525,27 @@ def plot_stiffness_change(parts: pd.DataFrame, *, ax: Axes | None = None) -> Axe
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model, fe_model=beam)
+    >>> ax = frf_ipz.plotting.plot_stiffness_change(updated_model.parts)
+    >>> ax.get_ylabel()
+    'Change of stiffness, %'
     """
     return _draw(describe_stiffness_change(parts), ax, "the update has changed no named parts")
 
@@ -333,6 +570,28 @@ def plot_prediction(
     -------
     Axes
         With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> prediction = frf_ipz.predict_frfs(fit, updated_model, points=["9:+z"])
+    >>> ax = frf_ipz.plotting.plot_prediction(prediction)
+    >>> ax.get_ylabel()
+    'Accelerance, m/s^2/N'
     """
     return draw_panel(describe_prediction(prediction, frf, measured), ax)
 
@@ -365,6 +624,17 @@ def plot_structure(
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> ax = frf_ipz.plotting.plot_structure(beam.geometry, sensors=[frf_ipz.Dof(11, "z")])
+    >>> ax.get_xlabel()
+    'Position, m'
     """
     marks = StructureMarks(sensors=sensors, inputs=inputs, points=points)
     return _draw(describe_structure(geometry, marks), ax, "the model has no nodes")
@@ -391,6 +661,29 @@ def plot_mismatch(diagnosis: Diagnosis, *, column: str = "before", ax: Axes | No
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> ax = frf_ipz.plotting.plot_mismatch(diagnosis)
+    >>> ax.get_ylabel()
+    'as it is'
     """
     picture = describe_mismatch(diagnosis)
     names = [] if picture is None else [layer.name for layer in picture.layers]
@@ -418,6 +711,29 @@ def plot_ranking(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> ax = frf_ipz.plotting.plot_ranking(diagnosis)
+    >>> ax.get_xlabel()
+    'Log Bayes factor over the model without it'
     """
     return _draw(describe_ranking(diagnosis), ax, "no explanation gains any evidence")
 
@@ -436,6 +752,29 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
         Bars.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> ax = frf_ipz.plotting.plot_proof(diagnosis)
+    >>> ax.get_ylabel()
+    'Normalised FRF error, %'
     """
     return draw_panel(describe_proof(diagnosis), ax)
 

@@ -13,14 +13,15 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
 
+from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.structure import ReducedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.pairing.pairs import Pairs
-    from frf_ipz.structure import ReducedModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +36,14 @@ class Agreement:
         Amplitude correlation X_A [Grafe1998]: 1 if they are the same. Both are dominated by the resonances.
     median_db, largest_db : (n_frfs,) array
         Median and largest difference of the magnitudes over the lines, dB.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> frf = np.array([[1.0 + 1j], [2.0]])
+    >>> frf_ipz.compare_frfs(frf, 1.1 * frf).to_frame(["1:+x / 2:+x"]).round(3)
+               FRF  X_S    X_A  median dB  largest dB
+    0  1:+x / 2:+x  1.0  0.995      0.828       0.828
     """
 
     shape: FloatArray
@@ -85,6 +94,8 @@ def compare_frfs(first: ComplexArray, second: ComplexArray) -> Agreement:
     >>> float(agreement.shape[0]).__round__(12), float(agreement.median_db[0]).__round__(12)
     (1.0, 20.0)
     """
+    first = take_array("the first FRFs", first, np.complex128, (None, None), is_finite=False)
+    second = take_array("the second FRFs", second, np.complex128, (None, None), is_finite=False)
     require_shape("the second FRFs", second, first.shape)
     inner = np.abs(np.sum(first.conj() * second, axis=0))
     first_power, second_power = np.sum(np.abs(first) ** 2, axis=0), np.sum(np.abs(second) ** 2, axis=0)
@@ -112,7 +123,30 @@ def shift_to_measured_poles(pairs: Pairs, reduced_model: ReducedModel) -> Reduce
     -------
     ReducedModel
         With measured frequencies and damping ratios, and the nominal shapes.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> pairs = frf_ipz.pair_roots(fit, reduced_model)
+    >>> shifted = frf_ipz.shift_to_measured_poles(pairs, reduced_model)
+    >>> bool(np.allclose(shifted.mass, reduced_model.mass))
+    True
     """
+    require_type("pairs", pairs, Pairs)
+    require_type("reduced_model", reduced_model, ReducedModel)
     nominal = reduced_model
     squares, shapes = eigh(nominal.stiffness, nominal.mass)
     frequency = np.sqrt(np.maximum(squares, 0.0))

@@ -18,6 +18,12 @@ class PredictOptions:
     reference : str, optional
         File of FRFs measured at the points of interest: the report compares the prediction with them, and nothing else
         uses them.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.PredictOptions(points=("49:+z",)).points
+    ('49:+z',)
     """
 
     __pydantic_config__ = STRICT

@@ -10,21 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
-from frf_ipz.frf import FrfLabel, Measured
+from frf_ipz.frf import FrfLabel, Measured, require_measured
 from frf_ipz.prediction.advice import explain_wide_band, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.zeros import predicted_zeros
+from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.structure import ReducedModel
-    from frf_ipz.updating.updated_model import UpdatedModel
 
 BAND = (0.05, 0.95)
 
@@ -58,13 +59,39 @@ def predict_frfs(
     ------
     InputError
         If nothing was measured, or the model does not know a point.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> frf_ipz.predict_frfs(fit, updated_model, points=["9:+z"], frequency_hz=np.array([10.0, 20.0]))
+    Prediction: 9:+z / 11:+z on 2 lines from 10 to 20 Hz
     """
+    require_measured(measured)
+    require_type("updated_model", updated_model, UpdatedModel)
     labels, updated = measured.labels, updated_model
-    frequency_hz = np.asarray(measured.frequency_hz if frequency_hz is None else frequency_hz, float)
+    frequency_hz = take_array(
+        "the frequencies", measured.frequency_hz if frequency_hz is None else frequency_hz, np.float64
+    )
+    if not len(frequency_hz) or (frequency_hz < 0).any() or not frequency_hz.any():
+        raise InputError(f"the frequencies are {frequency_hz}; at least one above 0 Hz is needed, and none below")
     if not labels:
         raise InputError("a prediction needs at least one measured FRF: its label says where the structure is excited")
     input_dofs = tuple(dict.fromkeys(label.input_dof for label in labels))
-    predicted = tuple(FrfLabel(as_dof(point), dof, labels[0].quantity) for point in points for dof in input_dofs)
+    predicted = tuple(FrfLabel(point, dof, labels[0].quantity) for point in as_dofs(points) for dof in input_dofs)
     s: ComplexArray = np.asarray(2j * np.pi * frequency_hz)
     band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())

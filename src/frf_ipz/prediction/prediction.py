@@ -30,6 +30,29 @@ class Prediction(Tabulated, Drawn):
         Standard deviation of their real and imaginary parts, rad/s; NaN where the method gives none.
     warnings : tuple of str
         Where the band is wide, why, and what would narrow it.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> prediction = frf_ipz.predict_frfs(fit, updated_model, points=["9:+z"])
+    >>> prediction
+    Prediction: 9:+z / 11:+z on 790 lines from 5 to 399.5 Hz
+    >>> prediction.values.shape
+    (790, 1)
     """
 
     frequency_hz: FloatArray

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
+from frf_ipz.arguments import as_path
 from frf_ipz.display import PICTURES, REPORT
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export.frames import FRAMES, as_frame
@@ -85,10 +86,23 @@ class Results:
 
     Examples
     --------
-    >>> import frf_ipz
-    >>> results = frf_ipz.open_results("results/cantilever")  # doctest: +SKIP
-    >>> results.fit.n_modes  # doctest: +SKIP
-    4
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> results = frf_ipz.Campaign(frfs).run()
+    >>> results.stages
+    ('ingest', 'fit')
+    >>> results.fit.n_modes
+    3
     """
 
     def __init__(self, store: Store) -> None:
@@ -194,7 +208,7 @@ class Results:
             If it cannot be written.
         """
         try:
-            import_module(REPORT).write_report(self, Path(path))
+            import_module(REPORT).write_report(self, as_path(path))
         except OSError as error:
             raise InputError(f"{path}: the report cannot be written: {error.strerror}") from None
 
@@ -325,5 +339,26 @@ def open_results(path: str | Path) -> Results:
     ------
     InputError
         If no run has been made there, or it was made by a version whose results cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = frf_ipz.Campaign(frfs).run(Path(folder) / "results", until="fit")
+    ...     frf_ipz.open_results(Path(folder) / "results").stages
+    ('ingest', 'fit')
     """
-    return Results(read_run(Path(path)))
+    return Results(read_run(as_path(path)))

@@ -44,6 +44,12 @@ class UpdateOptions:
         Number of models drawn from the posterior (minimal-change), from which the bands of predictions follow.
     seed : int
         Seed of the draws.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.UpdateOptions(mass=True, ensemble=50).method
+    'minimal-change'
     """
 
     __pydantic_config__ = STRICT

@@ -19,16 +19,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Concise
+from frf_ipz.dofs import as_dofs
 from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.regions import Region, reduced_regions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.dofs import Dof
-    from frf_ipz.structure import ReducedModel, StructuralModel
 
 GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a wrong modulus or thickness
 SEGMENT_STD = 0.05  # of each term with a correlation length
@@ -89,6 +91,26 @@ class ParameterBasis(Concise):
     ------
     ShapeError
         If shapes disagree.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> basis = frf_ipz.make_structural_basis(beam, reduced_model)
+    >>> float(basis.amounts(np.zeros(len(basis.names))).max())
+    0.0
     """
 
     names: tuple[str, ...]
@@ -182,7 +204,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
 
 
 def make_structural_basis(
-    fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof] = ()
+    fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof | str] = ()
 ) -> ParameterBasis:
     """Factors on the parts of the FE model, masses of sensors, and generic changes that parts cannot express.
 
@@ -194,14 +216,37 @@ def make_structural_basis(
         Its reduced model.
     mass : bool
         Let the masses of the parts change too.
-    sensors : sequence of Dof
+    sensors : sequence of Dof or str
         Sensors of unknown mass that are attached during the whole test: the mass is a parameter too.
 
     Returns
     -------
     ParameterBasis
         With generic parameters instead of parts where the model has none, or only one.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> basis = frf_ipz.make_structural_basis(beam, reduced_model)
+    >>> len(basis.names), basis.names[0]
+    (31, 'stiffness of element 1')
     """
+    require_type("fe_model", fe_model, StructuralModel)
+    require_type("reduced_model", reduced_model, ReducedModel)
+    heavy_sensors = as_dofs(sensors, name="sensors")
     regions = reduced_regions(fe_model, reduced_model)
     if len(regions) < 2:
         basis = generic_basis(reduced_model)
@@ -210,7 +255,7 @@ def make_structural_basis(
         if mass:
             basis = join_bases(basis, _part_basis(regions, stiffness=False))
         basis = join_bases(basis, generic_basis(reduced_model, std=GENERIC_STD, common=False))
-    return join_bases(basis, _sensor_basis(reduced_model, sensors)) if sensors else basis
+    return join_bases(basis, _sensor_basis(reduced_model, heavy_sensors)) if heavy_sensors else basis
 
 
 def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:

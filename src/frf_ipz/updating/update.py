@@ -11,21 +11,21 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol, cast
 
+from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.pairing.pair import pair_roots
+from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.progress import silent
+from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating import methods
 from frf_ipz.updating.options import UpdateOptions
-from frf_ipz.updating.parameters import make_structural_basis
+from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 
 if TYPE_CHECKING:
-    from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.progress import Progress
-    from frf_ipz.structure import ReducedModel, StructuralModel
-    from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.position_uncertainty import PositionUncertainty
     from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -98,7 +98,32 @@ def update_model(
         If there is no such method, or the method cannot work on this model.
     NumericalError
         If the matrices of the model cannot be worked with.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> frf_ipz.update_model(fit, reduced_model, fe_model=beam)
+    UpdatedModel: minimal-change, converged, 6 targets, 2 iterations, 6 DOFs
     """
+    require_type("fit", fit, ModalFit)
+    require_type("reduced_model", reduced_model, ReducedModel)
+    require_type("pairs", pairs, Pairs, optional=True)
+    require_type("fe_model", fe_model, StructuralModel, optional=True)
+    require_type("options", options, UpdateOptions, optional=True)
+    require_type("basis", basis, ParameterBasis, optional=True)
     chosen = options or UpdateOptions()
     available = method_names()
     if chosen.method not in available:

@@ -14,7 +14,28 @@ from frf_ipz.structure import ReducedModel
 
 
 class UpdateStatus(Enum):
-    """How an update ended; the values are the message."""
+    """How an update ended; the values are the message.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> updated_model.status is frf_ipz.UpdateStatus.CONVERGED
+    True
+    """
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "stopped at the largest number of iterations: allow more, or look at the pairs"
@@ -49,6 +70,28 @@ class UpdatedModel(Tabulated, Drawn):
     parts : DataFrame
         Change of the stiffness of every part of the FE model, as `along_structure.change_along_structure` gives it;
         empty where the method has not changed parts.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
+    >>> updated_model = frf_ipz.update_model(fit, reduced_model)
+    >>> updated_model
+    UpdatedModel: minimal-change, converged, 6 targets, 2 iterations, 6 DOFs
+    >>> updated_model.ensemble.shape
+    (200, 3, 6, 6)
     """
 
     model: ReducedModel

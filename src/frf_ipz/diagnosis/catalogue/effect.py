@@ -54,6 +54,12 @@ class Parameter:
         The value at which the effect vanishes; 0 or infinity for most, 1 for ratios.
     tolerance : float
         Distance from the neutral value that a user's tolerances allow; smaller effects are not significant.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> round(frf_ipz.Parameter(name="mass_kg", low=0.001, high=0.1).typical, 6)
+    0.01
     """
 
     name: str
@@ -84,6 +90,12 @@ class Location:
         What `diagnosis.json` says of it: nodes, elements, springs, channels, an end, groups.
     text : mapping of str to str
         Parameters that are text: the kind of a filter.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.Location(key=(3, "x"), entries={"nodes": [3]}).entries
+    {'nodes': [3]}
     """
 
     key: tuple[object, ...]
@@ -107,6 +119,14 @@ class Signature:
         The parameter that multiplies the dynamic stiffness.
     amplitudes : (n,) array, optional
         What to try; chosen from the structure's own stiffness where it is left out.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> s = 2j * np.pi * np.array([10.0, 20.0])
+    >>> mass = frf_ipz.Signature(motion=np.array([0.0, 1.0]), shapes=s[None] ** 2, values=np.ones((1, 1)))
+    >>> mass.amplitude
+    0
     """
 
     motion: FloatArray
@@ -117,7 +137,44 @@ class Signature:
 
 
 class Effect(ABC):
-    """One thing that a nominal model may lack."""
+    """One thing that a nominal model may lack.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> class Ballast(frf_ipz.Effect):
+    ...     name = "ballast"
+    ...     def locations(self, context):
+    ...         return [frf_ipz.Location(key=(dof.node,), entries={"nodes": [dof.node]}) for dof in context.moving_dofs]
+    ...     def parameters(self, context, location):
+    ...         return (frf_ipz.Parameter(name="mass_kg", low=1e-3, high=1.0),)
+    ...     def build(self, context, location):
+    ...         matrix = context.model.mass_all * 0
+    ...         row = context.model.full_index(frf_ipz.Dof(location.key[0], "x"))
+    ...         unit = matrix.tolil()
+    ...         unit[row, row] = 1.0
+    ...         return lambda values: frf_ipz.Change(mass=values[0] * unit.tocsr())
+    ...     def statement(self, context, location, values):
+    ...         return f"Ballast of {values['mass_kg'].value:.3g} kg at node {location.key[0]}."
+    >>> import numpy as np
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("sensor_gain",))
+    >>> frf_ipz.diagnose(frfs, model, options=options, effects=[Ballast()]).verdict
+    'explained'
+    """
 
     name: ClassVar[str]
     """As in `diagnosis.json`."""

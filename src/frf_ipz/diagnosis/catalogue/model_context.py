@@ -37,6 +37,22 @@ class ModelContext:
         Where effects are searched, rad/s.
     options : DiagnoseOptions
         Tolerances.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> class Ballast(frf_ipz.Effect):
+    ...     name = "ballast"
+    ...     def locations(self, context: frf_ipz.ModelContext):
+    ...         return [frf_ipz.Location(key=(dof.node,)) for dof in context.moving_dofs]
+    ...     def parameters(self, context: frf_ipz.ModelContext, location):
+    ...         return (frf_ipz.Parameter(name="mass_kg", low=1e-3 * context.mass_kg, high=context.mass_kg),)
+    ...     def build(self, context, location):
+    ...         return lambda values: frf_ipz.Change(mass=values[0] * context.model.mass_all)
+    ...     def statement(self, context, location, values):
+    ...         return f"Ballast at {context.describe_node(location.key[0])}."
+    >>> Ballast().name
+    'ballast'
     """
 
     basis: Basis

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_each, require_type
 from frf_ipz.diagnosis.compare import mass_loss
 from frf_ipz.diagnosis.compare.learnt_nuisance import estimate_change_error, learn, predict_unchanged_model
 from frf_ipz.diagnosis.compare.states import CompareOptions, MachineState
@@ -19,6 +20,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Diagnosis
 from frf_ipz.diagnosis.verdict.decision import CONSISTENT
 from frf_ipz.display import Concise
+from frf_ipz.errors import InputError
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -42,6 +44,28 @@ class Comparison(Concise):
         with what the model cannot follow as noise.
     scatter : DiagnoseOptions
         Tolerances within which nothing has changed: those stated, or what the states before show beyond them.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> observed = frf_ipz.observe(frf_ipz.VibrationTest.from_frfs(frfs), frfs=frfs)
+    >>> before = frf_ipz.MachineState(observed=observed, fe_model=model)
+    >>> frf_ipz.compare_states(before, before).is_changed
+    False
     """
 
     diagnosis: Diagnosis
@@ -98,9 +122,36 @@ def compare_states(
     ------
     InputError
         If states do not show the same channels and modes, or a model lacks a DOF that was measured.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> test = frf_ipz.VibrationTest.from_frfs(frfs)
+    >>> before = frf_ipz.MachineState(observed=frf_ipz.observe(test, frfs=frfs), fe_model=model)
+    >>> frf_ipz.compare_states(before, before).statement
+    'Nothing has changed beyond what differs from test to test.'
     """
+    require_type("after", after, MachineState)
+    require_type("options", options, CompareOptions, optional=True)
     chosen = options or CompareOptions()
+    require_each("before", [before] if isinstance(before, MachineState) else before, MachineState)
     states = [before] if isinstance(before, MachineState) else list(before)
+    if not states:
+        raise InputError("before holds no state; give at least one that the state after is compared with")
     progress(0.0, "learning from the states before")
     return judge(learn(states, chosen), after, chosen, progress=progress)
 

@@ -30,6 +30,27 @@ class MachineState(Concise):
         Records or FRFs, from `observe`.
     fe_model : StructuralModel
         The FE model, with damping, and with everything that is known to be different in this state.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> observed = frf_ipz.observe(frf_ipz.VibrationTest.from_frfs(frfs), frfs=frfs)
+    >>> frf_ipz.MachineState(observed=observed, fe_model=model).observed.band_hz
+    (5.0, 99.5)
     """
 
     observed: Observations
@@ -48,6 +69,13 @@ class CompareOptions:
         What differs from test to test with nothing changed; what repeated states before show beyond that is added.
     effects : tuple of str
         Search for these changes only, besides `mass_loss`; for all effects of the catalogue where it is empty.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> options = frf_ipz.CompareOptions(effects=("added_mass", "local_stiffness"))
+    >>> options.model.stiffness_tolerance, options.scatter.stiffness_tolerance
+    (0.05, 0.001)
     """
 
     model: DiagnoseOptions = field(default=ROUGH_MODEL)

@@ -75,6 +75,17 @@ class Change:
         What a channel shows over what it should show.
     moved : mapping of str to int
         Output channels, and the node where the sensor really is.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.Change(mass=0.1 * model.mass_all)
+    >>> (heavier + heavier).mass.toarray().diagonal().tolist()
+    [0.4, 0.2, 0.2]
     """
 
     model: StructuralModel | None = None

@@ -43,6 +43,17 @@ class BeamSection:
         First and last element, both included.
     thickness_m, width_m : float, optional
         Of these elements; by default that of the beam.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> root = frf_ipz.BeamSection(elements=(1, 3), thickness_m=0.008)
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", section=[root],
+    ... )
+    >>> frf_ipz.solve_modes(beam, n_modes=1).natural_frequency_hz.round(2)
+    array([25.38])
     """
 
     __pydantic_config__ = STRICT
@@ -64,6 +75,17 @@ class BeamPointMass:
         The mass.
     rotary_inertia_kgm2 : float
         Its moment of inertia about y.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> sensor = frf_ipz.BeamPointMass(node=11, mass_kg=0.005)
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", point_mass=[sensor],
+    ... )
+    >>> frf_ipz.solve_modes(beam, n_modes=1).natural_frequency_hz.round(2)
+    array([15.35])
     """
 
     __pydantic_config__ = STRICT
@@ -85,6 +107,17 @@ class BeamPointSpring:
         Against its displacement z.
     rotational_stiffness_Nm_rad : float
         Against its rotation ry.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> support = frf_ipz.BeamPointSpring(node=11, stiffness_N_m=1e3)
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", point_spring=[support],
+    ... )
+    >>> frf_ipz.solve_modes(beam, n_modes=1).natural_frequency_hz.round(2)
+    array([30.96])
     """
 
     __pydantic_config__ = STRICT

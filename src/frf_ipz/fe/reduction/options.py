@@ -22,6 +22,12 @@ class ReduceOptions:
     residual_flexibility : tuple of str, optional
         DOFs whose residual flexibility joins the basis; by default the actuators, or the sensors and points where these
         are fewer, and DOFs with dampers.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.ReduceOptions(modes=5, residual_flexibility=("101:z",))
+    ReduceOptions(modes=5, dofs=(), residual_flexibility=('101:z',))
     """
 
     __pydantic_config__ = STRICT

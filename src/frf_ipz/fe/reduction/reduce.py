@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import Dof, as_dof
+from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
@@ -25,6 +26,7 @@ from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
 from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
+from frf_ipz.frf import require_measured
 from frf_ipz.structure import ReducedModel, StructuralModel
 
 if TYPE_CHECKING:
@@ -85,12 +87,18 @@ def reduce_model(
     >>> [dof.name for dof in frf_ipz.reduce_model(frfs, beam, points=["49:+z"]).dofs][:3]
     ['89:z', '101:z', '49:z']
     """
+    require_measured(measured)
+    require_type("fe_model", fe_model, StructuralModel)
+    require_type("options", options, ReduceOptions, optional=True)
+    require_type("default_damping_ratio", default_damping_ratio, float, int, np.number, optional=True)
+    if default_damping_ratio is not None and not 0 <= default_damping_ratio < 1:
+        raise InputError(f"default_damping_ratio is {default_damping_ratio}; a damping ratio lies from 0 to below 1")
     return reduce_to_dofs(
         fe_model,
         options=options,
         actuators=tuple(dict.fromkeys(label.input_dof for label in measured.labels)),
         sensors=tuple(dict.fromkeys(label.output_dof for label in measured.labels)),
-        points=tuple(as_dof(point) for point in points),
+        points=as_dofs(points),
         band_hz=measured.band_hz,
         default_damping_ratio=default_damping_ratio,
     )

@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.modes import ModeSet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.modes import ModeSet
 
 ITERATIONS = 20  # of the ratio of two FRFs; of gains and scales in turn
 UNDETERMINED = 1e-6  # part of a gain that the equations leave open: above, they do not determine it
@@ -134,7 +135,29 @@ def estimate_gains(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     -------
     DataFrame
         One row an FRF: ``output_dof, input_dof, gain, gain_std``; the median gain is 1.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> frf_ipz.estimate_gains(fit, frf_ipz.solve_modes(beam, n_modes=4))[["output_dof", "gain"]].round(3)
+      output_dof  gain
+    0       6:+z   1.0
+    1      11:+z   1.0
     """
+    require_type("fit", fit, ModalFit)
+    require_type("shapes", shapes, ModeSet)
     poles = fit.model.poles[: fit.n_modes]
     powers = np.array([label.quantity.power for label in fit.labels])
     signs = np.array([label.sign for label in fit.labels])

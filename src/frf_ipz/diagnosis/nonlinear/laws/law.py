@@ -30,7 +30,19 @@ LEAST_MOTION = 1e-30  # m: keeps a derivative at rest finite
 
 
 class Law(ABC):
-    """A force between a location and the ground, or across a spring, against its motion w and velocity v."""
+    """A force between a location and the ground, or across a spring, against its motion w and velocity v.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> class SquareDrag(frf_ipz.Law):
+    ...     name = "square_drag"
+    ...     strength_name = "drag_Ns2_m2"
+    ...     def unit_force(self, w, v, shape):
+    ...         return v * np.abs(v)
+    >>> SquareDrag().unit_force(np.zeros(2), np.array([-2.0, 3.0]), 0.0)
+    array([-4.,  9.])
+    """
 
     name: ClassVar[str]
     """As in `diagnosis.json`."""
