@@ -242,6 +242,27 @@ def test_wrong_values_raise_errors_of_the_package(name, tmp_path, monkeypatch):
     assert not slips, "\n".join(slips)
 
 
+@pytest.mark.parametrize("value", NOTHING_OF_THE_KIND, ids=lambda value: type(value).__name__)
+@pytest.mark.parametrize("name", [name for name in frf_ipz.plotting.__all__ if name.startswith("plot_")])
+def test_a_plot_refuses_what_is_no_result(name, value):
+    needs_fit = name in {"plot_fit", "plot_misfit"}
+    with pytest.raises(frf_ipz.InputError, match="needed is a"):
+        getattr(frf_ipz.plotting, name)(*([value, good().fit] if needs_fit else [value]))
+
+
+def test_plots_refuse_an_frf_a_column_and_a_label_that_is_not_there():
+    g = good()
+    prediction = frf_ipz.predict_frfs(g.fit, g.updated_model, points=["9:+z"])
+    for name, arguments in {
+        "plot_prediction": {"prediction": prediction, "frf": 1},
+        "plot_mismatch": {"diagnosis": g.diagnosis, "column": "never"},
+        "plot_structure": {"geometry": g.beam.geometry, "sensors": ["text"]},
+        "plot_fit": {"frfs": g.frfs, "fit": 3},
+    }.items():
+        with pytest.raises(frf_ipz.InputError):
+            getattr(frf_ipz.plotting, name)(**arguments)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A run's folder with all that can be read again, and files of a test, a model and a pipeline."""

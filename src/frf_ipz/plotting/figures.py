@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from matplotlib import rc_context
@@ -166,14 +166,14 @@ def draw_panel(picture: Picture, ax: Axes | None = None, *, panel: int = 0) -> A
     return ax
 
 
-def save_figure(figure: Figure, path: str | Path, *, file_format: str) -> None:
+def save_figure(figure: Figure, path: str | Path | BinaryIO, *, file_format: str) -> None:
     """Write a figure to a file, with text as text.
 
     Parameters
     ----------
     figure : Figure
         The figure.
-    path : str or Path
+    path : str, Path or binary stream
         File to write.
     file_format : str
         ``svg``, ``pdf`` or ``png``.
@@ -202,7 +202,7 @@ def save_figure(figure: Figure, path: str | Path, *, file_format: str) -> None:
     >>> with TemporaryDirectory() as folder:
     ...     frf_ipz.plotting.save_figure(ax.figure, f"{folder}/frfs.svg", file_format="svg")
     """
-    target = as_path(path)
+    target = path if hasattr(path, "write") else as_path(path)
     if file_format not in FORMATS:
         raise InputError(f"'{file_format}' is no format of pictures; {did_you_mean(str(file_format), FORMATS)}")
     with rc_context({"svg.fonttype": "none", "pdf.fonttype": 42, "savefig.dpi": 200}):  # text stays text

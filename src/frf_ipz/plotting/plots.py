@@ -8,7 +8,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+import pandas as pd
+
+from frf_ipz.arguments import require_each, require_type, take_array
+from frf_ipz.diagnosis.measured.levels import LevelDependence
+from frf_ipz.diagnosis.result import Diagnosis, LawInTime
+from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
+from frf_ipz.frf import FrfSet
+from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.ingest.frf_estimate import FrfEstimate
+from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.plotting.diagnosis import describe_mismatch, describe_proof, describe_ranking
 from frf_ipz.plotting.figures import draw_panel
 from frf_ipz.plotting.frfs import describe_fit, describe_frfs
@@ -18,26 +29,19 @@ from frf_ipz.plotting.prediction import describe_prediction
 from frf_ipz.plotting.records import describe_forces, describe_responses
 from frf_ipz.plotting.structure import StructureMarks, describe_structure
 from frf_ipz.plotting.updating import describe_convergence, describe_stiffness_change, describe_targets
+from frf_ipz.prediction.prediction import Prediction
+from frf_ipz.structure import Geometry
+from frf_ipz.updating.targets import Target
+from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import pandas as pd
     from matplotlib.axes import Axes
 
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.diagnosis.measured.levels import LevelDependence
-    from frf_ipz.diagnosis.result import Diagnosis, LawInTime
     from frf_ipz.dofs import Dof
-    from frf_ipz.frf import FrfSet
-    from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.frf_estimate import FrfEstimate
-    from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.plotting.picture import Picture
-    from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.structure import Geometry
-    from frf_ipz.updating.targets import Target
-    from frf_ipz.updating.updated_model import UpdatedModel
 
 
 def plot_records(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
@@ -81,6 +85,7 @@ def plot_records(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'force, N'
     """
+    require_type("estimate", estimate, FrfEstimate)
     return _draw(describe_forces(estimate), ax, "no force was recorded")
 
 
@@ -125,6 +130,7 @@ def plot_responses(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'output 1, m/s^2'
     """
+    require_type("estimate", estimate, FrfEstimate)
     return _draw(describe_responses(estimate), ax, "no response was recorded")
 
 
@@ -161,6 +167,7 @@ def plot_frfs(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Accelerance, m/s^2/N'
     """
+    require_type("frfs", frfs, FrfSet)
     return draw_panel(describe_frfs(frfs), ax)
 
 
@@ -197,6 +204,7 @@ def plot_phases(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Phase, °'
     """
+    require_type("frfs", frfs, FrfSet)
     return draw_panel(describe_frfs(frfs), ax, panel=1)
 
 
@@ -241,6 +249,7 @@ def plot_coherence(frfs: FrfSet, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Coherence'
     """
+    require_type("frfs", frfs, FrfSet)
     picture = describe_frfs(frfs)
     if len(picture.panels) < 3:
         raise InputError("the coherence of these FRFs is not known")
@@ -283,6 +292,8 @@ def plot_fit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Accelerance, m/s^2/N'
     """
+    require_type("frfs", frfs, FrfSet)
+    require_type("fit", fit, ModalFit)
     return draw_panel(describe_fit(frfs, fit), ax)
 
 
@@ -322,6 +333,8 @@ def plot_misfit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Misfit, m/s^2/N'
     """
+    require_type("frfs", frfs, FrfSet)
+    require_type("fit", fit, ModalFit)
     return draw_panel(describe_fit(frfs, fit), ax, panel=1)
 
 
@@ -361,6 +374,8 @@ def plot_stabilization(fit: ModalFit, frfs: FrfSet | None = None, *, ax: Axes | 
     >>> ax.get_xlabel()
     'Frequency, Hz'
     """
+    require_type("fit", fit, ModalFit)
+    require_type("frfs", frfs, FrfSet, optional=True)
     return draw_panel(describe_stabilization(fit, frfs), ax)
 
 
@@ -398,6 +413,7 @@ def plot_pole_zero_map(fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel()
     'Frequency, Hz'
     """
+    require_type("fit", fit, ModalFit)
     return draw_panel(describe_pole_zero_map(fit), ax)
 
 
@@ -436,6 +452,7 @@ def plot_pairs(pairs: Pairs, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel()
     'Frequency, Hz'
     """
+    require_type("pairs", pairs, Pairs)
     return draw_panel(describe_pairs(pairs), ax)
 
 
@@ -459,6 +476,7 @@ def plot_targets(targets: Sequence[Target], *, ax: Axes | None = None) -> Axes:
     InputError
         If there is nothing to draw.
     """
+    require_each("targets", targets, Target)
     return _draw(describe_targets(targets), ax, "the update had no targets")
 
 
@@ -503,6 +521,7 @@ def plot_convergence(updated: UpdatedModel, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel()
     'Iteration'
     """
+    require_type("updated", updated, UpdatedModel)
     return _draw(describe_convergence(updated), ax, "the update took one step")
 
 
@@ -547,6 +566,7 @@ def plot_stiffness_change(parts: pd.DataFrame, *, ax: Axes | None = None) -> Axe
     >>> ax.get_ylabel()
     'Change of stiffness, %'
     """
+    require_type("parts", parts, pd.DataFrame)
     return _draw(describe_stiffness_change(parts), ax, "the update has changed no named parts")
 
 
@@ -593,15 +613,22 @@ def plot_prediction(
     >>> ax.get_ylabel()
     'Accelerance, m/s^2/N'
     """
+    require_type("prediction", prediction, Prediction)
+    if frf not in range(len(prediction.labels)):
+        raise InputError(f"the prediction has no FRF {frf!r}; it has 0 to {len(prediction.labels) - 1}")
+    if measured is not None:
+        measured = take_array(
+            "the measured FRF", measured, np.complex128, (len(prediction.frequency_hz),), is_finite=False
+        )
     return draw_panel(describe_prediction(prediction, frf, measured), ax)
 
 
 def plot_structure(
     geometry: Geometry,
     *,
-    sensors: Sequence[Dof] = (),
-    inputs: Sequence[Dof] = (),
-    points: Sequence[Dof] = (),
+    sensors: Sequence[Dof | str] = (),
+    inputs: Sequence[Dof | str] = (),
+    points: Sequence[Dof | str] = (),
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a structure with sensors, inputs and points of interest.
@@ -610,7 +637,7 @@ def plot_structure(
     ----------
     geometry : Geometry
         Of the FE model.
-    sensors, inputs, points : sequence of Dof
+    sensors, inputs, points : sequence of Dof or str
         What to mark.
     ax : Axes, optional
         Where to draw; axes of a new figure where it is left out.
@@ -636,7 +663,10 @@ def plot_structure(
     >>> ax.get_xlabel()
     'Position, m'
     """
-    marks = StructureMarks(sensors=sensors, inputs=inputs, points=points)
+    require_type("geometry", geometry, Geometry)
+    marks = StructureMarks(
+        sensors=as_dofs(sensors, name="sensors"), inputs=as_dofs(inputs, name="inputs"), points=as_dofs(points)
+    )
     return _draw(describe_structure(geometry, marks), ax, "the model has no nodes")
 
 
@@ -685,6 +715,7 @@ def plot_mismatch(diagnosis: Diagnosis, *, column: str = "before", ax: Axes | No
     >>> ax.get_ylabel()
     'as it is'
     """
+    require_type("diagnosis", diagnosis, Diagnosis)
     picture = describe_mismatch(diagnosis)
     names = [] if picture is None else [layer.name for layer in picture.layers]
     if picture is None or column not in names:
@@ -735,6 +766,7 @@ def plot_ranking(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel()
     'Log Bayes factor over the model without it'
     """
+    require_type("diagnosis", diagnosis, Diagnosis)
     return _draw(describe_ranking(diagnosis), ax, "no explanation gains any evidence")
 
 
@@ -776,6 +808,7 @@ def plot_proof(diagnosis: Diagnosis, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'Normalised FRF error, %'
     """
+    require_type("diagnosis", diagnosis, Diagnosis)
     return draw_panel(describe_proof(diagnosis), ax)
 
 
@@ -794,6 +827,7 @@ def plot_law(law: LawInTime, *, ax: Axes | None = None) -> Axes:
     Axes
         Responses over time, or the force over the motion at its location.
     """
+    require_type("law", law, LawInTime)
     return draw_panel(describe_law_response(law) or describe_law_force(law), ax)
 
 
@@ -817,6 +851,7 @@ def plot_levels(levels: LevelDependence, *, ax: Axes | None = None) -> Axes:
     InputError
         If there is nothing to draw.
     """
+    require_type("levels", levels, LevelDependence)
     return _draw(describe_level_modes(levels), ax, "no mode was found at several levels")
 
 
