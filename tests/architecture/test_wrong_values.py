@@ -114,6 +114,16 @@ def calls():
             {"tolerance_m_per_m": [-1.0, np.nan]},
         ),
         "read_ensemble": ({"path": "x.mat"}, {"path": [Path(__file__)]}),
+        "read_frfs": (
+            {"path": "x.csv"},
+            {
+                "path": [Path(__file__), Path("x.csv")],
+                "quantity": ["inertia", 3],
+                "unit": ["parsec", 3],
+                "output": ["text", 3],
+                "input": ["text", 3],
+            },
+        ),
         "read_model": ({"path": "x.toml"}, {"path": [Path(__file__)]}),
         "read_state_space": ({"path": "x.json"}, {"path": [Path(__file__)]}),
         "read_test": ({"path": "x.toml"}, {"path": [Path(__file__)]}),
@@ -138,7 +148,7 @@ def calls():
             {"fit": g.fit, "reduced_model": g.reduced_model},
             {"pairs": [3], "fe_model": [3], "options": [{}, frf_ipz.UpdateOptions(method="guess")], "basis": [3]},
         ),
-        "write_state_space": ({"model": 3, "path": "x.json"}, {"path": ["x.txt"]}),
+        "write_state_space": ({"system": 3, "path": "x.json"}, {"path": ["x.txt"]}),
         "FrfSet.from_arrays": (
             FRFS,
             {
@@ -287,6 +297,7 @@ def folder(tmp_path_factory):
     [
         ("read_test", "test.toml"),
         ("read_model", "model.toml"),
+        ("read_frfs", "tip.csv"),
         ("open_results", "run"),
         ("read_state_space", "run/statespace.json"),
         ("read_state_space", "run/statespace.mat"),

@@ -25,6 +25,29 @@ class Estimate:
         Most probable value and standard deviation, in the unit that the parameter's name ends with.
     low, high : float
         Ends of the 95 % interval; not symmetric for parameters that are known to a factor.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> mass = diagnosis.findings[0].parameters["mass_kg"]
+    >>> mass.low < 0.2 < mass.high
+    True
     """
 
     value: float
@@ -59,6 +82,29 @@ class Finding:
         The location as the effect itself knows it.
     values : tuple of float
         Values of the parameters as the effect itself knows them, in its own order.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> finding = diagnosis.findings[0]
+    >>> finding.effect, finding.location, finding.is_significant
+    ('added_mass', {'nodes': [3]}, True)
     """
 
     effect: str
@@ -124,6 +170,13 @@ class DataCheck:
         What it stays below where nothing is wrong.
     statement : str
         A sentence for the user.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> check = frf_ipz.DataCheck(name="reciprocity", value=1.3, limit=4.0, statement="Exchanged FRFs agree.")
+    >>> check.passed
+    True
     """
 
     name: str
@@ -147,6 +200,28 @@ class Misfit:
         Norm of measured minus model over the norm of measured, on what was fitted and on what was not.
     training_noise, held_out_noise : float
         The same norms over what noise and tolerances make one expect.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> diagnosis.after.training < diagnosis.before.training
+    True
     """
 
     training: float
@@ -167,6 +242,15 @@ class Ambiguity:
         Log Bayes factor of the first over the last.
     resolve_by : str
         The sensor or excitation that would distinguish them.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> ambiguity = frf_ipz.Ambiguity(
+    ...     effects=("added_mass", "local_stiffness"), log_bayes_factor=1.2, resolve_by="A sensor at node 7 would."
+    ... )
+    >>> ambiguity.statement
+    'These data cannot tell apart: added mass and local stiffness. A sensor at node 7 would.'
     """
 
     effects: tuple[str, ...]
@@ -194,6 +278,29 @@ class Curves(Concise):
         As measured; of the model as it is, with what its tolerances allow, and with the findings.
     expected : (n_points, n_frfs) array
         Standard deviation of noise and of what no parameter of the model stands for.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> dofs = ["1:x", "2:x", "3:x"]
+    >>> masses = np.diag([2.0, 1.0, 1.0])
+    >>> model = frf_ipz.StructuralModel.from_matrices(masses, stiffness, dofs=dofs, modal_damping=0.01)
+    >>> heavier = frf_ipz.StructuralModel.from_matrices(
+    ...     masses + np.diag([0.0, 0.0, 0.2]), stiffness, dofs=dofs, modal_damping=0.01
+    ... )
+    >>> lines = np.arange(5, 100.0, 0.5)
+    >>> first, accelerance = frf_ipz.Dof(1, "x"), frf_ipz.FrfQuantity.ACCELERANCE
+    >>> labels = [frf_ipz.FrfLabel(frf_ipz.parse_dof(dof), first, accelerance) for dof in dofs]
+    >>> values = frf_ipz.compute_frfs(heavier, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=dofs, inputs=["1:x"], variance=np.full(values.shape, 2e-6)
+    ... )
+    >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
+    >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
+    >>> curves = diagnosis.curves
+    >>> curves.measured.shape == curves.explained.shape == (len(curves.s), len(curves.labels))
+    True
     """
 
     s: ComplexArray
@@ -219,6 +326,16 @@ class LinearisedLaw(Concise):
         Root mean square motion there in each record, ascending.
     stiffness_by_record, damping_by_record : (n_records,) array
         About the motion in that record alone, N/m and N s/m.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> law = frf_ipz.LinearisedLaw(
+    ...     ends=(frf_ipz.Dof(3, "x"),), stiffness=1e4, damping=2.0, motion_rms_m=np.array([1e-4, 3e-4]),
+    ...     stiffness_by_record=np.array([8e3, 1.2e4]), damping_by_record=np.array([2.0, 2.0]),
+    ... )
+    >>> law.statement.split(';')[0].split(', ')[1]
+    'a spring of 1e+04 N/m and a damper of 2 N s/m stand for it in a linear model'
     """
 
     ends: tuple[Dof, ...]
@@ -259,6 +376,15 @@ class LawInTime(Concise):
         s from the start.
     measured, without, simulated : (n_samples,) array
         As measured, and of the fitted model without the law and with it, SI.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> motion = np.array([-1e-3, 0.0, 1e-3])
+    >>> law = frf_ipz.LawInTime(motion_m=motion, velocity_m_s=np.zeros(3), force_N=1e10 * motion**3)
+    >>> ax = frf_ipz.plotting.plot_law(law)
+    >>> ax.get_ylabel()
+    'Force of the law, N'
     """
 
     motion_m: FloatArray

@@ -57,6 +57,17 @@ class StateSpaceModel(Concise):
         Names of the states.
     input_units, output_units : tuple of str
         SI units.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> oscillator = frf_ipz.StateSpaceModel(
+    ...     A=np.array([[0.0, 1.0], [-100.0, -0.2]]), B=np.array([[0.0], [1.0]]), C=np.array([[1.0, 0.0]]),
+    ...     D=np.zeros((1, 1)), dt=0.0, input_names=("1:+x",), output_names=("1:+x",), state_names=("x", "v"),
+    ...     input_units=("N",), output_units=("m",),
+    ... )
+    >>> oscillator.A.shape
+    (2, 2)
     """
 
     A: FloatArray

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arguments import require_file
 from frf_ipz.dofs import as_dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
@@ -110,10 +111,20 @@ def read_frfs(
 
     Examples
     --------
-    >>> frfs = read_frfs("data/reference/cantilever_49.csv", quantity="accelerance")  # doctest: +SKIP
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import frf_ipz
+    >>> table = '''frequency_hz,output_dof,input_dof,real,imag
+    ... 10,11:+z,6:+z,0.1,0.01
+    ... 20,11:+z,6:+z,0.3,0.02
+    ... '''
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "tip.csv").write_text(table)
+    ...     frf_ipz.read_frfs(f"{folder}/tip.csv", quantity="accelerance")
+    FrfSet: 1 FRFs (accelerance) on 2 lines from 10 to 20 Hz, 11:+z / 6:+z
     """
     source = FrfSource(
-        path=Path(path),
+        path=require_file(path),
         quantity=as_quantity(quantity),
         unit=unit,
         output_dof=None if output is None else as_dof(output),
