@@ -12,7 +12,7 @@ import numpy as np
 
 import frf_ipz
 
-ROOT = Path(__file__).parents[2] / "data"
+ROOT = Path("../../data")  # as seen from docs/gallery
 
 # %%
 # The whole chain in one call.

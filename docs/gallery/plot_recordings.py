@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 
 import frf_ipz
 
-DATA = Path(__file__).parents[2] / "data" / "raw" / "cantilever"
+DATA = Path("../../data/raw/cantilever")  # as seen from docs/gallery
 
 # %%
 # ``test.toml`` says which files belong to which point and what their columns hold.

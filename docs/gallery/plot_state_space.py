@@ -12,7 +12,7 @@ import numpy as np
 
 import frf_ipz
 
-DATA = Path(__file__).parents[2] / "data" / "raw" / "cantilever"
+DATA = Path("../../data/raw/cantilever")  # as seen from docs/gallery
 
 # %%
 results = frf_ipz.Campaign(

@@ -52,6 +52,7 @@ def test_a_private_name_would_be_seen():
 def test_example_runs_and_draws(path, monkeypatch, capsys):
     mpl.use("Agg")
     drawn = []
+    monkeypatch.chdir(path.parent)
     monkeypatch.setattr(plt, "show", lambda: drawn.extend(plt.get_fignums()))
     try:
         runpy.run_path(str(path))
