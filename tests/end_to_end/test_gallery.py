@@ -51,7 +51,6 @@ def test_a_private_name_would_be_seen():
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs_and_draws(path, monkeypatch, capsys):
     mpl.use("Agg")
-    monkeypatch.chdir(GALLERY)
     drawn = []
     monkeypatch.chdir(path.parent)
     monkeypatch.setattr(plt, "show", lambda: drawn.extend(plt.get_fignums()))
