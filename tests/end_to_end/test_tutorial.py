@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import frf_ipz
 from page_blocks import assert_same, run_page
 
 ROOT = Path(__file__).parents[2]
@@ -64,6 +65,19 @@ def test_page(repository, name, count):
     assert len(texts) == count
     for expected, printed in texts:
         assert_same(expected, printed)
+
+
+def test_robust_control_of_the_same_beam(repository):
+    """The how-to guide that goes on where the tutorial ends."""
+    folder, _ = repository
+    guide = (ROOT / "docs" / "how-to" / "robust_control.md").read_text(encoding="utf-8")
+    (section,) = re.findall(r"```toml\n(.*?)```", guide, re.DOTALL)
+    pipeline = folder / "beam" / "robust.toml"
+    pipeline.write_text(toml_blocks("campaign")[1] + section, encoding="utf-8")
+    frf_ipz.run_pipeline(pipeline, folder / "robust" / "results", until="export")
+    with contextlib.chdir(folder / "robust"):
+        ((expected, printed),) = run_page(guide)
+    assert_same(expected, printed)
 
 
 @pytest.mark.slow
