@@ -55,7 +55,7 @@ check: .venv/test
 docs: .venv/docs
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --jobs auto --quiet docs docs/_build/html
 
-bench: .venv/peers
+bench: .venv/peers  # writes results/timings.json too
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-only -s
 
 proof: .venv/run

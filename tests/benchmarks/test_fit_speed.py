@@ -69,7 +69,7 @@ def sdypy_seconds(truth, order, *, select):
 
 @pytest.mark.filterwarnings("ignore")  # of the peer
 @pytest.mark.parametrize("name", ["b", "c"])
-def test_against_sdypy(benchmark, truth_sets, name):
+def test_against_sdypy(benchmark, timings, truth_sets, name):
     resource = pytest.importorskip("resource", reason="Windows does not tell the peak of a process's memory so")
     truth = truth_sets[name]
     frfs = of_bench(truth)
@@ -81,6 +81,13 @@ def test_against_sdypy(benchmark, truth_sets, name):
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     whole = cpu_seconds(lambda: fit_modes(frfs, options=options))
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    timings.add("poles of the start", f"set {name}, sdypy-EMA's stabilisation", peer / poles, POLES_FASTER[name])
+    timings.add(
+        "whole fit with covariance",
+        f"set {name}, sdypy-EMA's poles" + (" with their choice" if name == "b" else ""),
+        (chosen if name == "b" else peer) / whole,
+        WHOLE_FASTER[name],
+    )
     benchmark.extra_info.update(
         peer_cpu_s=peer, peer_chosen_cpu_s=chosen, poles_cpu_s=poles, whole_cpu_s=whole, memory_mb=memory
     )
@@ -96,7 +103,7 @@ def test_against_sdypy(benchmark, truth_sets, name):
 
 
 @pytest.mark.filterwarnings("ignore")  # of the peer
-def test_against_auto_fit(benchmark, truth_sets):
+def test_against_auto_fit(benchmark, timings, truth_sets):
     skrf = pytest.importorskip("skrf", reason="needs the extra 'peers'")
     fitting = pytest.importorskip("skrf.vectorFitting", reason="needs the extra 'peers'")
     truth = truth_sets["b"]
@@ -112,6 +119,7 @@ def test_against_auto_fit(benchmark, truth_sets):
     peer = time.process_time() - start
     frfs = of_bench(truth)
     ours = cpu_seconds(lambda: fit_modes(frfs, options=FitOptions()))
+    timings.add("whole fit with covariance", "set b, auto_fit of scikit-rf", peer / ours, AUTO_FASTER)
     benchmark.extra_info.update(peer_cpu_s=peer, ours_cpu_s=ours)
     print(f"\nset b: whole fit {ours:.3f} s, scikit-rf's auto_fit {peer:.2f} s of CPU: {peer / ours:.0f} times faster")
     benchmark.pedantic(lambda: None, rounds=1)
