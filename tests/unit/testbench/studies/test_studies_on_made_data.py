@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import frf_ipz
+from frf_ipz.progress import silent
 from frf_testbench.studies import beam_physics, silverbox
 from frf_testbench.studies import cantilever_masses as masses
 from frf_testbench.studies.double_beam_ringdown import study_double_beam_ringdown
@@ -207,3 +208,22 @@ def test_what_layouts_share_is_calibrated():
     start = frf_ipz.solve_modes(masses.build_layout(masses.START, LAYOUTS_M[0], exact=True).fe_model, n_modes=4)
     assert np.abs(start.natural_frequency_hz[1:4] / resonances[0] - 1).max() > 0.02
     assert np.array(fitted) == pytest.approx(np.array(resonances), rel=0.01)
+
+
+@pytest.mark.slow
+def test_pieces_that_lost_mass_are_found_in_all_layouts_together(tmp_path):
+    states, after = [], {}
+    for number, layout in enumerate(LAYOUTS_M):
+        path = tmp_path / f"P-{number + 1}.txt"
+        made = write_frf(path, SETUP, layout)
+        states.append(masses.read_state(path, made))
+    path = tmp_path / "P-1-1.txt"
+    write_frf(path, replace(SETUP, piece=0.02), LAYOUTS_M[3])
+    made = masses.build_layout(SETUP, LAYOUTS_M[3])
+    after = {("healthy", 4): (states[3], made), ("second", 4): (masses.read_state(path, made), made)}
+    each, together = masses.compare_layouts(states[:3], after, progress=silent).values()
+    healthy, second = each["verdict"]
+    assert healthy == "consistent"
+    assert second != "consistent"
+    assert together["second"].max() > 10
+    assert together["healthy"].max() < 3
