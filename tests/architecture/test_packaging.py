@@ -90,7 +90,7 @@ def makefile():
     for line in lines:
         if rule := re.match(r"(\.venv/\w+|\w+):(?!=) ?(.*)", line):
             target = rule[1]
-            needs[target], commands[target] = rule[2].split(), []
+            needs[target], commands[target] = rule[2].split("#")[0].split(), []
         elif line.startswith("\t"):
             command = line.strip()
             while "$(" in command:

@@ -36,7 +36,7 @@ def test_a_cubic_spring_is_that_of_harmonic_balance():
     assert_allclose(linear.stiffness_by_record, 0.75e12 * AMPLITUDES[::-1] ** 2, rtol=SINE)
     assert np.abs(linear.damping_by_record * OMEGA).max() < SINE * linear.stiffness
     assert linear.stiffness_by_record[0] < linear.stiffness < linear.stiffness_by_record[1]
-    assert "weakest blow, 7.07e-05 m rms" in linear.statement
+    assert "weakest record, 7.07e-05 m rms" in linear.statement
 
 
 def test_friction_is_the_damper_of_harmonic_balance():
