@@ -129,6 +129,18 @@ def test_the_weak_oscillator_is_fitted():
 
 
 @pytest.mark.slow
+def test_the_cubic_spring_of_an_oscillator_is_found(tmp_path):
+    force, motion = make_oscillator(40600, 4.0)
+    random = np.random.default_rng(6)
+    rows = np.stack([force, motion + 1e-5 * random.normal(size=len(motion))]).T
+    np.savetxt(tmp_path / "SNLS80mV.csv", rows, delimiter=",", header="V1,V2", comments="")
+    weak, laws = silverbox.study_silverbox(tmp_path).values()
+    assert weak["frequency_hz"][0] == pytest.approx(68, rel=0.02)
+    assert laws.loc["law", "catalogue"] == "cubic_stiffness"
+    assert laws.loc["k3 / k1, 1/V^2", "catalogue"] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.slow
 def test_a_mass_that_the_model_lacks_is_the_first_cause(monkeypatch):
     monkeypatch.setattr(beam_physics, "MOST_CAUSES", 1)
     drawn = {"length_m": 0.5, "width_m": 0.02, "thickness_m": 0.002, "youngs_modulus_Pa": 200e9}
