@@ -65,14 +65,13 @@ class NormalEquations:
         diagonal = np.diagonal(self.matrix)
         if not np.isfinite(diagonal).all():
             return None
-        scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-        scaled = self.matrix / np.outer(scale, scale)
-        scaled.flat[:: len(scaled) + 1] += damping
+        # parameters of any size: the error of a Cholesky factor does not depend on the scale of rows and columns
+        damped = self.matrix + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0))
         try:
-            factor = linalg.cho_factor(scaled, lower=True, check_finite=False)
+            factor = linalg.cho_factor(damped, lower=True, check_finite=False)
         except linalg.LinAlgError:
             return None
-        step = linalg.cho_solve(factor, self.right / scale, check_finite=False) / scale
+        step = linalg.cho_solve(factor, self.right, check_finite=False)
         return np.asarray(step) if np.isfinite(step).all() else None
 
     def predict_decrease(self, step: FloatArray) -> float:
