@@ -9,7 +9,7 @@ chapters 27 and 28.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,13 @@ from scipy import linalg
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.diagnosis.evidence.fit import Data, Fit
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
+from frf_ipz.numerics.levenberg_marquardt import (
+    AcceptedStep,
+    LeastSquaresStatus,
+    LevenbergMarquardt,
+    NormalEquations,
+    minimise,
+)
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
@@ -26,8 +33,9 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.response import Response
 
 STEP = 1e-6  # of the logarithm of a parameter, to both sides: peaks are so narrow that one side is not exact enough
-FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-5, 1e-9, 1e6
-FASTER, SLOWER = 0.2, 6.0  # what damping is multiplied with after a good and a bad step
+SETTINGS = LevenbergMarquardt(
+    steps=8, initial_damping=1e-5, min_damping=1e-9, max_damping=1e6, damping_decrease=0.2, damping_increase=6.0
+)
 LONGEST_STEP = 0.7  # of the logarithm of a parameter, or a tenth of a linear range
 PRIOR_CURVATURE = 12.0  # over the squared range: that of a uniform prior, where the data say nothing
 MODE_CORRECTIONS = 2  # corrections of the frequencies after a step
@@ -91,109 +99,101 @@ def fit_map(
     Fit
         At the maximum, or where it was stopped.
     """
-    start = hypothesis.clip_to_searched(values)
-    point = _evaluate(
-        hypothesis, data, start, np.zeros(hypothesis.nuisance_prior.size) if nuisance is None else nuisance
+    problem = _MapProblem(hypothesis=hypothesis, data=data)
+    start = problem.evaluate(
+        hypothesis.clip_to_searched(values),
+        np.zeros(hypothesis.nuisance_prior.size) if nuisance is None else nuisance,
     )
-    slope = _linearise(hypothesis, data, point)
-    damping, has_converged = FIRST_DAMPING, False
-    for iteration in range(iterations):
-        gain = 0.0
-        while damping < MAX_DAMPING:
-            trial = _step(hypothesis, data, point, slope, damping)
-            gain = point.objective - trial.objective
-            if gain > 0 or abs(gain) < tolerance:
-                break
-            damping *= SLOWER
-        is_far = bool(np.any(np.abs(trial.searched - point.searched) > LARGE_STEP * _longest_step(hypothesis)))
-        if gain > 0:
-            point, damping = trial, max(FASTER * damping, MIN_DAMPING)
-            slope = _linearise(hypothesis, data, point)
-        if gain < tolerance:
-            has_converged = True
-            break
-        if iteration >= PATIENCE and not is_far and point.objective - FURTHER_GAIN * gain > 2 * cost_limit:
-            break
-    return _finish(hypothesis, point, slope, has_converged=has_converged)
+
+    def is_of_no_use(step: AcceptedStep[_Point]) -> bool:
+        moved = np.abs(step.after.searched - step.before.searched)
+        is_far = bool(np.any(moved > LARGE_STEP * _longest_step(hypothesis)))
+        expected = step.after.objective - FURTHER_GAIN * step.decrease
+        return step.number > PATIENCE and not is_far and expected > 2 * cost_limit
+
+    settings = replace(SETTINGS, steps=iterations, absolute_decrease=tolerance, negligible_increase=tolerance)
+    optimum = minimise(problem, start, settings, stop=is_of_no_use)
+    has_converged = optimum.status in {LeastSquaresStatus.CONVERGED, LeastSquaresStatus.STALLED}
+    return _finish(hypothesis, optimum.point, optimum.linearise(), has_converged=has_converged)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Linearisation:
+class _Linearisation(NormalEquations):
     """How everything changes around a point: first by the parameters, then by the nuisance parameters that matter."""
 
-    jacobian: FloatArray
     used: BoolArray
     squares: FloatArray  # (m, n_parameters), of the modes' squared frequencies
     scatter: FloatArray  # (m, n_nuisance), of the same
     ratios: FloatArray  # (m, n_parameters), of their damping ratios without scatter
-    slopes: FloatArray  # of the whitened nuisance
-
-    def curvature(self, hypothesis: Hypothesis) -> FloatArray:
-        """Sum the data's curvature, the prior of the nuisance, and uniform priors where data say nothing."""
-        n_parameters = len(hypothesis.parameters)
-        prior = np.ones(self.jacobian.shape[1])
-        prior[:n_parameters] = PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2
-        prior[n_parameters:] = self.slopes**2
-        return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior))
 
 
-def _evaluate(hypothesis: Hypothesis, data: Data, searched: FloatArray, nuisance: FloatArray) -> _Point:
-    response = hypothesis.respond(hypothesis.to_physical(searched), nuisance, data.measured.s)
-    whitened_nuisance, slopes = hypothesis.nuisance_prior.whiten(nuisance, is_bounded=data.is_bounded)
-    misfit = data.misfit(response)
-    return _Point(
-        searched=searched,
-        nuisance=nuisance,
-        misfit=misfit,
-        response=response,
-        whitened_nuisance=whitened_nuisance,
-        slopes=slopes,
-    )
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _MapProblem:
+    """What is minimised: misfit and whitened nuisance parameters."""
 
+    hypothesis: Hypothesis
+    data: Data
 
-def _linearise(hypothesis: Hypothesis, data: Data, point: _Point) -> _Linearisation:
-    m = hypothesis.nuisance_prior.n_modes
-    changes, squares, ratios = [], [], []
-    for index in range(len(hypothesis.parameters)):
-        low, high = point.searched.copy(), point.searched.copy()
-        low[index] = max(low[index] - STEP, hypothesis.low[index])
-        high[index] = min(high[index] + STEP, hypothesis.high[index])
-        before, after = (
-            hypothesis.respond(hypothesis.to_physical(searched), point.nuisance, data.measured.s)
-            for searched in (low, high)
+    def evaluate(self, searched: FloatArray, nuisance: FloatArray) -> _Point:
+        """Compute response and misfit for some parameters."""
+        response = self.hypothesis.respond(self.hypothesis.to_physical(searched), nuisance, self.data.measured.s)
+        whitened_nuisance, slopes = self.hypothesis.nuisance_prior.whiten(nuisance, is_bounded=self.data.is_bounded)
+        return _Point(
+            searched=searched,
+            nuisance=nuisance,
+            misfit=self.data.misfit(response),
+            response=response,
+            whitened_nuisance=whitened_nuisance,
+            slopes=slopes,
         )
-        step = high[index] - low[index]
-        changes.append((after.values - before.values) / step)
-        squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
-        ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
-    by_nuisance = nuisance_jacobian(point.response, hypothesis.nuisance_prior, hypothesis.context.layout)
-    white = data.slopes(point.response, np.dstack([*changes, by_nuisance]))
-    used = np.sum(white[:, len(changes) :] ** 2, 0) > MIN_INFLUENCE
-    return _Linearisation(
-        jacobian=white[:, np.concatenate([np.ones(len(changes), bool), used])],
-        used=used,
-        squares=np.reshape(squares, (len(changes), m)).T,
-        scatter=_scatter_of_squares(point.response.modes, hypothesis.nuisance_prior),
-        ratios=np.reshape(ratios, (len(changes), m)).T,
-        slopes=point.slopes[used],
-    )
 
+    def cost(self, point: _Point) -> float:
+        """Give the objective."""
+        return point.objective
 
-def _step(hypothesis: Hypothesis, data: Data, point: _Point, slope: _Linearisation, damping: float) -> _Point:
-    n_parameters = len(hypothesis.parameters)
-    curvature = slope.curvature(hypothesis)
-    gradient = slope.jacobian.T @ point.misfit
-    gradient[n_parameters:] -= (point.whitened_nuisance * point.slopes)[slope.used]
-    damped = curvature + damping * np.diag(np.diag(curvature))
-    step = linalg.cho_solve(linalg.cho_factor(damped, lower=True, check_finite=False), gradient, check_finite=False)
-    if n_parameters:
-        longest = _longest_step(hypothesis)
-        step *= min(1.0, float(np.min(longest / np.maximum(np.abs(step[:n_parameters]), 1e-300))))
-    searched = np.clip(point.searched + step[:n_parameters], hypothesis.low, hypothesis.high)
-    nuisance = point.nuisance.copy()
-    nuisance[slope.used] += step[n_parameters:]
-    nuisance = _correct_modes(hypothesis, point, slope, searched, nuisance)
-    return _evaluate(hypothesis, data, searched, nuisance)
+    def linearise(self, point: _Point) -> _Linearisation:
+        """Derive by all parameters; where data say nothing of one, its prior is uniform."""
+        hypothesis, data = self.hypothesis, self.data
+        m, n_parameters = hypothesis.nuisance_prior.n_modes, len(hypothesis.parameters)
+        changes, squares, ratios = [], [], []
+        for index in range(n_parameters):
+            low, high = point.searched.copy(), point.searched.copy()
+            low[index] = max(low[index] - STEP, hypothesis.low[index])
+            high[index] = min(high[index] + STEP, hypothesis.high[index])
+            before, after = (
+                hypothesis.respond(hypothesis.to_physical(searched), point.nuisance, data.measured.s)
+                for searched in (low, high)
+            )
+            step = high[index] - low[index]
+            changes.append((after.values - before.values) / step)
+            squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
+            ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
+        by_nuisance = nuisance_jacobian(point.response, hypothesis.nuisance_prior, hypothesis.context.layout)
+        white = data.slopes(point.response, np.dstack([*changes, by_nuisance]))
+        used = np.sum(white[:, n_parameters:] ** 2, 0) > MIN_INFLUENCE
+        jacobian = white[:, np.concatenate([np.ones(n_parameters, bool), used])]
+        prior = np.concatenate([PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2, point.slopes[used] ** 2])
+        right = jacobian.T @ point.misfit
+        right[n_parameters:] -= (point.whitened_nuisance * point.slopes)[used]
+        return _Linearisation(
+            matrix=jacobian.T @ jacobian + np.diag(prior),
+            right=right,
+            used=used,
+            squares=np.reshape(squares, (n_parameters, m)).T,
+            scatter=_scatter_of_squares(point.response.modes, hypothesis.nuisance_prior),
+            ratios=np.reshape(ratios, (n_parameters, m)).T,
+        )
+
+    def move(self, point: _Point, slope: _Linearisation, step: FloatArray) -> _Point:
+        """Take a step that is not too long, within bounds, with modes where the linear step puts them."""
+        hypothesis, n_parameters = self.hypothesis, len(self.hypothesis.parameters)
+        if n_parameters:
+            longest = _longest_step(hypothesis)
+            step = step * min(1.0, float(np.min(longest / np.maximum(np.abs(step[:n_parameters]), 1e-300))))
+        searched = np.clip(point.searched + step[:n_parameters], hypothesis.low, hypothesis.high)
+        nuisance = point.nuisance.copy()
+        nuisance[slope.used] += step[n_parameters:]
+        return self.evaluate(searched, _correct_modes(hypothesis, point, slope, searched, nuisance))
 
 
 def _longest_step(hypothesis: Hypothesis) -> FloatArray:
@@ -280,7 +280,7 @@ def adopt_modes(hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> FloatAr
 
 def _finish(hypothesis: Hypothesis, point: _Point, slope: _Linearisation, *, has_converged: bool) -> Fit:
     n_parameters = len(hypothesis.parameters)
-    curvature = slope.curvature(hypothesis)
+    curvature = slope.matrix
     lower = _cholesky(curvature)
     log_volume = float(np.sum(np.log(np.diag(lower))))
     values = hypothesis.to_physical(point.searched)
