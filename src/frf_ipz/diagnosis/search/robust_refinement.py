@@ -8,8 +8,8 @@ yet do not dominate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
+from frf_ipz.numerics.levenberg_marquardt import LevenbergMarquardt, NormalEquations, minimise
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
@@ -25,8 +26,15 @@ if TYPE_CHECKING:
 
 STEP = 1e-4  # of the logarithm of a parameter, for its derivative
 LONGEST_STEP = 0.5
-MAX_DAMPING = 1e4
-MIN_GAIN = 0.01  # change of the robust misfit
+SETTINGS = LevenbergMarquardt(
+    steps=12,
+    initial_damping=1e-2,
+    min_damping=1e-6,
+    max_damping=1e4,
+    damping_decrease=0.2,
+    damping_increase=6.0,
+    absolute_decrease=0.01,
+)
 REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the global scan
 LOCATIONS_PER_EFFECT = 3  # of an effect that are refined
 N_STEPPED, COST_RATIO = 8, 4.0  # hypotheses whose neighbours are tried far from the axis, and times the best cost
@@ -103,53 +111,64 @@ def refine(
     misfit : float
         Robust misfit there.
     """
-    nuisance = np.zeros(hypothesis.nuisance_prior.size)
-
-    def misfit_at(searched: FloatArray) -> ComplexArray:
-        response = hypothesis.respond(hypothesis.to_physical(searched), nuisance, measured.s)
-        return np.asarray(measured.values - response.values)
-
-    point = hypothesis.clip_to_searched(values)
-    misfit = misfit_at(point)
-    cost, damping = compute_robust_misfit(misfit, weights), 1e-2
-    if not len(point):
-        return values, cost
-    for _ in range(iterations):
-        curvature, gradient = _normal_equations(misfit_at, point, misfit, weights, hypothesis.high)
-        gain = 0.0
-        while damping < MAX_DAMPING:
-            step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature) + 1e-12), gradient)
-            step *= min(1.0, LONGEST_STEP / float(np.abs(step).max() + 1e-300))
-            trial = np.clip(point + step, hypothesis.low, hypothesis.high)
-            trial_misfit = misfit_at(trial)
-            trial_cost = compute_robust_misfit(trial_misfit, weights)
-            if trial_cost < cost:
-                gain, point, misfit, cost = cost - trial_cost, trial, trial_misfit, trial_cost
-                damping = max(0.2 * damping, 1e-6)
-                break
-            damping *= 6.0
-        if gain < MIN_GAIN:
-            break
-    return hypothesis.to_physical(point), cost
+    problem = _RobustProblem(
+        hypothesis=hypothesis,
+        measured=measured,
+        weights=weights,
+        nuisance=np.zeros(hypothesis.nuisance_prior.size),
+    )
+    start = problem.evaluate(hypothesis.clip_to_searched(values))
+    if not len(start.searched):
+        return values, problem.cost(start)
+    optimum = minimise(problem, start, replace(SETTINGS, steps=iterations))
+    return hypothesis.to_physical(optimum.point.searched), optimum.cost
 
 
-def _normal_equations(
-    misfit_at: Callable[[FloatArray], ComplexArray],
-    point: FloatArray,
-    misfit: ComplexArray,
-    weights: FloatArray,
-    high: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    robust = weights / (1 + np.sum(weights * np.abs(misfit) ** 2, 1))[:, None]
-    columns = []
-    for index in range(len(point)):
-        moved = point.copy()
-        step = STEP if moved[index] + STEP <= high[index] else -STEP
-        moved[index] += step
-        columns.append(((misfit - misfit_at(moved)) / step).ravel())
-    derivative = np.stack(columns, 1)
-    weighted = robust.ravel()[:, None] * derivative
-    return (derivative.conj().T @ weighted).real, (weighted.conj().T @ misfit.ravel()).real
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _RobustPoint:
+    """Parameters of the effects as searched, and what they leave."""
+
+    searched: FloatArray
+    misfit: ComplexArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _RobustProblem:
+    """What is minimised: the robust misfit, whose curvature is that of its lines reweighted."""
+
+    hypothesis: Hypothesis
+    measured: TransferFunctions
+    weights: FloatArray
+    nuisance: FloatArray
+
+    def evaluate(self, searched: FloatArray) -> _RobustPoint:
+        """Compute the misfit for some parameters."""
+        response = self.hypothesis.respond(self.hypothesis.to_physical(searched), self.nuisance, self.measured.s)
+        return _RobustPoint(searched=searched, misfit=np.asarray(self.measured.values - response.values))
+
+    def cost(self, point: _RobustPoint) -> float:
+        """Give the robust misfit."""
+        return compute_robust_misfit(point.misfit, self.weights)
+
+    def linearise(self, point: _RobustPoint) -> NormalEquations:
+        """Derive by differences, away from the upper bound."""
+        robust = self.weights / (1 + np.sum(self.weights * np.abs(point.misfit) ** 2, 1))[:, None]
+        columns = []
+        for index in range(len(point.searched)):
+            moved = point.searched.copy()
+            step = STEP if moved[index] + STEP <= self.hypothesis.high[index] else -STEP
+            moved[index] += step
+            columns.append(((point.misfit - self.evaluate(moved).misfit) / step).ravel())
+        derivative = np.stack(columns, 1)
+        weighted = robust.ravel()[:, None] * derivative
+        return NormalEquations(
+            matrix=(derivative.conj().T @ weighted).real, right=(weighted.conj().T @ point.misfit.ravel()).real
+        )
+
+    def move(self, point: _RobustPoint, _equations: NormalEquations, step: FloatArray) -> _RobustPoint:
+        """Take a step that is not too long, within bounds."""
+        step = step * min(1.0, LONGEST_STEP / float(np.abs(step).max() + 1e-300))
+        return self.evaluate(np.clip(point.searched + step, self.hypothesis.low, self.hypothesis.high))
 
 
 StartBeside: TypeAlias = tuple[tuple[Component, ...], Start]
