@@ -1,8 +1,7 @@
 """Output-error fit of a law at its location: every segment is simulated.
 
 Unlike in `alternating_fit`, no motion is estimated from the data: the law's force follows from the measured force
-alone, and so do its derivatives by all parameters. Steps are damped as long as the misfit grows (Levenberg and
-Marquardt).
+alone, and so do its derivatives by all parameters.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit, LawStart
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING, solve_scaled
 from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalResponse, respond
 from frf_ipz.diagnosis.nonlinear.model.time_response import TimeResponse
 from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
@@ -28,14 +27,19 @@ from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
     step_tangent,
 )
 from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT
+from frf_ipz.numerics.levenberg_marquardt import LeastSquaresStatus, LevenbergMarquardt, NormalEquations, minimise
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import NuisancePrior
     from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-FIRST_DAMPING, MAX_DAMPING = 1e-3, 1e4
-DAMPING_DOWN, DAMPING_UP = 0.1, 10.0  # factors of the damping after a good and a bad step
-CONVERGED = 3e-3  # relative drop of the cost
+SETTINGS = LevenbergMarquardt(
+    steps=6,
+    initial_damping=1e-3,
+    min_damping=ROUNDING,
+    max_damping=5e3,
+    relative_decrease=3e-3,
+)
 WEAKER = 0.1  # factor of a law's strength as long as its motion diverges
 DIVERGED = 1e100  # standard deviations: a derivative as large has diverged, and is set to zero
 LONGEST = 0.5  # relative change of a law's parameter in one step
@@ -83,27 +87,42 @@ def fit_output_error(
     LawFit
         The best simulation.
     """
-    simulation, damping = _simulate(segments, nuisance_prior, start), FIRST_DAMPING
+    problem = _OutputErrorProblem(segments=segments, nuisance_prior=nuisance_prior)
+    simulation = _simulate(segments, nuisance_prior, start)
     while not np.isfinite(simulation.cost):  # a softening spring that is too strong diverges
         weaker = replace(simulation.start, strength=WEAKER * simulation.start.strength)
         simulation = _simulate(segments, nuisance_prior, weaker)
-    rows, converged = _derivative_rows(segments, nuisance_prior, simulation), False
-    for _ in range(iterations):
-        before = simulation.cost
-        while damping < MAX_DAMPING:
-            trial = _simulate(segments, nuisance_prior, _damped_step(simulation, rows, damping))
-            if trial.cost < simulation.cost:
-                break
-            damping *= DAMPING_UP
-        else:
-            converged = True
-            break
-        simulation, damping = trial, damping * DAMPING_DOWN
-        rows = _derivative_rows(segments, nuisance_prior, simulation)
-        converged = bool(simulation.cost > (1 - CONVERGED) * before)
-        if converged:
-            break
-    return _as_law_fit(simulation, rows, converged=converged)
+    optimum = minimise(problem, simulation, replace(SETTINGS, steps=iterations))
+    converged = optimum.status in {LeastSquaresStatus.CONVERGED, LeastSquaresStatus.STALLED}
+    return _as_law_fit(optimum.point, optimum.linearise(), converged=converged)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _OutputErrorProblem:
+    """What is minimised: misfit of the simulation and nuisance parameters, strength and shape by relative changes."""
+
+    segments: SegmentSet
+    nuisance_prior: NuisancePrior
+
+    def cost(self, simulation: _Simulation) -> float:
+        """Give the cost; infinite where the motion diverges."""
+        return simulation.cost
+
+    def linearise(self, simulation: _Simulation) -> NormalEquations:
+        """Derive by nuisance, strength and shape."""
+        return _normal_equations(simulation, _derivative_rows(self.segments, self.nuisance_prior, simulation))
+
+    def move(self, simulation: _Simulation, _equations: NormalEquations, step: FloatArray) -> _Simulation:
+        """Simulate after a step that changes no parameter of the law by much."""
+        start, n = simulation.start, len(simulation.start.nuisance)
+        step = step * min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
+        moved = replace(
+            start,
+            strength=float(start.strength * (1 + step[n])),
+            shape=float(start.shape * (1 + step[n + 1])) if start.law.shape_name else start.shape,
+            nuisance=start.nuisance + step[:n],
+        )
+        return _simulate(self.segments, self.nuisance_prior, moved)
 
 
 def gain_of_added_forces(
@@ -133,7 +152,8 @@ def gain_of_added_forces(
     n_plain = len(rows) - len(forces)
     sizes = np.linalg.norm(rows[n_plain:], axis=1)
     rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
-    normal, right = _normal_equations(simulation, rows)
+    equations = _normal_equations(simulation, rows)
+    normal, right = equations.matrix, equations.right
     drops = [right[:n] @ solve_scaled(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
     return float(drops[1] - drops[0])
 
@@ -207,32 +227,20 @@ def _derivative_rows(
     return np.where(np.abs(real_rows).max(axis=1, keepdims=True) < DIVERGED, real_rows, 0.0)
 
 
-def _normal_equations(simulation: _Simulation, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _normal_equations(simulation: _Simulation, rows: FloatArray) -> NormalEquations:
     n = len(simulation.start.nuisance)
     prior = np.full(len(rows), WEAK_PRIOR)
     prior[:n] = 1.0
     right = rows @ simulation.misfit
     right[:n] -= simulation.start.nuisance
-    return rows @ rows.T + np.diag(prior), right
+    return NormalEquations(matrix=rows @ rows.T + np.diag(prior), right=right)
 
 
-def _damped_step(simulation: _Simulation, rows: FloatArray, damping: float) -> LawStart:
+def _as_law_fit(simulation: _Simulation, equations: NormalEquations, *, converged: bool) -> LawFit:
     start, n = simulation.start, len(simulation.start.nuisance)
-    normal, right = _normal_equations(simulation, rows)
-    damped = normal + damping * np.diag(np.diag(normal))
-    step = solve_scaled(damped, right)
-    step *= min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
-    shape = start.shape * (1 + step[n + 1]) if start.law.shape_name else start.shape
-    return replace(
-        start, strength=float(start.strength * (1 + step[n])), shape=float(shape), nuisance=start.nuisance + step[:n]
-    )
-
-
-def _as_law_fit(simulation: _Simulation, rows: FloatArray, *, converged: bool) -> LawFit:
-    start, n = simulation.start, len(simulation.start.nuisance)
-    normal, _ = _normal_equations(simulation, rows)
-    inverse = solve_scaled(normal, np.eye(len(rows))[:, n:])[n:]
-    sizes = np.array([start.strength, start.shape])[: len(rows) - n]
+    n_law = len(equations.right) - n
+    inverse = solve_scaled(equations.matrix, np.eye(n + n_law)[:, n:])[n:]
+    sizes = np.array([start.strength, start.shape])[:n_law]
     covariance = np.zeros((2, 2))
     covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
     return LawFit(
