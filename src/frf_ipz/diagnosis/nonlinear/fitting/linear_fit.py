@@ -8,13 +8,16 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING
 from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalResponse, nominal_values, respond
 from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import NuisancePrior
 from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 from frf_ipz.numerics.least_squares import cholesky_with_prior
+from frf_ipz.numerics.levenberg_marquardt import LevenbergMarquardt, NormalEquations, minimise
 
-STEPS, CONVERGED = 6, 0.01  # of the fit: at most, and the relative drop of the cost that is worth a step
+SETTINGS = LevenbergMarquardt(  # whole steps, as long as they lower the cost by what is worth one
+    steps=5, trials_per_step=1, initial_damping=ROUNDING, min_damping=ROUNDING, relative_decrease=0.01
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,21 +105,50 @@ def fit_linear(segments: SegmentSet, nuisance_prior: NuisancePrior) -> LinearFit
 
 def _converged_cost(segments: SegmentSet, nuisance_prior: NuisancePrior, nuisance: FloatArray) -> float:
     """Cost of the linear model after a few steps: a law must explain what is left then, not after the first one."""
-    used, best = segments.used, np.inf
-    no_force = np.zeros((segments.n_segments, len(used)), complex)
-    for _ in range(STEPS):
+    problem = _LinearProblem(segments=segments, nuisance_prior=nuisance_prior)
+    return minimise(problem, problem.evaluate(nuisance), SETTINGS).cost
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LinearPoint:
+    """Nuisance parameters, and what the linear model leaves with them."""
+
+    nuisance: FloatArray
+    response: ModalResponse
+    misfit: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LinearProblem:
+    """What is minimised: misfit of the linear model, and nuisance parameters."""
+
+    segments: SegmentSet
+    nuisance_prior: NuisancePrior
+
+    def evaluate(self, nuisance: FloatArray) -> _LinearPoint:
+        """Compute response and misfit."""
+        segments, nuisance_prior, used = self.segments, self.nuisance_prior, self.segments.used
         response = respond(nuisance_prior.modal_model, segments.s, nuisance_prior.to_values(nuisance))
         motion = linear_sensor_motion(segments, nuisance_prior, response)
         motion[nuisance_prior.moving] += nuisance_prior.sensor_free_vibration(nuisance, response)
         misfit = as_real_rows((segments.motion - motion)[:, :, used] / np.sqrt(segments.variance[:, :, used]))
-        cost = float(misfit @ misfit + nuisance @ nuisance)
-        if cost > (1 - CONVERGED) * best:
-            return min(best, cost)
-        best = cost
-        columns = as_real_rows(nuisance_prior.jacobian(segments, response.on(used), no_force, None, nuisance))
-        normal = columns @ columns.T + np.eye(len(columns))
-        nuisance = nuisance + solve_scaled(normal, columns @ misfit - nuisance)
-    return best
+        return _LinearPoint(nuisance=nuisance, response=response, misfit=misfit)
+
+    def cost(self, point: _LinearPoint) -> float:
+        """Sum the weighted squares."""
+        return float(point.misfit @ point.misfit + point.nuisance @ point.nuisance)
+
+    def linearise(self, point: _LinearPoint) -> NormalEquations:
+        """Derive by the nuisance parameters."""
+        segments, used = self.segments, self.segments.used
+        no_force = np.zeros((segments.n_segments, len(used)), complex)
+        columns = self.nuisance_prior.jacobian(segments, point.response.on(used), no_force, None, point.nuisance)
+        rows = as_real_rows(columns)
+        return NormalEquations(matrix=rows @ rows.T + np.eye(len(rows)), right=rows @ point.misfit - point.nuisance)
+
+    def move(self, point: _LinearPoint, _equations: NormalEquations, step: FloatArray) -> _LinearPoint:
+        """Compute response and misfit after a step."""
+        return self.evaluate(point.nuisance + step)
 
 
 def linear_sensor_motion(segments: SegmentSet, nuisance_prior: NuisancePrior, response: ModalResponse) -> ComplexArray:
