@@ -15,8 +15,9 @@ import numpy as np
 from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawStart, estimate_location_motion
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_scaled
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING
 from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
+from frf_ipz.numerics.levenberg_marquardt import LevenbergMarquardt, NormalEquations, minimise
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
@@ -25,8 +26,16 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel, ModalResponse
     from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
 
-ROUNDS, CONVERGED = 16, 0.01  # of Gauss-Newton steps; relative drop of the cost that is worth a step
-TRIALS, STIFFER, LEAST_DAMPING = 6, 4.0, 1e-4  # of a step: shorter and shorter ones until one lowers the cost
+SETTINGS = LevenbergMarquardt(  # steps are damped only where a whole one does not lower the cost
+    steps=16,
+    trials_per_step=6,
+    initial_damping=ROUNDING,
+    min_damping=ROUNDING,
+    damping_decrease=0.25,
+    damping_increase=4.0,
+    min_rejected_damping=1e-4,
+    relative_decrease=0.01,
+)
 INDISTINGUISHABLE = 15.0  # difference of the cost: with less, two locations explain equally well
 POSSIBLE, POSSIBLE_PART = 60.0, 0.1  # of the cost above the least, and part of it, at a possible location
 MIN_SENSORS = 2
@@ -99,23 +108,37 @@ def fit_free_force(
     FreeForce
         The best step.
     """
-    best = _project(segments, linear, location, linear.start_nuisance if nuisance is None else nuisance)
-    used, damping = segments.used, 0.0
-    for _ in range(ROUNDS):
-        columns = linear.nuisance_prior.jacobian(segments, best.response.on(used), best.force, location)
-        rows = as_real_rows(columns - best.to_sensors * _force_along(best.to_sensors, columns)[..., None, :])
-        normal, slope = rows @ rows.T + np.eye(len(rows)), rows @ best.misfit - best.nuisance
-        for _ in range(TRIALS):
-            step = solve_scaled(normal + damping * np.diag(np.diag(normal)), slope)
-            trial = _project(segments, linear, location, best.nuisance + step)
-            if trial.cost < best.cost:
-                break
-            damping = max(STIFFER * damping, LEAST_DAMPING)
-        if not trial.cost <= (1 - CONVERGED) * best.cost:  # nor where it is no number
-            break
-        best, damping = trial, damping / STIFFER
-    best = min(best, trial, key=lambda projection: projection.cost)
+    problem = _FreeForceProblem(segments=segments, linear=linear, location=location)
+    start = _project(segments, linear, location, linear.start_nuisance if nuisance is None else nuisance)
+    best = minimise(problem, start, SETTINGS).point
     return FreeForce(location=location, cost=best.cost, force=-best.force, nuisance=best.nuisance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _FreeForceProblem:
+    """What is minimised: what no force at the location explains, and nuisance parameters."""
+
+    segments: SegmentSet
+    linear: LinearFit
+    location: int
+
+    def cost(self, projection: _Projection) -> float:
+        """Give the cost."""
+        return projection.cost
+
+    def linearise(self, projection: _Projection) -> NormalEquations:
+        """Derive by the nuisance parameters, without the part that a force can follow."""
+        on_used = projection.response.on(self.segments.used)
+        columns = self.linear.nuisance_prior.jacobian(self.segments, on_used, projection.force, self.location)
+        along = projection.to_sensors * _force_along(projection.to_sensors, columns)[..., None, :]
+        rows = as_real_rows(columns - along)
+        return NormalEquations(
+            matrix=rows @ rows.T + np.eye(len(rows)), right=rows @ projection.misfit - projection.nuisance
+        )
+
+    def move(self, projection: _Projection, _equations: NormalEquations, step: FloatArray) -> _Projection:
+        """Find the best force with other nuisance parameters."""
+        return _project(self.segments, self.linear, self.location, projection.nuisance + step)
 
 
 def localise_force(segments: SegmentSet, linear: LinearFit) -> ForceLocalisation:
