@@ -34,6 +34,7 @@ from .errors import FileFormatError as FileFormatError
 from .errors import FrfIpzError as FrfIpzError
 from .errors import IllConditionedError as IllConditionedError
 from .errors import InputError as InputError
+from .errors import NoModesError as NoModesError
 from .errors import NumericalError as NumericalError
 from .errors import PairingError as PairingError
 from .errors import QuantityError as QuantityError

@@ -107,6 +107,17 @@ class FileFormatError(InputError):
         super().__init__(f"{path}{f', {where}' if where else ''}: {problem}")
 
 
+class NoModesError(InputError):
+    """Measured FRFs show no mode: nothing stands out of their noise in the band.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> issubclass(frf_ipz.NoModesError, frf_ipz.InputError)
+    True
+    """
+
+
 class NumericalError(FrfIpzError, RuntimeError):
     """A computation cannot give a result.
 

@@ -67,7 +67,7 @@ def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Prog
     ------
     InputError
         If too few lines remain to be fitted.
-    NumericalError
+    NoModesError
         If no mode is found.
 
     Examples

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.errors import InputError, NoModesError
 from frf_ipz.identification.fit import fit_modes, fit_residues
 from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.quantities import FrfQuantity
@@ -299,7 +299,7 @@ def test_noise_alone_has_no_modes():
     frfs = with_noise(LINES_HZ, values, labels_of(4, 1), 1e-3, rng)
     with pytest.raises(InputError, match="no frequency line carries a signal"):
         fit_modes(frfs, options=FitOptions())
-    with pytest.raises(NumericalError, match="no mode stands out of the noise"):
+    with pytest.raises(NoModesError, match="no mode stands out of the noise"):
         fit_modes(frfs, options=FitOptions(band_hz=(10.0, 900.0)))
 
 

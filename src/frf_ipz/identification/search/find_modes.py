@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from frf_ipz.errors import NumericalError
+from frf_ipz.errors import NoModesError
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
@@ -103,7 +103,7 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     ------
     InputError
         If too few lines remain to be fitted.
-    NumericalError
+    NoModesError
         If no mode is found.
     """
     progress(0.0, "choosing lines")
@@ -166,7 +166,7 @@ def _select(
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
     selected = select_modes(data, poles, terms, options, noise_is_known=noise_is_known)
     if not mode_order(selected.fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
-        raise NumericalError(
+        raise NoModesError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
             "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
         )

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.errors import NumericalError
+from frf_ipz.errors import NoModesError
 from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.measured_lines import FEWEST_LINES
 from frf_ipz.identification.search.find_modes import FittedModes, find_modes, variance_factors
@@ -141,7 +141,7 @@ def fit_halves(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> SplitH
 def _fit_half(frfs: FrfSet, options: FitOptions) -> _Half:
     try:
         fitted = find_modes(frfs, options)
-    except NumericalError:  # no mode stands out of the noise
+    except NoModesError:  # no mode stands out of the noise
         return _Half(poles=np.zeros(0, complex), variance=np.zeros((2, 0)))
     variance = variance_factors(fitted) * _white_noise_variance(fitted)
     return _Half(poles=fitted.fit.poles, variance=variance.reshape(2, -1))
