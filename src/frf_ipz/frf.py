@@ -14,7 +14,7 @@ import numpy.typing as npt
 from frf_ipz.arguments import describe, require_choice, require_type, take_array
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
 from frf_ipz.display import Drawn, Tabulated
-from frf_ipz.dofs import Dof, as_dofs
+from frf_ipz.dofs import Dof, as_dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
@@ -33,9 +33,9 @@ class FrfLabel:
 
     Parameters
     ----------
-    output_dof, input_dof : Dof
+    output_dof, input_dof : Dof or str
         Sensor and excited DOF, with the signs of the test.
-    quantity : FrfQuantity
+    quantity : FrfQuantity or str
         What was measured.
     output_channel, input_channel : str
         Columns of the recordings that it comes from.
@@ -43,8 +43,7 @@ class FrfLabel:
     Examples
     --------
     >>> import frf_ipz
-    >>> sensor, force = frf_ipz.parse_dof("20:-z"), frf_ipz.parse_dof("18:+z")
-    >>> label = frf_ipz.FrfLabel(sensor, force, frf_ipz.FrfQuantity.ACCELERANCE)
+    >>> label = frf_ipz.FrfLabel("20:-z", "18:+z", "accelerance")
     >>> str(label), label.unit, label.sign
     ('20:-z / 18:+z', 'm/s^2/N', -1)
     """
@@ -54,6 +53,11 @@ class FrfLabel:
     quantity: FrfQuantity
     output_channel: str = ""
     input_channel: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "output_dof", as_dof(self.output_dof))
+        object.__setattr__(self, "input_dof", as_dof(self.input_dof))
+        object.__setattr__(self, "quantity", as_quantity(self.quantity))
 
     def __str__(self) -> str:
         return f"{self.output_dof} / {self.input_dof}"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of
@@ -83,3 +83,10 @@ def test_labels_know_sign_and_unit():
     assert label.unit == "m/s^2/N"
     assert FrfQuantity.RECEPTANCE.unit("rx", "ry") == "rad/(N m)"
     assert [frf_quantity_of(name).power for name in ("displacement", "velocity", "acceleration")] == [0, 1, 2]
+
+
+def test_a_label_takes_the_names_of_dofs_and_quantities():
+    label = FrfLabel("20:-z", "18:+z", "mobility")
+    assert label == FrfLabel(parse_dof("20:-z"), parse_dof("18:+z"), FrfQuantity.MOBILITY)
+    with pytest.raises(InputError, match="20z"):
+        FrfLabel("20z", "18:+z", "mobility")

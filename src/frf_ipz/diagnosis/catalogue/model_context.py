@@ -99,7 +99,7 @@ class ModelContext:
         return motion
 
     def stiffness_against(self, motion: FloatArray) -> float:
-        """Stiffness of the structure against a motion by the elastic modes near the band, N/m."""
+        """Stiffness against a motion by the elastic modes near the band, N/m; N m/rad against a rotation."""
         shapes = motion @ self.basis.loaded_shapes
         squares = self.basis.modes.eigenvalues[: len(shapes)]
         elastic = squares > 0
