@@ -80,6 +80,7 @@ def test_weak_modes_are_found_where_the_noise_lets_them(seed):
         assert (error[weak] < 1e-3) == (np.max(best / demanded) > 1)  # what the BIC asks of a mode
 
 
+@pytest.mark.slow
 def test_noise_that_all_frfs_share():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     values = exact(truth, 2j * np.pi * LINES_HZ)

@@ -10,6 +10,8 @@ from frf_ipz.diagnosis.measured.preprocessing.dispersion import CUT_OFF, excess_
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
+pytestmark = pytest.mark.slow
+
 CUBIC_N_M3 = 2e10
 EVERY = 2  # samples of the fine recordings, one of the converter
 FALL_DB = 100.0  # from 0.42 to 0.5 of the converter's rate

@@ -5,6 +5,8 @@ import pytest
 
 from frf_ipz.diagnosis.nonlinear.linearity import WIDTH, _quotient_misfit, assess_linearity
 
+pytestmark = pytest.mark.slow
+
 HALF_BAND = WIDTH / 2  # lines
 ACROSS = np.linspace(-1, 1, WIDTH)  # a group of lines
 LOUD = 0.2  # noise over the motion of the strongest record

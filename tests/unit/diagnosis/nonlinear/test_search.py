@@ -16,6 +16,8 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
 from frf_ipz.diagnosis.verdict.law_and_linear import MAX_NUISANCE_CHI2
 
+pytestmark = pytest.mark.slow
+
 CASES = {
     "cubic_stiffness": (lambda w, _: 2e10 * w**3, (0, 0, 1, 0), {"nodes": [3]}, {"cubic_N_m3": 2e10}),
     "gap_contact": (

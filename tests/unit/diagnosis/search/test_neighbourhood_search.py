@@ -13,6 +13,8 @@ from frf_ipz.diagnosis.search import pair_search as pairs
 from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model, search_component
 from frf_ipz.diagnosis.search.robust_refinement import Start
 
+pytestmark = pytest.mark.slow
+
 KINDS = ("attached_resonator", "local_damper", "grounded_spring", "coupling_spring", "viscoelastic_joint")
 SEEN = 0.05  # relative
 

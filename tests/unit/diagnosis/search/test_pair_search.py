@@ -38,6 +38,8 @@ from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.changes import with_point_masses, with_springs
 from frf_ipz.progress import silent
 
+pytestmark = pytest.mark.slow
+
 THICK_M, HIGH_HZ = 0.03, (60.0, 5000.0)  # shear and rotary inertia lower the highest mode there by some per cent
 SOFTER = 0.9
 SEEN = 0.02  # relative: noise of 0.1 % of the FRFs, tolerances of 0.1 % of the stiffness

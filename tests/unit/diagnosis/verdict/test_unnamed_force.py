@@ -11,6 +11,8 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.quantities import FrfQuantity
 
+pytestmark = pytest.mark.slow
+
 IMITATORS = ("attached_resonator", "viscoelastic_joint")
 NOISY = 0.004  # with less, two imitators are sought before: that takes longer
 DELAY_S = 5e-4

@@ -291,6 +291,7 @@ def test_two_effects_are_both_there():
     assert all(one["ratio_rms"] >= 3 for one in case.truth["detectability"]["each"])
 
 
+@pytest.mark.slow
 def test_a_law_shows_in_impacts_of_different_levels():
     case = concealed("cubic_stiffness")
     assert case.truth["nonlinear"]
