@@ -138,7 +138,7 @@ def test_a_node_cannot_lose_more_than_it_has(nominal):
 
 
 def test_no_state_before_is_refused(nominal, real):
-    with pytest.raises(InputError, match="no state before"):
+    with pytest.raises(InputError, match="before holds no state"):
         frf_ipz.compare_states([], state(nominal, real, 1), options=FEW)
 
 
