@@ -12,7 +12,7 @@ WRONG = [
     (frf_ipz.IngestOptions, "exponential_window_s", -1.0),
     (frf_ipz.IngestOptions, "force_window_s", float("inf")),
     (frf_ipz.ReduceOptions, "modes", 0),
-    (frf_ipz.UpdateOptions, "delta", 0.0),
+    (frf_ipz.UpdateOptions, "delta", -1.0),
     (frf_ipz.PredictOptions, "points", 5),
     (frf_ipz.ExportOptions, "sample_time_s", float("nan")),
     (frf_ipz.ExportOptions, "outputs", "metres"),

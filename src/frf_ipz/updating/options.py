@@ -61,8 +61,8 @@ class UpdateOptions:
     max_iterations: Count | None = None
     alpha: NotNegative = 0.1
     beta: Positive = 0.3
-    delta: Positive = 1e-3
-    delta_damping: Positive = 0.1
+    delta: NotNegative = 1e-3
+    delta_damping: NotNegative = 0.1
     cross_sensitivities: bool = True
     ensemble: CountOrNone = 200
     seed: CountOrNone = 0
