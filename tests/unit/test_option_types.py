@@ -33,3 +33,8 @@ def test_numbers_of_numpy_are_numbers():
 
 def test_a_list_is_as_good_as_a_tuple():
     assert frf_ipz.FitOptions(band_hz=[10.0, 700.0]).band_hz == (10.0, 700.0)
+
+
+def test_a_stop_of_zero_lets_the_published_method_go_on():
+    options = frf_ipz.UpdateOptions(method="ipz", delta=0.0, delta_damping=0.0)
+    assert (options.delta, options.delta_damping) == (0.0, 0.0)
