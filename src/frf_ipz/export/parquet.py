@@ -158,5 +158,7 @@ def write_table(table: pa.Table, path: Path) -> None:
 def _array(values: Any, column: Column) -> pa.Array:  # noqa: ANN401  what Arrow takes has no common type
     if isinstance(values, pa.Array):
         return values
+    if not len(values):  # an empty column of a data frame has no type of its own: the declared one counts
+        return pa.array([], KINDS[column.kind])
     plain = np.ascontiguousarray(values) if isinstance(values, np.ndarray) else list(values)
     return pa.array(plain, KINDS[column.kind], from_pandas=column.kind == "float")

@@ -20,7 +20,7 @@ from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.frf import require_measured
 from frf_ipz.prediction.ensemble import ModelEnsemble
-from frf_ipz.updating.updated_model import UpdatedModel
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -152,6 +152,8 @@ def estimate_uncertainty_weights(
     if frequency_hz is None:
         low, high = measured.band_hz
         frequency_hz = np.geomspace(max(low, high / WIDEST), high, WEIGHT_LINES)
+    if updated.status is UpdateStatus.NOTHING_TO_DO:
+        raise InputError("the update had no target in the band, so the uncertainty of its model is unknown")
     if not len(updated.ensemble):
         raise InputError(
             f"the update by '{updated.method}' has no ensemble, so its uncertainty is unknown; use [update] "

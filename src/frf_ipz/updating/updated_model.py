@@ -12,6 +12,11 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.structure import ReducedModel
 
+UNCERTAIN = (
+    "the model is left as it was, and nothing tells how wrong it is: predictions have no band, and there are no members "
+    "for robust design"
+)
+
 
 class UpdateStatus(Enum):
     """How an update ended; the values are the message.
@@ -137,5 +142,5 @@ def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:
         before=no_roots,
         after=no_roots,
         ensemble=np.zeros((0, 3, order, order)),
-        warnings=(UpdateStatus.NOTHING_TO_DO.value,),
+        warnings=(UNCERTAIN,),
     )

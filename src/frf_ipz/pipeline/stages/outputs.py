@@ -18,6 +18,7 @@ from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
+from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,13 +91,14 @@ def export(
     inputs = runner.inputs
     options = inputs.options.export
     delays = known_delays(modal_fit, corrected_by)
+    has_members = options.ensemble and updated.status is not UpdateStatus.NOTHING_TO_DO
     return runner.stage(
         "export",
         {"options": asdict(options), "points": repr(inputs.points), "after": runner.after("update"), "delays": delays},
         lambda _: make_state_space(modal_fit, updated, points=inputs.points, options=options, delays_s=delays),
         lambda model: {
             **{name: partial(write_state_space, model) for name in ("statespace.json", "statespace.mat")},
-            **(_design_files(updated, modal_fit, inputs.points, options, delays) if options.ensemble else {}),
+            **(_design_files(updated, modal_fit, inputs.points, options, delays) if has_members else {}),
         },
     )
 
