@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import require_finite, require_shape
-from frf_ipz.errors import FileFormatError, InputError, ShapeError, did_you_mean
+from frf_ipz.errors import InputError, ShapeError, did_you_mean
+from frf_ipz.input_files import require_regular_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -183,13 +184,10 @@ def require_file(path: str | PathLike[str]) -> Path:
     InputError
         If it is no path.
     FileFormatError
-        If there is no such file, or it is a folder.
+        If there is no such file, or it is a folder, a device or a pipe.
     """
     file = as_path(path)
-    if file.is_dir():
-        raise FileFormatError(file, "is a folder, but a file is expected: name one inside it")
-    if not file.exists():
-        raise FileFormatError(file, "there is no such file")
+    require_regular_file(file)
     return file
 
 

@@ -16,50 +16,20 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
+from frf_ipz.input_files import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
 
+DEEPEST = 32  # levels of tables and lists; no file of the contract has more than six
+TOO_DEEP = "is nested too deeply; no key of this program is"
 CLASS_NAME = re.compile(r"(?:[A-Z][a-z]+){2,}")  # a dataclass that is a branch of a union
 REPORTED_FIRST = ("unexpected_keyword_argument", "missing")
 
 Options = TypeVar("Options")
-
-
-def read_text(path: Path) -> str:
-    """Read a text file in UTF-8 (with or without a BOM), else in Latin-1.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        Its text; lines end with LF.
-
-    Raises
-    ------
-    FileFormatError
-        If it does not exist or cannot be read.
-    """
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file") from None
-    except IsADirectoryError:
-        raise FileFormatError(path, "is a folder, but a file is expected: name one inside it") from None
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.replace("\r\n", "\n")
 
 
 def read_toml(path: Path, options_type: type[Options], *, required: str = "") -> Options:
@@ -84,14 +54,48 @@ def read_toml(path: Path, options_type: type[Options], *, required: str = "") ->
     FileFormatError
         If the file is missing, is no TOML, or does not fit: names the key, what was expected and the closest known key.
     """
-    text = read_text(path)
+    table = parse_toml(read_text(path), path)
+    if required and required not in table:
+        raise FileFormatError(path, f"has no section [{required}]; is it the right file?")
+    return to_options(table, options_type, path)
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """Parse the text of a TOML file.
+
+    Parameters
+    ----------
+    text : str
+        What the file says.
+    path : Path
+        The file, for the message.
+
+    Returns
+    -------
+    dict
+        Its tables and values.
+
+    Raises
+    ------
+    FileFormatError
+        If it is no TOML, or nested deeper than any key of this program.
+    """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FileFormatError(path, f"is not valid TOML: {error}") from None
-    if required and required not in table:
-        raise FileFormatError(path, f"has no section [{required}]; is it the right file?")
-    return to_options(table, options_type, path)
+    except RecursionError:
+        raise FileFormatError(path, TOO_DEEP) from None
+    level: list[Any] = [table]
+    for _ in range(DEEPEST):
+        level = [item for value in level for item in _items(value)]
+    if level:
+        raise FileFormatError(path, TOO_DEEP)
+    return table
+
+
+def _items(value: Any) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path) -> Options:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import pytest
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.toml_files import STRICT, read_text, read_toml
+from frf_ipz.input_files import read_text
+from frf_ipz.toml_files import STRICT, read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,3 +77,13 @@ def test_a_missing_section_and_a_missing_file_are_reported(tmp_path):
 def test_a_folder_instead_of_a_file_is_reported(tmp_path):
     with pytest.raises(FileFormatError, match="is a folder, but a file is expected"):
         read_text(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["fit = " + 5000 * "[" + 5000 * "]", "fit = " + 40 * "{ a = " + "1" + 40 * " }", "fit." + "a." * 5000 + "b = 1"],
+    ids=["lists", "tables", "dotted keys"],
+)
+def test_deep_nesting_is_refused_in_one_line(tmp_path, text):
+    with pytest.raises(FileFormatError, match="nested too deeply"):
+        read(tmp_path, text)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.input_files import open_input
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -98,11 +98,8 @@ def digest_file(path: Path) -> str:
     FileFormatError
         If it cannot be read.
     """
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
+    with open_input(path) as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _dense_parts(array: Any) -> list[Any]:  # noqa: ANN401  arrays, sparse ones among them

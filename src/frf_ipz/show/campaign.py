@@ -7,13 +7,14 @@ that has not been run yet gets a folder for its results beside it: ``results/NAM
 from __future__ import annotations
 
 import os
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from frf_ipz.errors import InputError
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.input_files import read_text
 from frf_ipz.runs.folder import MANIFEST, read_manifest
+from frf_ipz.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,8 +88,10 @@ def _run_in(folder: Path) -> RunPaths:
 
 def _is_pipeline(file: Path) -> bool:
     try:
-        return "pipeline" in tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError):
+        text = read_text(file)
+    except FileFormatError:
         return False
-    except tomllib.TOMLDecodeError:  # the page then says what is wrong with it
+    try:
+        return "pipeline" in parse_toml(text, file)
+    except FileFormatError:  # the page then says what is wrong with it
         return file.name == "pipeline.toml"

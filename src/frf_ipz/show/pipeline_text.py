@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from typing import TYPE_CHECKING
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.input_files import read_bytes
 from frf_ipz.pipeline.config import PipelineFile
-from frf_ipz.toml_files import to_options
+from frf_ipz.toml_files import parse_toml, to_options
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -73,11 +73,7 @@ def parse(text: str, path: Path) -> PipelineFile:
     FileFormatError
         If it is no TOML or no pipeline.
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(path, f"is not valid TOML: {error}") from None
-    return to_options(table, PipelineFile, path)
+    return to_options(parse_toml(text, path), PipelineFile, path)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -98,7 +94,7 @@ def write_text(path: Path, text: str) -> None:
     target = path.resolve()
     beside = target.with_name(target.name + BESIDE)
     try:
-        ends = "\r\n" if b"\r\n" in target.read_bytes() else "\n"
+        ends = "\r\n" if b"\r\n" in read_bytes(target) else "\n"
         with beside.open("w", encoding="utf-8", newline=ends) as stream:
             stream.write(text)
             stream.flush()

@@ -6,12 +6,12 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
+from frf_ipz.input_files import read_text
 from frf_ipz.runs.folder import MANIFEST, read_manifest
 from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
-from frf_ipz.toml_files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import tomlkit
 
-from frf_ipz.toml_files import read_text
+from frf_ipz.input_files import read_text
 from frf_testbench.proof.commands import Step, compute_code_digest, find_public_command, read_outcome, run_all
 from frf_testbench.proof.plan import Folders
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from frf_ipz.toml_files import read_text
+from frf_ipz.input_files import read_text
 
 KEYS = ("nodes", "elements", "springs", "groups", "channels")
 EXACT, NEAR, WRONG = "exact", "near", "wrong"

@@ -11,7 +11,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.toml_files import read_text
+from frf_ipz.input_files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.input_files import open_input
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -134,13 +135,8 @@ def read_head(path: Path) -> bytes:
     FileFormatError
         If there is no such file, it cannot be read, or is empty.
     """
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD)
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file") from None
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
+    with open_input(path) as stream:
+        head = stream.read(HEAD)
     if not head.strip():
         raise FileFormatError(path, EMPTY)
     return head

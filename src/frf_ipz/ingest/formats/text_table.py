@@ -9,6 +9,7 @@ import pyarrow.csv as arrow_csv
 
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.ingest.formats.text_layout import BOM, decode, is_number, name_and_unit
+from frf_ipz.input_files import open_input
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -77,7 +78,7 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
     """
     keys = [f"{index}" for index in range(len(names))]
     try:
-        with layout.path.open("rb") as stream:
+        with open_input(layout.path) as stream:
             reader = arrow_csv.open_csv(
                 _prepare_stream(stream, layout),
                 read_options=arrow_csv.ReadOptions(
@@ -95,8 +96,6 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
     except pa.ArrowInvalid as error:
         numeric = [index for index, kind in types.items() if pa.types.is_floating(kind)]
         raise _explain_error(layout, names, numeric, str(error)) from None
-    except OSError as error:
-        raise FileFormatError(layout.path, f"cannot be read: {error.strerror or error}") from None
 
 
 def line_of_row(layout: TextLayout, row: int) -> int:
@@ -190,7 +189,7 @@ def _is_special(field: str) -> bool:
 def _numbered_rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
     """Give the lines of numbers with their line numbers."""
     number = 0
-    with layout.path.open("rb") as stream:
+    with open_input(layout.path) as stream:
         for lines in stream:
             for line in lines.rstrip(b"\r\n").split(b"\r"):
                 number += 1

@@ -1,0 +1,169 @@
+"""The one door through which files that others wrote are opened; what is wrong with one is said in one line.
+
+Only regular files are opened: a device never ends, a pipe waits for ever. No other module opens a file to read it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from io import BufferedReader
+    from pathlib import Path
+
+MISSING = "there is no such file"
+FOLDER = "is a folder, but a file is expected: name one inside it"
+MOST_TEXT_BYTES = 1 << 26  # of settings and tables that people write: two million lines
+MB = 1e6
+
+
+def require_regular_file(path: Path) -> int:
+    """Refuse what is no file with content: a folder, a device, a pipe, a link in a circle, nothing at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    int
+        Its size in bytes.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is something else, or cannot be reached.
+    """
+    try:
+        with _errors_of_system(path):
+            status = path.stat()
+    except FileFormatError:
+        raise
+    except ValueError:  # a NUL in the name, or letters that no file system can hold
+        raise FileFormatError(ascii(str(path)), "is no name that a file can have") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise FileFormatError(path, FOLDER)
+    if not stat.S_ISREG(status.st_mode):
+        raise FileFormatError(path, "is a device or a pipe; a file is needed: copy what it gives to one")
+    return status.st_size
+
+
+@contextmanager
+def open_input(path: Path) -> Iterator[BufferedReader]:
+    """Open a file to read it in parts.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Yields
+    ------
+    BufferedReader
+        Its bytes.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is no file, or cannot be read.
+    """
+    require_regular_file(path)
+    with _errors_of_system(path), path.open("rb") as stream:
+        yield stream
+
+
+def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
+    """Read a whole file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most_bytes : int, optional
+        A larger file is refused; by default one that is larger than the memory of the machine.
+
+    Returns
+    -------
+    bytes
+        Its content.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is no file, is too large, or cannot be read.
+    """
+    size = require_regular_file(path)
+    limit = _memory_bytes() if most_bytes is None else most_bytes
+    if size > limit:
+        raise _too_large(path, size, limit)
+    with open_input(path) as stream:
+        try:
+            data = stream.read(limit + 1)
+        except MemoryError:
+            raise _too_large(path, size, limit) from None
+    if len(data) > limit:  # it has grown, or does not say how large it is
+        raise _too_large(path, len(data), limit)
+    return data
+
+
+def read_text(path: Path) -> str:
+    """Read a text file in UTF-8 (with or without a BOM), else in Latin-1.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Its text; lines end with LF.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is no file, is too large for a text, or cannot be read.
+    """
+    data = read_bytes(path, most_bytes=MOST_TEXT_BYTES)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n")
+
+
+@contextmanager
+def _errors_of_system(path: Path) -> Iterator[None]:
+    """Turn what the system says about a path into one line."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise FileFormatError(path, MISSING) from None
+    except IsADirectoryError:
+        raise FileFormatError(path, FOLDER) from None
+    except OSError as error:
+        circle = error.errno == errno.ELOOP
+        reason = "is a link that leads in a circle" if circle else f"cannot be read: {error.strerror or error}"
+        raise FileFormatError(path, reason) from None
+
+
+def _too_large(path: Path, size: int, limit: int) -> FileFormatError:
+    return FileFormatError(
+        path, f"has {size / MB:.0f} MB; at most {limit / MB:.0f} MB can be read: is it the right file?"
+    )
+
+
+def _memory_bytes() -> int:
+    """Give the memory of the machine; where it does not say, the largest size of a file in 32 bits."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return 1 << 32
