@@ -12,6 +12,8 @@ from importlib.resources import files
 from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 
 REPORT = "frf_ipz.report"
+PLOTLY = "plotly-cartesian.min.js"
+SCRIPTS = (PLOTLY, "page.js")  # of a page with pictures, in the order in which they run
 
 
 @cache
@@ -46,6 +48,7 @@ def page_environment(*packages: str) -> Environment:
     return environment
 
 
+@cache
 def read_asset(package: str, name: str) -> str:
     """Read a script or a style sheet of a package.
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from plotly.offline import get_plotlyjs
-
 from frf_ipz.progress import Progress, silent
-from frf_ipz.report.html import REPORT, page_environment, read_asset
+from frf_ipz.report.html import REPORT, SCRIPTS, page_environment, read_asset
 from frf_ipz.report.page_data import page_data
 from frf_ipz.report.plotly_drawing import colour_name
+from frf_ipz.report.policy import page_policy
 from frf_ipz.report.section import Section
 from frf_ipz.report.sections import (
     diagnosis,
@@ -101,11 +100,12 @@ def render_page(run: Results, sections: Sequence[Section]) -> str:
         HTML.
     """
     template = page_environment().get_template("report/report.html")
+    scripts = [read_asset(REPORT, name) for name in SCRIPTS]
     return template.render(
         **run_values(run, sections),
         style=read_asset(REPORT, "page.css"),
-        script=read_asset(REPORT, "page.js"),
-        plotly=get_plotlyjs(),
+        scripts=scripts,
+        policy=page_policy(*scripts),
     )
 
 

@@ -8,14 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plotly.offline import get_plotlyjs
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
-from frf_ipz.report.html import REPORT, read_asset
+from frf_ipz.report.html import PLOTLY, REPORT, read_asset
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import SHOW, render_choices, render_page
@@ -71,7 +70,7 @@ def _routes(bench: Workbench, *, home: str = "") -> list[Route]:
         Route("/change", _answering(bench, _change), methods=["POST"]),
         Route("/run", _answering(bench, _run), methods=["POST"]),
         Route("/run/{path:path}", _answering(bench, _file)),
-        Route("/plotly.js", _fixed(get_plotlyjs(), SCRIPT)),
+        Route("/plotly.js", _fixed(read_asset(REPORT, PLOTLY), SCRIPT)),
         Route("/page.js", _fixed(read_asset(REPORT, "page.js"), SCRIPT)),
         Route("/show.js", _fixed(read_asset(SHOW, "show.js"), SCRIPT)),
         *_styles(),

@@ -16,6 +16,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import frf_ipz
+from frf_ipz.report.policy import page_policy
 from frf_testbench.proof.charts import draw_calibration, draw_parameter_errors, draw_point_errors, draw_times
 from frf_testbench.proof.judging import Judgement, ParameterScore
 from frf_testbench.proof.plan import FULL
@@ -108,6 +109,7 @@ def write_page(path: Path, cases: Cases, bars: Sequence[Bar], *, title: str, cod
     template = make_environment(autoescape=True).get_template("proof.html.jinja")
     text = template.render(
         title=title,
+        policy=page_policy(),
         code=code,
         n_cases=len(cases),
         group_counts=", ".join(f"{counts[group]} {group}" for group in groups),

@@ -1,15 +1,19 @@
 """The page holds what the run holds, and nothing else."""
 
 import base64
+import hashlib
+import html
 import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from frf_ipz.report.html import REPORT, SCRIPTS
 from frf_ipz.report.page import SECTIONS, write_report
 from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import nothing_to_do
@@ -78,6 +82,31 @@ def test_nothing_is_fetched_from_elsewhere(page):
     reader = read(page)
     assert reader.sources == []
     assert all(link.startswith("#") for link in reader.links)
+
+
+def test_only_the_scripts_of_the_page_may_run(page):
+    policy = re.search(r'<meta http-equiv="content-security-policy" content="([^"]+)">', page)[1]
+    policy = html.unescape(policy)
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digests = {base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts}
+    assert set(re.findall(r"'sha256-([^']+)'", policy)) == digests
+    assert len(digests) == 2
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe" not in policy.replace("style-src 'unsafe-inline'", "")
+    assert {"base-uri 'none'", "form-action 'none'"} <= set(policy.split("; "))
+    assert page.index("http-equiv") < min(page.index("<style"), page.index("<script"), page.index("<title"))
+
+
+def test_the_library_that_draws_is_the_one_that_is_noted():
+    assets = files(REPORT) / "assets"
+    note = (assets / "README.md").read_text(encoding="utf-8")
+    noted = re.search(r"`(plotly\S+)` \| `\S+` \| (\S+) \| MIT, `(\S+)` \| `(\w+)`", note)
+    library = (assets / noted[1]).read_bytes()
+    assert noted[1] in SCRIPTS
+    assert hashlib.sha256(library).hexdigest() == noted[4]
+    assert f"v{noted[2]}\n".encode() in library[:200]
+    assert (assets / noted[3]).read_text(encoding="utf-8").startswith("MIT License")
+    assert not re.search(rb"new Worker|new Function|\beval\(", library)
 
 
 def test_links_lead_somewhere_and_names_are_unique(page):

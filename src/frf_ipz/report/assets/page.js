@@ -15,6 +15,7 @@
       c0: "#5cb8f2", c1: "#ff8a4c", c2: "#35c79f", c3: "#e88fc6", c4: "#e8d04a", c5: "#a9abff", c6: "#a3adb8",
     },
   };
+  const NO_CLOUD = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "" }; // measurements stay on this machine
   const PRINT_WIDTH = 680;
   const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
   const decoded = [];
@@ -86,7 +87,7 @@
     const picture = page.pictures[name];
     const figure = document.getElementById(name);
     const plot = figure.querySelector(".plot");
-    const config = { responsive: !printing, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
+    const config = { responsive: !printing, ...NO_CLOUD, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
     Plotly.react(plot, traces(picture, drawn.has(name) && plot.data), themed(unpack(picture.layout), figure), config);
     if (!drawn.has(name)) {
       drawn.set(name, plot);
