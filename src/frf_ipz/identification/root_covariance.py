@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
 
@@ -38,7 +39,7 @@ class RootCovariance:
     """
 
     common: FloatArray
-    blocks: Any
+    blocks: sparse.csr_array[np.float64, tuple[int, int]]
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -1,61 +1,85 @@
-"""Results of stages into one file and back, exactly.
+"""Results of stages into one file and back, exactly. Data are never code.
 
-A result is a tree of our own dataclasses, arrays, tables, enums, tuples, mappings and plain values. Arrays go into an
-``.npz`` archive, the tree that refers to them into a JSON text inside it. Nothing in a file can run code when it is
-read: only dataclasses and enums of this package are built again.
+What a file may hold follows from the types of `RESULTS` and from the annotations of their fields: a value that is
+no such thing is refused. No name in a file is ever looked up, but in this table; arrays are plain numbers.
 """
 
 from __future__ import annotations
 
-import json
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
+from functools import cache
 from importlib import import_module
-from pathlib import Path
-from typing import Any, cast
-from zipfile import BadZipFile
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pandas as pd
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, FrfIpzError
+from frf_ipz.runs.stage_file import ADVICE, StageFile, read_stage_file, write_stage_file
 
-PACKAGE = "frf_ipz."
-TREE = "tree"
-PLAIN = (str, int, float, bool, type(None))
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+RESULTS = {  # by stage: the whole list of what is ever built from a file, with the types of its fields
+    "ingest": "frf_ipz.ingest.frf_estimate:FrfEstimate",
+    "fit": "frf_ipz.identification.modal_fit:ModalFit",
+    "model": "frf_ipz.structure:Geometry",
+    "diagnose": "frf_ipz.diagnosis.result:Diagnosis",
+    "levels": "frf_ipz.diagnosis.measured.levels:LevelDependence",
+    "reduce": "frf_ipz.structure:ReducedModel",
+    "pair": "frf_ipz.pairing.pairs:Pairs",
+    "update": "frf_ipz.updating.updated_model:UpdatedModel",
+    "predict": "frf_ipz.prediction.prediction:Prediction",
+    "reference": "frf_ipz.frf:FrfSet",
+    "export": "frf_ipz.export.state_space:StateSpaceModel",
+}
+LARGEST_INTEGER = 1 << 63
+REASON = 200  # letters of what is wrong that are said
 
 
-def save_result(result: object, path: Path) -> None:
+def save_result(result: object, path: Path, *, key: str = "") -> None:
     """Write a stage's result.
 
     Parameters
     ----------
     result : object
-        A tree of what the module's docstring names.
+        Of a type of `RESULTS`, or plain values, arrays and tables.
     path : Path
-        File to write, ending in ``.npz``.
+        File to write.
+    key : str
+        Digest of all that the result depends on, to be kept with it.
 
     Raises
     ------
     TypeError
-        If the tree holds something else: a fault of the program.
+        If it holds what its annotations do not say: a fault of the program.
     OSError
         If it cannot be written.
     """
-    arrays: dict[str, np.ndarray[Any, Any]] = {}
-    tree = _encode(result, arrays)
-    with path.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **{TREE: np.array(json.dumps(tree)), **arrays})
+    arrays: list[NDArray[Any]] = []
+    name = f"{type(result).__module__}:{type(result).__qualname__}"
+    kind: Any = type(result) if name in RESULTS.values() else object
+    tree = [name if kind is not object else "", _kind(kind).encode(result, arrays)]
+    write_stage_file(StageFile(key=key, tree=tree, arrays=arrays), path)
 
 
-def load_result(path: Path) -> Any:
+def load_result(path: Path, *, stage: str = "", key: str | None = None) -> Any:
     """Read what `save_result` wrote.
 
     Parameters
     ----------
     path : Path
         The file.
+    stage : str
+        The result must be what this stage gives; empty for anything.
+    key : str, optional
+        The key that must be kept with it; any by default.
 
     Returns
     -------
@@ -65,98 +89,313 @@ def load_result(path: Path) -> Any:
     Raises
     ------
     FileFormatError
-        If the file is damaged or was written by another version of the program.
+        If the file is damaged, was written by another version of the program, or holds something else.
     """
+    content = read_stage_file(path)
+    if key is not None and content.key != key:
+        raise FileFormatError(path, f"belongs to another run; {ADVICE}")
+    allowed = (RESULTS[stage],) if stage else ("", *RESULTS.values())
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return _decode(json.loads(str(archive[TREE])), archive)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, ImportError, BadZipFile) as error:
-        raise FileFormatError(path, f"is damaged or from another version ({error}); delete it and run again") from None
+        name, tree = content.tree
+        if name not in allowed:
+            raise _MisfitError(f"it holds {name or 'plain values'}")
+        arrays = dict(enumerate(content.arrays))
+        return _kind(_type_of(name) if name else object).decode(tree, arrays)
+    except (FrfIpzError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
+        reason = " ".join(str(error).split())[:REASON]
+        raise FileFormatError(path, f"is damaged or from another version ({reason}); {ADVICE}") from None
 
 
-def _encode(value: Any, arrays: dict[str, Any]) -> Any:
-    if isinstance(value, Enum):
-        return {"enum": _type_name(type(value)), "name": value.name}
-    if isinstance(value, PLAIN):
-        return value
-    if isinstance(value, np.ndarray | np.generic | complex):
-        return {"array" if isinstance(value, np.ndarray) else "scalar": _keep(np.asarray(value), arrays)}
-    if isinstance(value, Path):
-        return {"path": str(value)}
-    if isinstance(value, tuple | list):
-        return {"tuple": [_encode(item, arrays) for item in value]}
-    return _encode_mapping(value, arrays)
+class _MisfitError(ValueError):
+    """A value is not what its annotation says."""
 
 
-def _encode_mapping(value: Any, arrays: dict[str, Any]) -> Any:
-    if sparse.issparse(value):
-        part: Any = sparse.csr_array(cast("Any", value))
-        return {"csr": [_keep(part.data, arrays), _keep(part.indices, arrays), _keep(part.indptr, arrays), part.shape]}
-    if isinstance(value, pd.DataFrame):
-        columns = [[str(name), _encode(_column(value[name]), arrays)] for name in value.columns]
-        return {"frame": columns, "rows": len(value)}
-    if is_dataclass(value) and not isinstance(value, type):
-        items = {item.name: _encode(getattr(value, item.name), arrays) for item in fields(value) if item.init}
-        return {"type": _type_name(type(value)), "fields": items}
-    if isinstance(value, dict):
-        return {"dict": [[_encode(key, arrays), _encode(item, arrays)] for key, item in value.items()]}
-    raise TypeError(f"a stage's result holds a {type(value).__name__}, which cannot be kept")
+class _Kind:
+    """Turns values of one annotation into JSON values and back; arrays go aside."""
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        raise NotImplementedError
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        raise NotImplementedError
 
 
-def _column(series: Any) -> Any:
-    values = series.to_numpy()
-    return values if values.dtype.kind in "biufc" else [None if pd.isna(item) else item for item in series.tolist()]
+class _Scalar(_Kind):
+    """A number, a truth value or a text."""
 
+    def __init__(self, kind: type) -> None:
+        self._kind = kind
 
-def _keep(array: np.ndarray[Any, Any], arrays: dict[str, Any]) -> str:
-    key = f"a{len(arrays)}"
-    arrays[key] = array
-    return key
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        del arrays
+        plain = value.item() if isinstance(value, np.generic) else value
+        plain = float(plain) if self._kind is float and type(plain) is int else plain
+        if not isinstance(plain, self._kind) or isinstance(plain, bool) is not (self._kind is bool):
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a {self._kind.__name__}")
+        return self._kind(plain)
 
-
-def _type_name(cls: type) -> str:
-    if not cls.__module__.startswith(PACKAGE):
-        raise TypeError(f"{cls.__module__}.{cls.__qualname__} is no type of this package")
-    return f"{cls.__module__}:{cls.__qualname__}"
-
-
-def _type(name: str) -> Any:
-    module, _, qualified = name.partition(":")
-    if not module.startswith(PACKAGE):
-        raise TypeError(f"{name} is no type of this package")
-    return getattr(import_module(module), qualified)
-
-
-def _decode(node: Any, archive: Any) -> Any:
-    if not isinstance(node, dict):
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        del arrays
+        if type(node) is not self._kind or (type(node) is int and abs(node) >= LARGEST_INTEGER):
+            raise _MisfitError(f"a {self._kind.__name__} was expected")
         return node
-    tag = next(iter(node))
-    return DECODERS[tag](node, archive)
 
 
-def _decode_frame(node: Any, archive: Any) -> pd.DataFrame:
-    columns = {name: _decode(column, archive) for name, column in node["frame"]}
-    return pd.DataFrame(
-        {name: list(column) if isinstance(column, tuple) else column for name, column in columns.items()},
-        index=range(node["rows"]),
-    )
+class _Complex(_Kind):
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        del arrays
+        number = complex(value)
+        return {"complex": [number.real, number.imag]}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        real, imag = (REAL.decode(part, arrays) for part in node["complex"])
+        return complex(real, imag)
 
 
-def _decode_csr(node: Any, archive: Any) -> Any:
-    data, indices, indptr, shape = node["csr"]
-    return sparse.csr_array((archive[data], archive[indices], archive[indptr]), shape=tuple(shape))
+class _Nothing(_Kind):
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        del arrays
+        if value is not None:
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of None")
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        del arrays
+        if node is not None:
+            raise _MisfitError("nothing was expected")
 
 
-DECODERS: dict[str, Any] = {
-    "enum": lambda node, _: _type(node["enum"])[node["name"]],
-    "array": lambda node, archive: archive[node["array"]],
-    "scalar": lambda node, archive: archive[node["scalar"]][()],
-    "path": lambda node, _: Path(node["path"]),
-    "tuple": lambda node, archive: tuple(_decode(item, archive) for item in node["tuple"]),
-    "csr": _decode_csr,
-    "frame": _decode_frame,
-    "type": lambda node, archive: _type(node["type"])(
-        **{name: _decode(item, archive) for name, item in node["fields"].items()}
-    ),
-    "dict": lambda node, archive: {_decode(key, archive): _decode(item, archive) for key, item in node["dict"]},
+class _Choice(_Kind):
+    """A member of an enum, by its name."""
+
+    def __init__(self, kind: type[Enum]) -> None:
+        self._kind = kind
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        del arrays
+        return self._kind(value).name
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        return self._kind[TEXT.decode(node, arrays)]
+
+
+class _Array(_Kind):
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if not isinstance(value, np.ndarray):
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of an array")
+        arrays.append(value)
+        return {"array": len(arrays) - 1}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        return arrays.pop(node["array"])  # once: many references to one array could grow without end
+
+
+class _Sparse(_Kind):
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        part: Any = sparse.csr_array(cast("Any", value))
+        places = [ARRAY.encode(item, arrays) for item in (part.data, part.indices, part.indptr)]
+        return {"csr": places, "shape": list(part.shape)}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        data, indices, pointers = (ARRAY.decode(item, arrays) for item in node["csr"])
+        n_rows, n_columns = (INTEGER.decode(item, arrays) for item in node["shape"])
+        if n_rows != n_columns:
+            raise _MisfitError("a square matrix was expected")
+        matrix = sparse.csr_array((data, indices, pointers), shape=(n_rows, n_columns))
+        matrix.check_format(full_check=True)  # an index beyond its end would be followed
+        return matrix
+
+
+class _Frame(_Kind):
+    """A table: columns of numbers as arrays, others as lists of plain values."""
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if not isinstance(value, pd.DataFrame):
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a table")
+        columns = [[str(name), _encode_column(value[name], arrays)] for name in value.columns]
+        return {"frame": columns, "rows": len(value)}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        columns = {TEXT.decode(name, arrays): _decode_column(column, arrays) for name, column in node["frame"]}
+        if {len(column) for column in columns.values()} - {node["rows"]} or (node["rows"] and not columns):
+            raise _MisfitError("the columns of a table are not of one length")
+        return pd.DataFrame(columns, index=range(node["rows"]))
+
+
+class _Tuple(_Kind):
+    """Any number of values of one kind."""
+
+    def __init__(self, item: _Kind) -> None:
+        self._item = item
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if not isinstance(value, tuple | list):
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a tuple")
+        return [self._item.encode(item, arrays) for item in value]
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        if not isinstance(node, list):
+            raise _MisfitError("a list was expected")
+        return tuple(self._item.decode(item, arrays) for item in node)
+
+
+class _FixedTuple(_Kind):
+    """As many values as the annotation names, each of its own kind."""
+
+    def __init__(self, items: tuple[_Kind, ...]) -> None:
+        self._items = items
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        return [kind.encode(item, arrays) for kind, item in zip(self._items, value, strict=True)]
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        return tuple(kind.decode(item, arrays) for kind, item in zip(self._items, node, strict=True))
+
+
+class _Mapping(_Kind):
+    def __init__(self, key: _Kind, value: _Kind) -> None:
+        self._key, self._value = key, value
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        pairs = value.items()
+        return {"dict": [[self._key.encode(key, arrays), self._value.encode(item, arrays)] for key, item in pairs]}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        pairs = node["dict"]
+        return {self._key.decode(key, arrays): self._value.decode(item, arrays) for key, item in pairs}
+
+
+class _Fields(_Kind):
+    """A dataclass of this package: its fields, each of the kind of its annotation."""
+
+    def __init__(self, kind: Any) -> None:
+        if not is_dataclass(kind) or not isinstance(kind, type) or not kind.__module__.startswith(PACKAGE):
+            raise TypeError(f"{kind} is no dataclass of this package, and no annotation of what can be kept")
+        hints = get_type_hints(kind)
+        self.kind = kind
+        self._kinds = {item.name: _kind(hints[item.name]) for item in fields(kind) if item.init}
+        self._required = {
+            item.name
+            for item in fields(kind)
+            if item.init and item.default is MISSING and item.default_factory is MISSING
+        }
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if type(value) is not self.kind:
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a {self.kind.__name__}")
+        return {"fields": {name: kind.encode(getattr(value, name), arrays) for name, kind in self._kinds.items()}}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        items = node["fields"]
+        if items.keys() - self._kinds.keys() or self._required - items.keys():
+            raise _MisfitError(f"it has not the fields of {self.kind.__name__}")
+        return self.kind(**{name: self._kinds[name].decode(item, arrays) for name, item in items.items()})
+
+
+class _Union(_Kind):
+    """The first of several kinds that fits."""
+
+    def __init__(self, kinds: tuple[_Kind, ...]) -> None:
+        self._kinds = kinds
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        for kind in self._kinds:
+            try:
+                return kind.encode(value, arrays)
+            except TypeError:
+                continue
+        raise TypeError(f"a stage's result holds a {type(value).__name__}, which its annotation does not name")
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        for kind in self._kinds:
+            try:
+                return kind.decode(node, arrays)
+            except (TypeError, LookupError, _MisfitError):
+                continue
+        raise _MisfitError("a value is none of what it may be")
+
+
+class _Plain(_Kind):
+    """Whatever holds no type of the package: numbers, texts, arrays, tables, tuples and mappings of them."""
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if isinstance(value, complex | np.complexfloating):
+            return COMPLEX.encode(value, arrays)
+        plain = value.item() if isinstance(value, np.generic) else value
+        for kinds, kind in self._by_value().items():
+            if isinstance(plain, kinds):
+                return kind.encode(plain, arrays)
+        if isinstance(plain, Enum) or not isinstance(plain, str | int | float | None):
+            raise TypeError(f"a stage's result holds a {type(value).__name__}, which cannot be kept")
+        return plain
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        if isinstance(node, list):
+            return TUPLE.decode(node, arrays)
+        if isinstance(node, dict):
+            by_tag = {"array": ARRAY, "csr": SPARSE, "frame": FRAME, "dict": MAPPING, "complex": COMPLEX}
+            return by_tag[next(iter(node), "")].decode(node, arrays)
+        return INTEGER.decode(node, arrays) if type(node) is int else node
+
+    def _by_value(self) -> dict[Any, _Kind]:
+        return {
+            np.ndarray: ARRAY,
+            pd.DataFrame: FRAME,
+            sparse.sparray: SPARSE,
+            (tuple, list): TUPLE,
+            dict: MAPPING,
+        }
+
+
+PACKAGE = "frf_ipz."
+REAL, INTEGER, TEXT, TRUTH = _Scalar(float), _Scalar(int), _Scalar(str), _Scalar(bool)
+ARRAY, SPARSE, FRAME, COMPLEX, NOTHING, PLAIN = _Array(), _Sparse(), _Frame(), _Complex(), _Nothing(), _Plain()
+TUPLE, MAPPING = _Tuple(PLAIN), _Mapping(PLAIN, PLAIN)
+SIMPLE: dict[Any, _Kind] = {
+    float: REAL,
+    int: INTEGER,
+    str: TEXT,
+    bool: TRUTH,
+    complex: COMPLEX,
+    type(None): NOTHING,
+    object: PLAIN,
+    pd.DataFrame: FRAME,
+    np.ndarray: ARRAY,
+    sparse.csr_array: SPARSE,
 }
+
+
+@cache
+def _kind(hint: Any) -> _Kind:
+    """Find what turns the values of an annotation into a file and back."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if hint in SIMPLE or origin in SIMPLE:
+        return SIMPLE[hint if hint in SIMPLE else origin]
+    if origin in {Union, UnionType}:
+        return _Union(tuple(map(_kind, arguments)))
+    if origin is tuple:
+        return _Tuple(_kind(arguments[0])) if arguments[1:] == (...,) else _FixedTuple(tuple(map(_kind, arguments)))
+    if origin is Mapping:
+        return _Mapping(*map(_kind, arguments))
+    return _Choice(hint) if isinstance(hint, type) and issubclass(hint, Enum) else _Fields(hint)
+
+
+def _type_of(name: str) -> type:
+    module, _, qualified = name.partition(":")  # of the table above, not of a file
+    kind: type = getattr(import_module(module), qualified)
+    return kind
+
+
+def _encode_column(series: Any, arrays: list[NDArray[Any]]) -> Any:
+    values = series.to_numpy()
+    if values.dtype.kind in "biufc":
+        return ARRAY.encode(values, arrays)
+    return [None if pd.isna(item) else PLAIN.encode(item, arrays) for item in series.tolist()]
+
+
+def _decode_column(node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+    if isinstance(node, list):
+        return pd.Series(TUPLE.decode(node, arrays), dtype=None if node else object)
+    column = ARRAY.decode(node, arrays)
+    if column.ndim != 1:
+        raise _MisfitError("a column of a table has more than one axis")
+    return column

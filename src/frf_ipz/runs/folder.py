@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.runs.codec import load_result, save_result
+from frf_ipz.runs.stage_file import SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -99,7 +100,7 @@ class RunFolder:
         object
             The result.
         """
-        stored = self.path / STAGES / f"{name}.npz"
+        stored = self.path / STAGES / f"{name}{SUFFIX}"
         if self._is_current(name, key) and stored.is_file():
             try:
                 result: Result = load_result(stored)
@@ -111,7 +112,7 @@ class RunFolder:
         started = time.perf_counter()
         result = compute()
         named = files(result)
-        self._write({f"{STAGES}/{name}.npz": lambda path: save_result(result, path), **named})
+        self._write({f"{STAGES}/{name}{SUFFIX}": lambda path: save_result(result, path), **named})
         self._note(name, key, started, named)
         return result
 
@@ -222,7 +223,7 @@ class RunFolder:
         FileFormatError
             If the file is damaged.
         """
-        staged, stored = (folder / STAGES / f"{name}.npz" for folder in (self.staging, self.path))
+        staged, stored = (folder / STAGES / f"{name}{SUFFIX}" for folder in (self.staging, self.path))
         place = staged if staged.is_file() else stored
         return load_result(place) if place.is_file() else None
 

@@ -86,8 +86,8 @@ def test_the_json_is_as_in_the_contract(with_mass):
 
 
 def test_a_diagnosis_survives_being_stored(with_mass, tmp_path):
-    save_result(with_mass, tmp_path / "diagnosis.npz")
-    assert load_result(tmp_path / "diagnosis.npz").to_json() == with_mass.to_json()
+    save_result(with_mass, tmp_path / "diagnosis.result")
+    assert load_result(tmp_path / "diagnosis.result").to_json() == with_mass.to_json()
 
 
 def test_the_corrected_model_has_the_mass(nominal, with_mass):

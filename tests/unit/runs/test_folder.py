@@ -42,7 +42,7 @@ def test_a_stage_is_computed_once_for_a_key(tmp_path):
 def test_a_damaged_result_is_computed_again(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    (tmp_path / "stages" / "fit.npz").write_bytes(b"no archive")
+    (tmp_path / "stages" / "fit.result").write_bytes(b"no result")
     with open_run(tmp_path) as folder:
         assert stage(folder, "a", 2) == 2
 

@@ -201,7 +201,7 @@ def test_what_the_page_shows_of_the_file_is_escaped(client):
 
 def test_a_damaged_result_is_said(client, bench):
     assert client.get(HOME).status_code == 200
-    (bench.folder / "stages" / "fit.npz").write_bytes(b"no archive")
+    (bench.folder / "stages" / "fit.result").write_bytes(b"no result")
     (bench.folder / "run.json").touch()
     answer = client.get(HOME)
     assert answer.status_code == 400

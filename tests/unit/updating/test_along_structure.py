@@ -98,6 +98,6 @@ def test_a_model_without_parts_has_no_table(local):
 def test_the_table_survives_a_run_folder(local, tmp_path):
     _, updated_model = local
     for number, result in enumerate((updated_model, replace(updated_model, parts=pd.DataFrame()))):
-        save_result(result, tmp_path / f"{number}.npz")
-        back = load_result(tmp_path / f"{number}.npz")
+        save_result(result, tmp_path / f"{number}.result")
+        back = load_result(tmp_path / f"{number}.result")
         pd.testing.assert_frame_equal(back.parts, result.parts, check_column_type=False, check_index_type=False)

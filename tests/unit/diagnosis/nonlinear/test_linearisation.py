@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -78,7 +79,7 @@ def test_the_linear_model_has_spring_and_damper(tmp_path, location):
         alternatives=(),
         mismatch_hz=np.zeros(0),
         mismatch_where="",
-        mismatch=None,
+        mismatch=pd.DataFrame(),
         before=nothing,
         updated=nothing,
         after=nothing,
@@ -90,8 +91,8 @@ def test_the_linear_model_has_spring_and_damper(tmp_path, location):
     row = np.array([motion.get(dof, 0.0) for dof in model.all_dofs])
     assert_allclose((changed.stiffness_all - model.stiffness_all).toarray(), 5e4 * np.outer(row, row))
     assert_allclose((changed.damping_all - model.damping_all).toarray(), 3.0 * np.outer(row, row))
-    save_result(diagnosis, tmp_path / "d.npz")
-    loaded = load_result(tmp_path / "d.npz")
+    save_result(diagnosis, tmp_path / "d.result")
+    loaded = load_result(tmp_path / "d.result")
     assert loaded.to_json()["linear_model"] == diagnosis.to_json()["linear_model"]
     assert loaded.to_json()["linear_model"]["between"] == [dof.name for dof in location.ends]
     assert "linear_model" not in replace(diagnosis, linearised_law=None).to_json()
