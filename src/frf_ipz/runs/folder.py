@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.runs.codec import load_result, save_result
+from frf_ipz.runs.manifest import MANIFEST, load_manifest
 from frf_ipz.runs.stage_file import SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-MANIFEST = "run.json"
 STAGES = "stages"
 STAGING = ".partial-"
 
@@ -339,13 +339,13 @@ def read_run(path: Path) -> RunFolder:
     Raises
     ------
     InputError
-        If no run has been made there, or another version made it, whose results have another form.
+        If no run has been made there, `run.json` is damaged, or another version made it, with results of another form.
     """
     if not (path / MANIFEST).is_file():
         raise InputError(
             f"{path}: there is no run here (no {MANIFEST}); make one with 'frf-ipz run PIPELINE --out {path}'"
         )
-    manifest = read_manifest(path)
+    manifest = load_manifest(path)
     made_by = str(manifest.get("frf_ipz", __version__))
     if made_by.split(".")[:2] != __version__.split(".")[:2]:
         pipeline = manifest.get("pipeline", "PIPELINE")
@@ -370,10 +370,9 @@ def read_manifest(path: Path) -> dict[str, Any]:
         What it says; empty where there is none or it is damaged, so that everything is computed anew.
     """
     try:
-        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return load_manifest(path)
+    except FileFormatError:
         return {}
-    return manifest if isinstance(manifest, dict) else {}
 
 
 def _sweep(path: Path) -> None:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.input_files import read_text
-from frf_ipz.runs.folder import MANIFEST, read_manifest
+from frf_ipz.runs.folder import read_manifest
+from frf_ipz.runs.manifest import MANIFEST
 from frf_ipz.toml_files import parse_toml
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.input_files import read_text
-from frf_ipz.runs.folder import MANIFEST, read_manifest
+from frf_ipz.runs.folder import read_manifest
+from frf_ipz.runs.manifest import MANIFEST
 from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
