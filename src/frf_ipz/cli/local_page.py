@@ -7,6 +7,7 @@ import sys
 import webbrowser
 from typing import TYPE_CHECKING
 
+from frf_ipz.cli.printing import say
 from frf_ipz.show.server import serve
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
     """
 
     def announce(address: str) -> None:
-        print(f"{address}\nstop with Ctrl-C", flush=True)
+        say(f"{address}\nstop with Ctrl-C")
         if _has_desktop() if browser is None else browser:
             webbrowser.open(address)
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
-from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from frf_ipz import __version__
+from frf_ipz.cli.printing import guard_streams, say, say_error
+from frf_ipz.visible_text import one_line
 
 EPILOG = """
 [bold]From a folder of recordings to a controller-ready model[/bold]
@@ -59,7 +60,7 @@ HELP = {
 
 def _version(is_given: bool) -> None:  # noqa: FBT001  the signature of a typer callback
     if is_given:
-        print(f"frf-ipz {__version__}")
+        say(f"frf-ipz {__version__}")
         raise typer.Exit
 
 
@@ -95,7 +96,7 @@ def check(pipeline: PipelineArgument) -> None:
     from frf_ipz.pipeline.check import describe_setup
     from frf_ipz.pipeline.inputs import read_inputs
 
-    print(describe_setup(read_inputs(pipeline)))
+    say(describe_setup(read_inputs(pipeline)))
 
 
 @app.command()
@@ -106,7 +107,7 @@ def init(
     from frf_ipz.pipeline.init import write_starting_files
 
     for path, written in write_starting_files(folder).items():
-        print(f"{'wrote' if written else 'left '} {path}")
+        say(one_line(f"{'wrote' if written else 'left '} {path}"))
 
 
 @app.command()
@@ -123,7 +124,7 @@ def plot(
     """Draw one picture of a run for a publication."""
     from frf_ipz.cli.pictures import draw_picture, picture_list
 
-    print(picture_list(folder) if name is None else draw_picture(folder, name, file_format, out))
+    say(picture_list(folder) if name is None else draw_picture(folder, name, file_format, out))
 
 
 @app.command()
@@ -146,15 +147,14 @@ def main() -> None:
 
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
-    if isinstance(sys.stdout, TextIOWrapper):  # a console or a pipe may know fewer letters than a user's names have
-        sys.stdout.reconfigure(errors="backslashreplace")
+    guard_streams()
     try:
         app()
     except FrfIpzError as error:
-        print(f"frf-ipz: {error}", file=sys.stderr)
+        say_error(str(error))
         sys.exit(1 if isinstance(error, NumericalError) else 2)
     except KeyboardInterrupt:
-        print("frf-ipz: stopped; what was in the folder is untouched", file=sys.stderr)
+        say_error("stopped; what was in the folder is untouched")
         sys.exit(130)
 
 

@@ -7,7 +7,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from frf_ipz.cli.printing import say
 from frf_ipz.pipeline.run import run_pipeline
+from frf_ipz.visible_text import one_line
 
 
 def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool | None, quiet: bool) -> None:
@@ -32,13 +34,13 @@ def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool
         If the run cannot be done.
     """
     console = Console(stderr=True, quiet=quiet, highlight=False)
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
         task = bar.add_task("reading", total=1.0)
 
         def show(fraction: float, text: str) -> None:
-            bar.update(task, completed=fraction, description=text[:60].ljust(60))
+            bar.update(task, completed=fraction, description=one_line(text)[:60].ljust(60))
 
         run = run_pipeline(pipeline, out, until=until, diagnosing=diagnosing, progress=show)
     if not quiet:
-        Console(highlight=False, soft_wrap=True).print(run.summary(), markup=False)
+        say(run.summary())

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.visible_text import one_line
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -48,7 +50,7 @@ def describe_setup(inputs: PipelineInputs) -> str:
         "",
         "Everything fits together. Nothing was run.",
     ]
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def draw(geometry: Geometry, sensors: Iterable[Dof], inputs: Iterable[Dof], points: Iterable[Dof]) -> list[str]:

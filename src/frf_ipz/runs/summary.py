@@ -8,6 +8,7 @@ import numpy as np
 
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.rational import natural_frequency_hz
+from frf_ipz.visible_text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,7 +56,7 @@ def summarise(results: Results) -> str:
     lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
     if results.path is not None and "report" in results.stages and "report" not in results.stale:
         lines.append(f"{'page':<12}{results.path / 'report.html'}")
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def estimate_lines(estimate: FrfEstimate) -> list[tuple[str, str]]:

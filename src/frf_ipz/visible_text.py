@@ -1,0 +1,64 @@
+"""Text that may come from anybody, made safe to show: what a terminal would obey is written out instead.
+
+Names come from files. An escape sequence in one could clear the screen, write to the clipboard or hide a line, a
+bidirectional control could show a name as another, and a line feed could add a line that nobody said.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+
+JOINERS = frozenset("\u200c\u200d\u00ad")  # of scripts and pictographs; they move nothing
+OBEYED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # controls, formats, half a pair of code units, ends of lines
+
+
+def one_line(text: str) -> str:
+    r"""Write out whatever a terminal would not show as a letter of the same line.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        With ``\x1b``, ``\n`` and the like as these letters.
+
+    Examples
+    --------
+    >>> one_line("beam\x1b[2J\n\u202egood")
+    'beam\\x1b[2J\\n\\u202egood'
+    >>> one_line("Träger 梁 \U0001f528")
+    'Träger 梁 🔨'
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_shown(letter) for letter in text)
+
+
+def lines(text: str) -> str:
+    r"""Write out whatever a terminal would not show as a letter; lines stay lines.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        The text, its line feeds and tabs kept.
+
+    Examples
+    --------
+    >>> lines("first\r\x07\n\tsecond")
+    'first\\r\\x07\n\tsecond'
+    """
+    return "\n".join("\t".join(map(one_line, line.split("\t"))) for line in text.split("\n"))
+
+
+def _shown(letter: str) -> str:
+    if letter in JOINERS or unicodedata.category(letter) not in OBEYED:
+        return letter
+    return letter.encode("unicode_escape").decode("ascii")
