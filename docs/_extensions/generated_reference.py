@@ -18,7 +18,7 @@ from numpydoc.docscrape import NumpyDocString
 from pydantic import BeforeValidator
 from typer.main import get_command
 
-from frf_ipz.cli.main import app
+from frf_ipz.cli.commands import app
 from frf_ipz.diagnosis import result as diagnosis_result
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws

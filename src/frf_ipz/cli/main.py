@@ -1,161 +1,130 @@
-"""``frf-ipz``: arguments into calls of the library, errors into one line.
+"""The entry point of ``frf-ipz``: errors and signals into one line, and the exit status.
 
-Every stage is imported by the command that needs it, so that ``--help`` answers at once.
+Signals are caught from the first line on, before anything large is imported. SIGTERM and a closed terminal do what
+Ctrl-C does: what is at work clears up, and the exit status is 128 and the number of the signal.
 """
 
 from __future__ import annotations
 
+import _thread
 import os
+import signal
 import sys
-from pathlib import Path
-from typing import Annotated
+import threading
+import time
+import weakref
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-import typer
-
-from frf_ipz import __version__
-from frf_ipz.cli.printing import guard_streams, say, say_error
-from frf_ipz.visible_text import one_line
-
-EPILOG = """
-[bold]From a folder of recordings to a controller-ready model[/bold]
-
-  frf-ipz init FOLDER                    writes test.toml and pipeline.toml from the CSVs in FOLDER
-  frf-ipz check FOLDER/pipeline.toml     validates everything and draws the set-up
-  frf-ipz run FOLDER/pipeline.toml --out RESULTS
-  frf-ipz show RESULTS                   opens the results as a page to look at and to work on
-
-[bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 no result could be
-computed, or a fault of the program.
-"""
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
 
 # Of linear algebra: on small matrices more than one only wait for each other.
 THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
-
-app = typer.Typer(
-    help="From hammer-test recordings and a nearly right FE model to a controller-ready model, and to what the model "
-    "left out.",
-    epilog=EPILOG,
-    rich_markup_mode="rich",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-
-PipelineArgument = Annotated[Path, typer.Argument(metavar="PIPELINE", help="The pipeline.toml to work on.")]
-OutOption = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]
-
-HELP = {
-    "run": "Run the whole chain: FRFs, poles and zeros, updated model, prediction, state space, report.",
-    "ingest": "Recordings into FRFs with their variance: frf.parquet, records.parquet.",
-    "fit": "FRFs into poles, zeros and mode shapes: poles.parquet, zeros.parquet, fit.parquet, modes.parquet.",
-    "diagnose": "Locate a mismatch of model and recordings, and say what was left out: diagnosis.json, report.html.",
-    "pair": "Measured poles and zeros against those of the reduced FE model: pairs.parquet.",
-    "update": "Bring the reduced model to the measured poles and zeros: updated_model.npz, parameters.parquet.",
-    "predict": "FRFs at the points of interest, with their band: poi_frf.parquet.",
-    "export": "The state space for python-control and MATLAB: statespace.json, statespace.mat.",
-    "report": "Everything on one page: report.html.",
-}
+SIGNALS = "SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"  # each system has some of them
+STOPPED = "stopped; results are those of the last command that came to its end"
+PAUSE_S = 0.01  # what drops an exception has gone on by then
 
 
-def _version(is_given: bool) -> None:  # noqa: FBT001  the signature of a typer callback
-    if is_given:
-        say(f"frf-ipz {__version__}")
-        raise typer.Exit
+class Stopped(BaseException):
+    """A signal asks the program to end; no `KeyboardInterrupt`, which packages turn into exit status 1."""
 
 
-@app.callback()
-def options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
-    ] = False,
-) -> None:
-    """Take the options that stand before the command."""
-    del version
+class Stopping:
+    """Raises `Stopped` in the main thread for a signal, and again where it is dropped on its way, as imports may do."""
 
+    def __init__(self) -> None:
+        self.received = 0
+        self._is_over = False
+        self._raised: weakref.ref[Stopped] | None = None
 
-def _stage_command(stage: str) -> None:
-    """Add the command that runs the chain up to a stage."""
+    def __call__(self, number: int, frame: FrameType | None = None) -> None:
+        """Handle a signal, as `signal.signal` calls it."""
+        del frame
+        if self._is_over:
+            return
+        self.received = self.received or number
+        stopped = Stopped()
+        self._raised = weakref.ref(stopped, self._raise_again)
+        try:
+            raise stopped
+        finally:
+            del stopped  # else its own traceback keeps it
 
-    def command(pipeline: PipelineArgument, out: OutOption = Path("results"), quiet: QuietOption = False) -> None:
-        from frf_ipz.cli.terminal import run_with_progress
+    def end(self) -> None:
+        """Take note that it has come to where it is reported."""
+        self._is_over = True
 
-        until, diagnosing = ("report", None) if stage == "run" else (stage, True if stage == "diagnose" else None)
-        run_with_progress(pipeline, out, until=until, diagnosing=diagnosing, quiet=quiet)
+    def _raise_again(self, _: object) -> None:
+        if not self._is_over:  # not from here, where it would be dropped once more
+            threading.Thread(target=self._interrupt_main, daemon=True).start()
 
-    app.command(stage, help=HELP[stage])(command)
-
-
-for _stage in HELP:
-    _stage_command(_stage)
-
-
-@app.command()
-def check(pipeline: PipelineArgument) -> None:
-    """Validate test, model and pipeline, draw the set-up, run nothing."""
-    from frf_ipz.pipeline.check import describe_setup
-    from frf_ipz.pipeline.inputs import read_inputs
-
-    say(describe_setup(read_inputs(pipeline)))
-
-
-@app.command()
-def init(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the recordings as CSV.")],
-) -> None:
-    """Write commented test.toml and pipeline.toml from a folder of CSVs; what is there already is left alone."""
-    from frf_ipz.pipeline.init import write_starting_files
-
-    for path, written in write_starting_files(folder).items():
-        say(one_line(f"{'wrote' if written else 'left '} {path}"))
-
-
-@app.command()
-def plot(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with the results of a run.")],
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Which picture; without it, all are named.")
-    ] = None,
-    file_format: Annotated[str, typer.Option("--format", "-f", metavar="svg|pdf|png", help="Kind of file.")] = "svg",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help="File to write; NAME.FORMAT here by default.")
-    ] = None,
-) -> None:
-    """Draw one picture of a run for a publication."""
-    from frf_ipz.cli.pictures import draw_picture, picture_list
-
-    say(picture_list(folder) if name is None else draw_picture(folder, name, file_format, out))
-
-
-@app.command()
-def show(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, or of a campaign.")],
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Where to listen; 0 for any free port.")] = 0,
-    browser: Annotated[
-        bool | None, typer.Option("--browser/--no-browser", help="Open the page; by default on a desktop only.")
-    ] = None,
-) -> None:
-    """Open a local page on a run or a campaign: look, run, reject and pin poles; changes go to pipeline.toml."""
-    from frf_ipz.cli.local_page import serve_page
-
-    serve_page(folder, port=port, browser=browser)
+    def _interrupt_main(self) -> None:
+        time.sleep(PAUSE_S)
+        if not self._is_over:
+            _thread.interrupt_main(signal.Signals(self.received))
 
 
 def main() -> None:
     """Run the command line; the exit status says how it went."""
-    from frf_ipz.errors import FrfIpzError, NumericalError
+    stopping = Stopping()
+    try:
+        with _handling_signals(stopping):
+            try:
+                _run()
+            finally:
+                stopping.end()
+    except BaseException:  # an import that was cut short raises anything
+        stopping.end()
+        if not stopping.received:
+            raise
+    if stopping.received:
+        from frf_ipz.cli.printing import say_error
 
+        say_error(STOPPED)
+        sys.exit(128 + stopping.received)
+
+
+def _run() -> None:
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
+    from frf_ipz.cli.commands import app
+    from frf_ipz.cli.printing import guard_streams, say_error
+    from frf_ipz.errors import FrfIpzError, NumericalError
+
     guard_streams()
     try:
         app()
     except FrfIpzError as error:
         say_error(str(error))
         sys.exit(1 if isinstance(error, NumericalError) else 2)
-    except KeyboardInterrupt:
-        say_error("stopped; what was in the folder is untouched")
-        sys.exit(130)
+
+
+@contextmanager
+def _handling_signals(stopping: Stopping) -> Iterator[None]:
+    """Let a function handle the signals that end a program, but those that are ignored, as ``nohup`` asks."""
+    if threading.current_thread() is not threading.main_thread():  # Python gives signals to no other
+        yield
+        return
+    numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in numbers}
+    report_unraisable = sys.unraisablehook
+
+    def report_others(unraisable: sys.UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, Stopped):  # it came while an object was being destroyed
+            report_unraisable(unraisable)
+
+    try:
+        sys.unraisablehook = report_others
+        for number, handler in before.items():
+            if handler is not signal.SIG_IGN:
+                signal.signal(number, stopping)
+        yield
+    finally:
+        sys.unraisablehook = report_unraisable
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 if __name__ == "__main__":
