@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 MISSING = "there is no such file"
 FOLDER = "is a folder, but a file is expected: name one inside it"
 MOST_TEXT_BYTES = 1 << 26  # of settings and tables that people write: two million lines
+BLOCK_BYTES = 1 << 20  # of a file that has more bytes than it says, as those of the system have
 MB = 1e6
 
 
@@ -106,7 +107,9 @@ def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
         raise _too_large(path, size, limit)
     with open_input(path) as stream:
         try:
-            data = stream.read(limit + 1)
+            data = stream.read(size + 1)  # not of the limit: as many bytes as are asked for are allocated
+            while len(data) <= limit and (rest := stream.read(BLOCK_BYTES)):
+                data += rest
         except MemoryError:
             raise _too_large(path, size, limit) from None
     if len(data) > limit:  # it has grown, or does not say how large it is
