@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from frf_ipz.errors import InputError
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-_LABEL = re.compile(r"^\s*(\d+)\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
+_LABEL = re.compile(r"^\s*([0-9]{1,18})\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -13,22 +13,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.arguments import take_array
+from frf_ipz.arguments import require_choice, take_array
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
 from frf_ipz.display import Concise, Drawn
 from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
+from frf_ipz.numerics.held_rows import find_held_rows
 from frf_ipz.numerics.neighbours import lines_between_neighbours
+from frf_ipz.numerics.rounding import printed_rounding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
+EPS = float(np.finfo(float).eps)
 SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 
 DOFS_SHOWN = 6
+HELD = ("auto", "keep")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -130,6 +134,12 @@ class StructuralModel(Drawn):
         Where the nodes are.
     parts : tuple of Part
         Its elements, springs, groups and point masses.
+    held_dofs : tuple of Dof
+        DOFs that have no row, because what made the matrices holds them.
+    notes : tuple of str
+        What was recognised in the matrices, and how they were taken.
+    rounding : float
+        Relative rounding of the entries of the stiffness matrix: that of double precision, or of printed digits.
     source : object
         The options it was built from (`fe.model_file`), for effects that build it anew; None for a model without.
     full_indices : mapping of Dof to int
@@ -163,6 +173,9 @@ class StructuralModel(Drawn):
     modal_damping: FloatArray
     geometry: Geometry
     parts: tuple[Part, ...] = ()
+    held_dofs: tuple[Dof, ...] = ()
+    notes: tuple[str, ...] = ()
+    rounding: float = EPS
     source: object = None
     full_indices: Mapping[Dof, int] = field(init=False, repr=False)
 
@@ -192,13 +205,14 @@ class StructuralModel(Drawn):
         coordinates: Mapping[int, Sequence[float]] | ArrayLike | None = None,
         modal_damping: float | Sequence[float] = (),
         name: str = "model",
+        held: str = "auto",
     ) -> StructuralModel:
         """Make a model from matrices, and check it.
 
         Parameters
         ----------
         mass, stiffness : (n, n) array, dense or sparse
-            kg and N/m (and their rotational counterparts), symmetric, without rows of held DOFs.
+            kg and N/m (and their rotational counterparts), symmetric.
         damping : (n, n) array, dense or sparse, optional
             Viscous damping, N s/m.
         dofs : sequence of Dof or str
@@ -210,11 +224,14 @@ class StructuralModel(Drawn):
             Damping ratios of the elastic modes besides `damping`; the last one holds for all further modes.
         name : str
             What it is called.
+        held : str
+            ``auto``: rows that are zero, rows of the identity, and rows with a penalty such as 1e36 on the diagonal are
+            held DOFs, which are left out; ``keep``: all rows are taken as they are.
 
         Returns
         -------
         StructuralModel
-            The model.
+            The model; its `notes` say what was left out.
 
         Raises
         ------
@@ -231,30 +248,40 @@ class StructuralModel(Drawn):
         >>> [dof.name for dof in model.dofs]
         ['1:x', '2:x']
         """
+        require_choice("held", held, HELD)
         rows = tuple(dof.unsigned for dof in as_dofs(dofs, name="dofs"))
-        mass_matrix = _symmetric_matrix("mass", mass, len(rows))
-        require_positive_definite_mass(mass_matrix, rows)
-        stiffness_matrix = _symmetric_matrix("stiffness", stiffness, len(rows))
-        require_semidefinite(stiffness_matrix, rows, "stiffness")
-        none = sparse.csr_array(mass_matrix.shape, dtype=np.float64)
-        damping_matrix = none if damping is None else _symmetric_matrix("damping", damping, len(rows))
-        require_semidefinite(damping_matrix, rows, "damping")
+        whole = {"mass": _square_matrix("mass", mass, len(rows))}
+        whole["stiffness"] = _square_matrix("stiffness", stiffness, len(rows))
+        if damping is not None:
+            whole["damping"] = _square_matrix("damping", damping, len(rows))
+        free = select_free_rows(whole["mass"], whole["stiffness"], rows, held=held)
+        matrices = {what: _symmetric_block(what, matrix, free.rows) for what, matrix in whole.items()}
+        require_positive_definite_mass(matrices["mass"], free.dofs)
+        rounding = printed_rounding(matrices["stiffness"].data)
+        require_semidefinite(matrices["stiffness"], free.dofs, "stiffness", rounding=rounding)
+        none = sparse.csr_array(matrices["mass"].shape, dtype=np.float64)
+        matrices.setdefault("damping", none)
+        require_semidefinite(matrices["damping"], free.dofs, "damping")
         nodes, positions = _positions(rows, coordinates)
         return cls(
             name=name,
             kind="matrices",
-            all_dofs=rows,
-            fixed=np.zeros(len(rows), bool),
-            mass_all=mass_matrix,
-            stiffness_all=stiffness_matrix,
-            damping_all=damping_matrix,
+            all_dofs=free.dofs,
+            fixed=np.zeros(len(free.dofs), bool),
+            mass_all=matrices["mass"],
+            stiffness_all=matrices["stiffness"],
+            damping_all=matrices["damping"],
             modal_damping=_damping_ratios(modal_damping),
             geometry=Geometry(
                 nodes=nodes,
                 coordinates_m=positions,
-                lines=lines_between_neighbours(stiffness_matrix, rows, nodes, positions),
+                lines=lines_between_neighbours(whole["stiffness"], rows, nodes, positions),
+                supports=free.supports,
                 is_schematic=coordinates is None,
             ),
+            held_dofs=free.held_dofs,
+            notes=free.notes,
+            rounding=rounding,
         )
 
     @property
@@ -333,6 +360,11 @@ class StructuralModel(Drawn):
         return matrix[free][:, free]
 
     def _missing_dof_message(self, dof: Dof) -> str:
+        if dof.unsigned in self.held_dofs:
+            return (
+                f"the DOF {dof.name} is held in the model '{self.name}': its row of the matrices is that of a support, "
+                "so nothing moves there; use another DOF"
+            )
         directions = [known.direction for known in self.all_dofs if known.node == dof.node]
         if directions:
             return (
@@ -344,6 +376,81 @@ class StructuralModel(Drawn):
             f"the model '{self.name}' has no node {dof.node}; its nodes go from {nodes.min()} to {nodes.max()}: "
             "correct the test or the pipeline"
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FreeRows:
+    """Rows of matrices that are not those of held DOFs.
+
+    Parameters
+    ----------
+    rows : (n_free,) int array
+        Their numbers, from 0.
+    dofs, held_dofs : tuple of Dof
+        DOFs of these rows, and of the others.
+    notes : tuple of str
+        What was recognised.
+    """
+
+    rows: IntArray
+    dofs: tuple[Dof, ...]
+    held_dofs: tuple[Dof, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def supports(self) -> dict[int, str]:
+        """Nodes with held DOFs, and how they are held."""
+        moving = {dof.node for dof in self.dofs}
+        return {dof.node: "pinned" if dof.node in moving else "clamped" for dof in self.held_dofs}
+
+
+def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, held: str) -> FreeRows:
+    """Tell the rows of free DOFs from those that are left in matrices for held ones.
+
+    Parameters
+    ----------
+    mass, stiffness : (n, n) sparse array
+        Of all rows; they need not be symmetric.
+    dofs : sequence of Dof
+        The DOF of each row.
+    held : str
+        ``auto``, or ``keep`` to take all rows as they are.
+
+    Returns
+    -------
+    FreeRows
+        The rows, and notes on what is left out.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite.
+    """
+    for matrix in (mass, stiffness):
+        require_finite("the matrices", matrix.data)
+    marks = find_held_rows(mass, stiffness)
+    if held == "keep" or not marks.any.any():
+        return FreeRows(rows=np.arange(len(dofs)), dofs=tuple(dofs), held_dofs=(), notes=())
+    notes = []
+    for ways, rows in (
+        ("zero in mass and stiffness", marks.zero),
+        ("those of the identity", marks.identity),
+        ("marked by a penalty on the diagonal", marks.penalty),
+    ):
+        names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
+        if names:
+            shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
+            notes.append(
+                f"{len(names)} rows are {ways} ({shown}): these DOFs are held, and left out; [matrices] held = 'keep' "
+                "takes the rows as they are"
+            )
+    free = np.flatnonzero(~marks.any)
+    return FreeRows(
+        rows=free,
+        dofs=tuple(dofs[row] for row in free.tolist()),
+        held_dofs=tuple(dofs[row] for row in np.flatnonzero(marks.any).tolist()),
+        notes=tuple(notes),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -442,15 +549,19 @@ class ReducedModel:
         return np.asarray(dof.sign * self.expansion[row])
 
 
-def _symmetric_matrix(what: str, matrix: ArrayLike | Matrix, order: int) -> Matrix:
-    """Take a matrix, dense or sparse, as a symmetric sparse one."""
+def _square_matrix(what: str, matrix: ArrayLike | Matrix, order: int) -> Matrix:
+    """Take a matrix, dense or sparse, as a sparse one."""
     given: Any = matrix if sparse.issparse(matrix) else np.atleast_2d(np.asarray(matrix))
     if given.shape != (order, order):
         raise ShapeError(f"the {what} matrix is {given.shape}, but {order} DOFs are named; one row a DOF is needed")
     if given.dtype.kind not in "iuf":
         raise InputError(f"the {what} matrix holds {given.dtype} values; real ones are needed")
+    return sparse.csr_array(given, dtype=np.float64)
+
+
+def _symmetric_block(what: str, matrix: Matrix, rows: IntArray) -> Matrix:
     try:
-        return symmetrise(sparse.csr_array(given, dtype=np.float64))
+        return symmetrise(matrix[rows][:, rows], rows=rows)
     except InputError as error:
         raise InputError(f"the {what} matrix {error}") from None
 

@@ -14,7 +14,7 @@ from frf_ipz.numerics.factorization import is_positive_definite
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import FloatArray, Matrix
+    from frf_ipz.arrays import FloatArray, IntArray, Matrix
     from frf_ipz.dofs import Dof
 
 DENSE_ORDER = 1000  # up to here all eigenvalues are computed, and the message can name the worst DOF
@@ -26,13 +26,15 @@ SYMMETRY_TOLERANCE = 1e-6  # of the geometric mean of the two diagonal entries: 
 ESTIMATE_TOLERANCE = 1e-2  # of the largest eigenvalue, which is only a yardstick
 
 
-def symmetrise(matrix: Matrix) -> Matrix:
+def symmetrise(matrix: Matrix, *, rows: IntArray | None = None) -> Matrix:
     """Average out small asymmetries, as they come from few printed digits.
 
     Parameters
     ----------
     matrix : (n, n) sparse array
         Real.
+    rows : (n,) int array, optional
+        Numbers of its rows, from 0, for messages; they count through where they are left out.
 
     Returns
     -------
@@ -53,12 +55,28 @@ def symmetrise(matrix: Matrix) -> Matrix:
     if excess.size and excess.max() > 0:
         worst = int(np.argmax(excess))
         row, column = int(difference.row[worst]), int(difference.col[worst])
+        numbers = np.arange(len(diagonal)) if rows is None else rows
         raise InputError(
-            f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g} in rows {row + 1} and "
-            f"{column + 1}; give the full symmetric matrix, or one triangle of it marked as symmetric"
+            f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g} in rows "
+            f"{numbers[row] + 1} and {numbers[column] + 1}; {_advice_on_asymmetry(matrix)}"
         )
     symmetric: Any = (matrix + matrix.T) / 2
     return sparse.csr_array(symmetric)
+
+
+def _advice_on_asymmetry(matrix: Matrix) -> str:
+    """Name what makes a matrix unsymmetric."""
+    skew = abs(matrix - matrix.T).sum() / 2
+    even = abs(sparse.triu(matrix + matrix.T, 1)).sum()
+    if even <= SYMMETRY_TOLERANCE * skew:
+        return (
+            "its entries beside the diagonal have opposite signs in the two triangles, as gyroscopic (Coriolis) "
+            "matrices of what rotates have; mass, stiffness and damping matrices are symmetric: leave that part out"
+        )
+    return (
+        "export it with both triangles, or with one of them only and 'symmetric' in its first line; gyroscopic and "
+        "circulatory forces, which are not symmetric, have to be left out"
+    )
 
 
 def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof]) -> None:
@@ -82,7 +100,7 @@ def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof]) -> None:
         raise InputError(
             f"the DOF {dofs[worst].name} (row {worst + 1}) has the mass {diagonal[worst]:.4g}, and "
             f"{np.count_nonzero(diagonal <= 0)} DOFs have none above 0; condense massless DOFs in the FE "
-            "program, or give them their (rotary) inertia",
+            "program, or give them their (rotary) inertia; DOFs that are held need [matrices] held = 'auto'",
         )
     scale = sparse.diags_array(1 / np.sqrt(diagonal))
     scaled = sparse.csr_array(scale @ mass @ scale)
@@ -98,8 +116,10 @@ def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof]) -> None:
         )
 
 
-def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str) -> None:
+def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str, *, rounding: float = 0.0) -> None:
     """Refuse a stiffness or damping matrix that gives off energy.
+
+    Rows and columns are scaled to a diagonal of ones, so that units and stiff rows do not hide a negative eigenvalue.
 
     Parameters
     ----------
@@ -109,23 +129,30 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str) -> None
         Its rows.
     what : str
         ``stiffness`` or ``damping``.
+    rounding : float
+        Relative rounding of its entries, by printed digits.
 
     Raises
     ------
     InputError
-        If an eigenvalue is below -1e-10 times the largest one.
+        If an eigenvalue of the scaled matrix is below -1e-10 times the largest one, and below what rounding explains.
     """
+    diagonal = matrix.diagonal()
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = sparse.csr_array(sparse.diags_array(scale) @ matrix @ sparse.diags_array(scale))
+    by_rounding = rounding * float(abs(scaled).sum(axis=1).max(initial=0.0))  # no change by rounding has a larger one
+    allowed = max(NEGATIVE_STIFFNESS * _largest_eigenvalue(scaled), by_rounding)
     if matrix.shape[0] <= DENSE_ORDER:
-        smallest, motion = _smallest_eigenpair(matrix)
-        is_semidefinite = smallest >= -NEGATIVE_STIFFNESS * _largest_eigenvalue(matrix)
-        where = f" of {smallest:.4g}, most of all at the DOF {dofs[int(np.argmax(motion))].name}"
+        smallest, motion = _smallest_eigenpair(scaled)
+        is_semidefinite = smallest >= -allowed
+        where = f" most of all at the DOF {dofs[int(np.argmax(motion))].name},"
     else:
-        shifted = _shifted(matrix, NEGATIVE_STIFFNESS * _largest_eigenvalue(matrix))
+        shifted = _shifted(scaled, allowed)
         is_semidefinite, where = matrix.nnz == 0 or is_positive_definite(shifted, _nodes(dofs)), ""
     if not is_semidefinite:
         raise InputError(
-            f"the {what} matrix is indefinite: it has a negative eigenvalue{where}; 0 is allowed, and -1e-10 times the "
-            "largest one. Check units and signs of what was exported",
+            f"the {what} matrix is indefinite: it has a negative eigenvalue,{where} beyond rounding. Check units and "
+            "signs of what was exported",
         )
 
 

@@ -42,6 +42,7 @@ def describe_setup(inputs: PipelineInputs) -> str:
         lines.append(
             f"model       {inputs.fe_model.name} ({inputs.fe_model.kind}), {len(inputs.fe_model.dofs)} free DOFs"
         )
+        lines += [f"  note      {note}" for note in inputs.fe_model.notes]
     lines += [
         f"test        {test.name} ({test.kind}), {len(test.files)} files",
         f"sensors  S  {_names(test.output_dofs)}",

@@ -13,8 +13,8 @@ from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.structure import ReducedModel
 
 UNCERTAIN = (
-    "the model is left as it was, and nothing tells how wrong it is: predictions have no band, and there are no members "
-    "for robust design"
+    "the model is left as it was, and nothing tells how wrong it is: predictions have no band, and there are no "
+    "members for robust design"
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy import sparse
@@ -13,18 +13,21 @@ from frf_ipz.arrays import IntArray
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.assembly import stated_damping
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
-from frf_ipz.fe.matrices.matrix_market import read_symmetric
+from frf_ipz.fe.matrices.matrix_market import MatrixFile, read_matrix_market
 from frf_ipz.fe.model_options import DampingSection, ModelSection
-from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite
+from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
 from frf_ipz.numerics.neighbours import lines_between_neighbours
+from frf_ipz.numerics.rounding import printed_rounding
 from frf_ipz.option_types import Name
-from frf_ipz.structure import Geometry, Part, StructuralModel
+from frf_ipz.structure import FreeRows, Geometry, Part, StructuralModel, select_free_rows
 from frf_ipz.toml_files import STRICT
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import Matrix
+    from frf_ipz.dofs import Dof
 
 KIND = "matrices"
 SUM_TOLERANCE = 1e-6  # of a diagonal entry: rounding of printed groups may add up to that
@@ -65,6 +68,9 @@ class MatricesOptions:
         Matrix Market file of viscous damping.
     group : tuple of MatrixGroup
         Additive parts of the matrices, which may be softer, stiffer, lighter or heavier than they should be.
+    held : str
+        ``auto``: rows that are zero, rows of the identity, and rows with a penalty such as 1e36 on the diagonal are
+        held DOFs, which are left out; ``keep``: all rows are taken as they are.
     """
 
     __pydantic_config__ = STRICT
@@ -74,6 +80,7 @@ class MatricesOptions:
     dofs: Name
     damping: Name | None = None
     group: tuple[MatrixGroup, ...] = ()
+    held: Literal["auto", "keep"] = "auto"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +141,8 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     Returns
     -------
     StructuralModel
-        The model with its groups as parts. No DOF is held: supports are not part of exported matrices.
+        The model with its groups as parts. Its notes say how the files were taken, and which rows were left out as
+        those of held DOFs.
 
     Raises
     ------
@@ -142,25 +150,32 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
         If a file cannot be read, sizes disagree, a matrix is not symmetric, the mass is not positive definite,
         stiffness or damping is indefinite, or groups add up to more than the whole.
     """
-    options, folder = file.matrices, path.parent
-    table = read_dof_table(folder / options.dofs)
-    mass = _matrix(folder / options.mass, table, options)
-    with errors_of_file(folder / options.mass):
-        require_positive_definite_mass(mass, table.dofs)
-    stiffness = _matrix(folder / options.stiffness, table, options)
-    with errors_of_file(folder / options.stiffness):
-        require_semidefinite(stiffness, table.dofs, "stiffness")
+    options = file.matrices
+    files = _Files(path=path, table=read_dof_table(path.parent / options.dofs), options=options)
+    whole_mass, whole_stiffness = files.read(options.mass), files.read(options.stiffness)
+    table = files.table
+    free = select_free_rows(whole_mass.matrix, whole_stiffness.matrix, table.dofs, held=options.held)
+    mass = files.free_block(options.mass, whole_mass, free)
+    with errors_of_file(path.parent / options.mass):
+        require_positive_definite_mass(mass, free.dofs)
+    stiffness = files.free_block(options.stiffness, whole_stiffness, free)
+    rounding = printed_rounding(whole_stiffness.matrix[free.rows][:, free.rows].data)
+    with errors_of_file(path.parent / options.stiffness):
+        require_semidefinite(stiffness, free.dofs, "stiffness", rounding=rounding)
+    notes = (*whole_mass.notes, *whole_stiffness.notes, *free.notes)
     modal_damping, damping = stated_damping(file.damping, mass, stiffness)
     if options.damping is not None:
-        exported = _matrix(folder / options.damping, table, options)
-        with errors_of_file(folder / options.damping):
-            require_semidefinite(exported, table.dofs, "damping")
+        whole_damping = files.read(options.damping)
+        exported = files.free_block(options.damping, whole_damping, free)
+        with errors_of_file(path.parent / options.damping):
+            require_semidefinite(exported, free.dofs, "damping", rounding=printed_rounding(exported.data))
         damping = sparse.csr_array(damping + exported)
+        notes = (*notes, *whole_damping.notes)
     return StructuralModel(
         name=file.model.name,
         kind=KIND,
-        all_dofs=table.dofs,
-        fixed=np.zeros(len(table.dofs), bool),
+        all_dofs=free.dofs,
+        fixed=np.zeros(len(free.dofs), bool),
         mass_all=mass,
         stiffness_all=stiffness,
         damping_all=damping,
@@ -168,38 +183,57 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
         geometry=Geometry(
             nodes=table.nodes,
             coordinates_m=table.coordinates_m,
-            lines=lines_between_neighbours(stiffness, table.dofs, table.nodes, table.coordinates_m),
+            lines=lines_between_neighbours(whole_stiffness.matrix, table.dofs, table.nodes, table.coordinates_m),
+            supports=free.supports,
         ),
-        parts=_groups(options, path, table, mass, stiffness),
+        parts=_groups(files, free, mass, stiffness),
+        held_dofs=free.held_dofs,
+        notes=notes,
+        rounding=rounding,
         source=file,
     )
 
 
-def _matrix(path: Path, table: DofTable, options: MatricesOptions) -> Matrix:
-    return read_symmetric(path, len(table.dofs), options.dofs)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Files:
+    """The files of a model."""
+
+    path: Path
+    table: DofTable
+    options: MatricesOptions
+
+    def read(self, name: str) -> MatrixFile:
+        return read_matrix_market(self.path.parent / name, len(self.table.dofs), self.options.dofs)
+
+    def free_block(self, name: str, file: MatrixFile, free: FreeRows) -> Matrix:
+        with errors_of_file(self.path.parent / name):
+            return symmetrise(file.matrix[free.rows][:, free.rows], rows=free.rows)
 
 
-def _groups(options: MatricesOptions, path: Path, table: DofTable, mass: Matrix, stiffness: Matrix) -> tuple[Part, ...]:
+def _groups(files: _Files, free: FreeRows, mass: Matrix, stiffness: Matrix) -> tuple[Part, ...]:
+    options = files.options
     repeated = next((name for name, count in Counter(group.name for group in options.group).items() if count > 1), None)
     if repeated is not None:
-        raise FileFormatError(path, f"two groups are called '{repeated}'; rename one", where="key 'matrices.group'")
+        raise FileFormatError(
+            files.path, f"two groups are called '{repeated}'; rename one", where="key 'matrices.group'"
+        )
     parts, remaining_stiffness, remaining_mass = [], stiffness.diagonal(), mass.diagonal()
     for group in options.group:
-        group_stiffness = _matrix(path.parent / group.stiffness, table, options)
+        group_stiffness = files.free_block(group.stiffness, files.read(group.stiffness), free)
         group_mass = (
-            _matrix(path.parent / group.mass, table, options)
+            files.free_block(group.mass, files.read(group.mass), free)
             if group.mass is not None
             else sparse.csr_array(stiffness.shape, dtype=np.float64)
         )
-        parts.append(_group_part(group.name, table, group_mass, group_stiffness))
+        parts.append(_group_part(group.name, free.dofs, group_mass, group_stiffness))
         remaining_stiffness = remaining_stiffness - group_stiffness.diagonal()
         remaining_mass = remaining_mass - group_mass.diagonal()
     for what, remaining, whole in (("stiffness", remaining_stiffness, stiffness), ("mass", remaining_mass, mass)):
         excess = -remaining - SUM_TOLERANCE * whole.diagonal()
         if excess.max() > 0:
-            dof = table.dofs[int(np.argmax(excess))]
+            dof = free.dofs[int(np.argmax(excess))]
             raise FileFormatError(
-                path,
+                files.path,
                 f"the groups' {what} adds up to more than the whole at the DOF {dof.name}; groups have to be additive "
                 "parts of the model's matrices, in the same units",
                 where="key 'matrices.group'",
@@ -207,12 +241,12 @@ def _groups(options: MatricesOptions, path: Path, table: DofTable, mass: Matrix,
     return tuple(parts)
 
 
-def _group_part(name: str, table: DofTable, mass: Matrix, stiffness: Matrix) -> Part:
+def _group_part(name: str, dofs: Sequence[Dof], mass: Matrix, stiffness: Matrix) -> Part:
     indices: IntArray = np.union1d(_used_rows(mass), _used_rows(stiffness)).astype(np.int64)
     return Part(
         kind="group",
         name=name,
-        nodes=tuple(sorted({table.dofs[index].node for index in indices.tolist()})),
+        nodes=tuple(sorted({dofs[index].node for index in indices.tolist()})),
         indices=indices,
         stiffness=stiffness[indices][:, indices],
         mass=mass[indices][:, indices],

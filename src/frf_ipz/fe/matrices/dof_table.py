@@ -10,15 +10,19 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import DIRECTIONS, Dof
-from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.errors import FileFormatError, did_you_mean, errors_of_file
 from frf_ipz.input_files import read_text
+from frf_ipz.text_numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
 COLUMNS = ("node", "direction", "x_m", "y_m", "z_m")
 SAME_POSITION_M = 1e-9  # coordinates of one node are copies of one number
+LARGEST_NODE = 2**53  # beyond, neighbours are one number to a spreadsheet
+LARGEST_M = 1e9  # beyond any structure: a coordinate that was meant otherwise
+SEPARATORS = (",", ";", "\t")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,18 +62,27 @@ def read_dof_table(path: Path) -> DofTable:
     FileFormatError
         If a column is missing, a row cannot be read, a DOF comes twice, or a node has two positions.
     """
-    rows = csv.reader(read_text(path).splitlines(), skipinitialspace=True)
-    columns = _columns(next(rows, []), path)
+    lines_of_text = read_text(path).replace("\r", "\n").split("\n")
+    separator = max(SEPARATORS, key=lines_of_text[0].count)
+    rows = _csv_rows(lines_of_text, separator, path)
+    _, header = next(rows, (1, []))
+    columns = _columns(header, path)
     lines: dict[Dof, int] = {}
     positions: dict[int, tuple[float, float, float]] = {}
-    for row in rows:
+    for number, row in rows:
         if not any(cell.strip() for cell in row):
             continue
-        where = f"line {rows.line_num}"
+        where = f"line {number}"
+        if any(cell.strip() for cell in row[len(header) :]):
+            raise FileFormatError(
+                path,
+                f"has {len(row)} cells, but the first line names {len(header)} columns; numbers have decimal points",
+                where=where,
+            )
         dof, position = _read_row(row, columns, path, where)
         if dof in lines:
             raise FileFormatError(path, f"the DOF {dof.name} is in line {lines[dof]} already", where=where)
-        lines[dof] = rows.line_num
+        lines[dof] = number
         first = positions.setdefault(dof.node, position)
         if max(abs(old - new) for old, new in zip(first, position, strict=True)) > SAME_POSITION_M:
             raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
@@ -83,9 +96,22 @@ def read_dof_table(path: Path) -> DofTable:
     )
 
 
+def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Give the number of each line with its cells."""
+    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    try:
+        for row in rows:
+            yield rows.line_num, row
+    except csv.Error as error:
+        raise FileFormatError(path, f"is no table: {error}", where=f"line {rows.line_num}") from None
+
+
 def _columns(header: list[str], path: Path) -> Mapping[str, int]:
-    columns = {name.strip().lower(): index for index, name in enumerate(header)}
+    names = [name.strip().lower() for name in header]
+    columns = {name: index for index, name in enumerate(names)}
     for name in COLUMNS:
+        if names.count(name) > 1:
+            raise FileFormatError(path, f"names the column '{name}' twice; rename one", where="line 1")
         if name not in columns:
             raise FileFormatError(
                 path, f"has no column '{name}'; expected is the header {','.join(COLUMNS)}", where="line 1"
@@ -99,16 +125,20 @@ def _read_row(
     if len(row) <= max(columns[name] for name in COLUMNS):
         raise FileFormatError(path, f"has {len(row)} cells; {', '.join(COLUMNS)} are needed", where=where)
     node, direction, *coordinates = (row[columns[name]].strip() for name in COLUMNS)
-    if not node.isdecimal() or int(node) < 1:
+    number = int(node[:20]) if node.isascii() and node.isdecimal() else 0
+    if not 1 <= number <= LARGEST_NODE:
         raise FileFormatError(path, f"'{node}' is no node number; expected is 1 or more", where=where)
     if direction.lower() not in DIRECTIONS:
         raise FileFormatError(
             path, f"'{direction}' is no direction; {did_you_mean(direction.lower(), DIRECTIONS)}", where=where
         )
-    try:
-        x, y, z = (float(text) for text in coordinates)
-    except ValueError:
-        raise FileFormatError(path, f"{', '.join(coordinates)} are no three coordinates in m", where=where) from None
-    if not np.isfinite((x, y, z)).all():
-        raise FileFormatError(path, f"{', '.join(coordinates)} are not finite", where=where)
-    return Dof(int(node), direction.lower()), (x, y, z)
+    position: list[float] = []
+    for name, text in zip(COLUMNS[2:], coordinates, strict=True):
+        with errors_of_file(path, where=f"{where}, column '{name}'"):
+            position.append(parse_number(text))
+        if abs(position[-1]) > LARGEST_M:
+            raise FileFormatError(
+                path, f"{text} m is farther than any structure reaches; coordinates are in m", where=where
+            )
+    x, y, z = position
+    return Dof(number, direction.lower()), (x, y, z)

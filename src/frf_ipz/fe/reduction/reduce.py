@@ -158,7 +158,7 @@ def reduce_to_dofs(
     """
     nominal = DEFAULT_DAMPING_RATIO if default_damping_ratio is None else default_damping_ratio
     damped = with_default_damping(model, nominal)
-    notes = []
+    notes = list(model.notes)
     if damped is not model:
         origin = "from the test" if default_damping_ratio is not None else "by default"
         notes.append(f"damping: {nominal:g} for every mode, {origin}")
