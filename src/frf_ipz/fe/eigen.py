@@ -3,15 +3,19 @@
 ``K phi = omega^2 M phi`` is solved by shift and inversion, ``(K + tau M)^-1 M``, with tau near the square of 0.4 times
 the first elastic mode: the low modes then keep their digits however fine the mesh, and a free structure stays positive
 definite. Small models take LAPACK, large ones ARPACK on a sparse factor.
+
+Whether a structure is free is asked of the geometry first: the motions of a rigid body that strain no row of the
+stiffness beyond its rounding are modes of frequency 0, and the elastic modes are sought beside them. Few printed digits
+then neither turn a rotation into a mode of 0.1 Hz nor make the stiffness indefinite.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arguments import require_type
@@ -21,6 +25,7 @@ from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
 from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
+from frf_ipz.numerics.rounding import printed_decimals
 from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
@@ -30,8 +35,11 @@ EPS = float(np.finfo(float).eps)
 SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding
 HELD_SHIFT = 0.01  # of the estimate, for a structure that is held: its stiffness needs no shift to be factored
 USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are lost; above, ARPACK crawls
+LOST = 1e-6  # of the shift: squares of frequencies below have no digit
 NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below is indistinguishable from zero
-MAX_ROUNDING = 1e-9  # of a stiffness matrix printed with few digits
+MAX_ROUNDING = 1e-9  # of a stiffness matrix that a condensation has rounded
+PRINTED = 2.0  # roundings of the sum of all terms' sizes: no row of a matrix that is rounded, or cut off, has more
+SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no sum of rounded terms is farther off
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
 MANY_MODES = 4  # a larger share of all modes than one in so many is found faster by LAPACK
@@ -260,65 +268,86 @@ def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
 
 
 def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -> ModalBasis:
-    stiffness, mass = model.stiffness, model.mass
-    order = mass.shape[0]
-    full_stiffness, full_mass = stiffness.toarray(), mass.toarray()
-    rough = linalg.eigh(full_stiffness, full_mass, eigvals_only=True)
+    """Solve the inverted problem by LAPACK: Cholesky's factor is as right in soft rows as in stiff ones."""
+    system = _System.of(model)
+    order = system.mass.shape[0]
+    shift, rough = _rough_squares(model, system, (2 * np.pi * SHIFT * _first_elastic_hz(model, system, up_to_hz)) ** 2)
     if up_to_hz is not None:
         # one mode more, so that rounding at the limit loses none
         n_modes = min(n_modes, 1 + int(np.searchsorted(rough, (2 * np.pi * up_to_hz) ** 2)))
-    elastic = rough[rough > order * EPS * abs(rough[-1])]
-    shift = SHIFT**2 * float(elastic[0]) if elastic.size else 1.0
-    if rough[0] <= -shift:
-        raise _indefinite_error(model, float(rough[0]))
-    indices = [order - min(n_modes, order), order - 1]
-    inverses, shapes = linalg.eigh(full_mass, full_stiffness + shift * full_mass, subset_by_index=indices)
+    elastic = rough[max(int(np.count_nonzero(rough <= LOST * shift)), system.rigid.shape[1]) :]
+    shift = SHIFT**2 * float(elastic[0]) if elastic.size else shift
+    shifted = system.stiffness + shift * system.mass
+    inverses, shapes = linalg.eigh(
+        system.mass.toarray(), shifted.toarray(), subset_by_index=[order - min(n_modes, order), order - 1]
+    )
     shapes = shapes[:, ::-1] / np.sqrt(inverses[::-1])
-    return _orthonormalised(model, stiffness, mass, shapes, factorize(stiffness + shift * mass, _nodes(model)), shift)
+    return _orthonormalised(model, system, shapes, factorize(shifted, _nodes(model)), shift)
+
+
+def _rough_squares(model: StructuralModel, system: _System, shift: float) -> tuple[float, FloatArray]:
+    """omega^2 of all modes, right for those above `LOST` times the shift; and a shift that resolves them."""
+    rough = _squares_at_shift(system, shift)
+    if rough is None:
+        lowest = linalg.eigh(
+            system.stiffness.toarray(), system.mass.toarray(), eigvals_only=True, subset_by_index=[0, 0]
+        )
+        raise _indefinite_error(model, float(lowest[0]))
+    while len(rough) / 2 < np.count_nonzero(rough <= LOST * shift) < len(rough):  # a stiff row has misled the guess
+        lower = _squares_at_shift(system, LOST * shift)
+        if lower is None:
+            break
+        shift, rough = LOST * shift, lower
+    return shift, rough
+
+
+def _squares_at_shift(system: _System, shift: float) -> FloatArray | None:
+    """omega^2 of all modes, ascending; None where the shifted stiffness is not positive definite."""
+    shifted = (system.stiffness + shift * system.mass).toarray()
+    try:
+        inverses = linalg.eigh(system.mass.toarray(), shifted, eigvals_only=True)
+    except linalg.LinAlgError:
+        return None
+    return np.asarray(1 / inverses[::-1] - shift)
 
 
 def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
-    stiffness, mass = model.stiffness, model.mass
-    frequency_hz = _first_shift_hz(model, stiffness, mass, up_to_hz)
+    system = _System.of(model)
+    frequency_hz = _first_shift_hz(model, system, up_to_hz)
     try:
-        basis = _solve_at_shift(model, stiffness, mass, frequency_hz, n_modes, up_to_hz)
+        basis = _solve_at_shift(model, system, frequency_hz, n_modes, up_to_hz)
     except ConvergenceError:  # parts of a held structure may be loose all the same: shift them farther from 0
-        return _solve_at_shift(model, stiffness, mass, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
+        return _solve_at_shift(model, system, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
     elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
     if elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]:
-        basis = _solve_at_shift(model, stiffness, mass, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
+        basis = _solve_at_shift(model, system, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
     return basis
 
 
 def _solve_at_shift(
-    model: StructuralModel,
-    stiffness: Matrix,
-    mass: Matrix,
-    frequency_hz: float,
-    n_modes: int | None,
-    up_to_hz: float | None,
+    model: StructuralModel, system: _System, frequency_hz: float, n_modes: int | None, up_to_hz: float | None
 ) -> ModalBasis:
     """Find modes with one factorization; twice as many each time until the highest lies above the limit."""
     shift = (2 * np.pi * frequency_hz) ** 2
-    order = mass.shape[0]
-    factor = factorize(stiffness + shift * mass, _nodes(model))
+    order = system.mass.shape[0]
+    factor = factorize(system.stiffness + shift * system.mass, _nodes(model))
     count = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
     while True:
-        shapes = _lanczos(stiffness, mass, factor, shift, count)
-        basis = _orthonormalised(model, stiffness, mass, shapes, factor, shift)
+        shapes = _lanczos(system, factor, shift, count)
+        basis = _orthonormalised(model, system, shapes, factor, shift)
         max_count = min(n_modes or order - 1, order - 1)
         if up_to_hz is None or count == max_count or basis.natural_frequency_hz[-1] > up_to_hz:
             return basis
         count = min(2 * count, max_count)
 
 
-def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: float, n_modes: int) -> FloatArray:
-    order = mass.shape[0]
+def _lanczos(system: _System, factor: Factorization, shift: float, n_modes: int) -> FloatArray:
+    order = system.mass.shape[0]
     inverse = sparse_linalg.LinearOperator((order, order), matvec=factor.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(order)  # the start vector of ARPACK differs from run to run
     try:
         eigenvalues, shapes = sparse_linalg.eigsh(
-            stiffness, n_modes, M=mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
+            system.stiffness, n_modes, M=system.mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
         )
     except sparse_linalg.ArpackNoConvergence as error:
         raise ConvergenceError(
@@ -327,51 +356,136 @@ def _lanczos(stiffness: Matrix, mass: Matrix, factor: Factorization, shift: floa
     return np.asarray(shapes[:, np.argsort(eigenvalues)])
 
 
-def _first_shift_hz(model: StructuralModel, stiffness: Matrix, mass: Matrix, up_to_hz: float | None) -> float:
-    """Guess a good shift before anything is factored, from slow bending of the whole structure."""
-    dofs = model.dofs
-    rigid, energies = _ritz(stiffness, mass, rigid_body_motions(dofs, model.geometry))
-    n_rigid = int(np.count_nonzero(energies <= _energy_uncertainty(model, stiffness, rigid)))
-    _, energies = _ritz(stiffness, mass, bending_motions(dofs, model.geometry))
-    elastic = np.sort(np.abs(energies))[n_rigid:]
-    estimate = float(np.sqrt(elastic[0])) / (2 * np.pi) if elastic.size else np.inf
+def _first_shift_hz(model: StructuralModel, system: _System, up_to_hz: float | None) -> float:
+    """Guess a good shift before anything is factored."""
+    _, rigid = _ritz(system, rigid_body_motions(model.dofs, model.geometry))
+    is_free = bool((system.energies(rigid) <= system.energy_uncertainty(rigid)).any())
+    return (SHIFT if is_free else HELD_SHIFT) * _first_elastic_hz(model, system, up_to_hz)
+
+
+def _first_elastic_hz(model: StructuralModel, system: _System, up_to_hz: float | None) -> float:
+    """Estimate the first elastic frequency from above, by slow bending of the whole structure."""
+    _, motions = _ritz(system, bending_motions(model.dofs, model.geometry))
+    energies = np.abs(system.energies(motions))
+    elastic = energies[energies > system.energy_uncertainty(motions)]
+    estimate = float(np.sqrt(elastic.min())) / (2 * np.pi) if elastic.size else np.inf
     estimate = min(estimate, up_to_hz or np.inf)
-    return (SHIFT if n_rigid else HELD_SHIFT) * (estimate if np.isfinite(estimate) else 1.0)
+    return estimate if 0 < estimate < np.inf else 1.0
 
 
-def _ritz(stiffness: Matrix, mass: Matrix, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal, and their omega^2."""
-    weights, axes = linalg.eigh(motions.T @ multiply(mass, motions))
+def _ritz(system: _System, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal; weights and motions."""
+    weights, axes = linalg.eigh(motions.T @ multiply(system.mass, motions))
     independent = weights > DEPENDENT * weights[-1]
-    motions = motions @ (axes[:, independent] / np.sqrt(weights[independent]))
-    _, axes = linalg.eigh(motions.T @ multiply(stiffness, motions))
-    motions = motions @ axes
-    return motions, np.sum(motions * multiply(stiffness, motions), 0)
+    normalised = axes[:, independent] / np.sqrt(weights[independent])
+    reduced = motions @ normalised
+    _, axes = linalg.eigh(reduced.T @ multiply(system.stiffness, reduced))
+    return normalised @ axes, reduced @ axes
 
 
-def _energy_uncertainty(model: StructuralModel, stiffness: Matrix, shapes: FloatArray) -> FloatArray:
-    """Twice the strain energy of each shape that rounding of the stiffness matrix can hide or feign."""
-    sizes = np.sum(np.abs(shapes) * multiply(abs(stiffness), np.abs(shapes)), 0)
-    return np.asarray(NO_ENERGY * _relative_rounding(model, stiffness) * sizes)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _System:
+    """Matrices of the free DOFs, and the motions of a rigid body that the structure is free to make.
+
+    Parameters
+    ----------
+    stiffness, mass : (n, n) sparse array
+        The matrices; of a small model printed with few digits, the stiffness without the forces that rounding feigns
+        under `rigid`.
+    rigid : (n, n_rigid) array
+        Mass-normalised.
+    in_arithmetic, in_print : float
+        Relative rounding of the stiffness, by double precision or a condensation, and by printed digits.
+    """
+
+    stiffness: Matrix
+    mass: Matrix
+    rigid: FloatArray
+    in_arithmetic: float
+    in_print: float
+
+    @classmethod
+    def of(cls, model: StructuralModel) -> _System:
+        stiffness, mass = model.stiffness, model.mass
+        motions = rigid_body_motions(model.dofs, model.geometry)
+        in_print = model.rounding if model.rounding > EPS else 0.0
+        whole = cls(
+            stiffness=stiffness,
+            mass=mass,
+            rigid=motions[:, :0],
+            in_arithmetic=EPS if in_print else _arithmetic_rounding(stiffness, motions),
+            in_print=in_print,
+        )
+        weights, _ = _ritz(whole, motions)
+        combined = motions @ weights  # of rigid motions again, free of the rounding of steps in between
+        forces = np.abs(multiply(stiffness, combined))
+        sizes = multiply(abs(stiffness), np.abs(motions) @ np.abs(weights))  # before terms cancel each other
+        allowed = max(NO_ENERGY * whole.in_arithmetic, PRINTED * in_print) * sizes
+        if in_print:  # then nodes may be printed with few digits too, and rotations are rounded by that
+            allowed += _by_printed_positions(model, stiffness)[:, None] * np.abs(weights[3:]).sum(0)
+        rigid = combined[:, (forces <= allowed).all(0)]
+        system = replace(whole, rigid=rigid)
+        if in_print and mass.shape[0] < DENSE_ORDER:
+            return replace(system, stiffness=system.without_feigned_forces())
+        return system
+
+    def without_feigned_forces(self) -> Matrix:
+        """Project the stiffness on motions that are orthogonal to the rigid ones in the mass."""
+        momenta, forces = multiply(self.mass, self.rigid), multiply(self.stiffness, self.rigid)
+        across = momenta @ forces.T
+        again = momenta @ (self.rigid.T @ forces) @ momenta.T
+        return sparse.csr_array(self.stiffness.toarray() - across - across.T + again)
+
+    def energies(self, shapes: FloatArray) -> FloatArray:
+        """Compute twice the strain energy of each shape."""
+        return np.asarray(np.sum(shapes * multiply(self.stiffness, shapes), 0))
+
+    def energy_uncertainty(self, shapes: FloatArray) -> FloatArray:
+        """Bound twice the strain energy of each shape that rounding of the stiffness can hide or feign."""
+        size = np.abs(shapes)
+        sums = np.sum(size * multiply(abs(self.stiffness), size), 0)
+        squares = np.sum(size**2 * multiply(self.stiffness**2, size**2), 0)  # printed entries are rounded one by one
+        return np.asarray(np.maximum(NO_ENERGY * self.in_arithmetic * sums, SPREAD * self.in_print * np.sqrt(squares)))
+
+
+def _by_printed_positions(model: StructuralModel, stiffness: Matrix) -> FloatArray:
+    """Largest force on each row under a unit rotation, by the rounding of printed coordinates."""
+    rounding_m = printed_decimals(model.geometry.coordinates_m)
+    moves = np.array([not dof.direction.startswith("r") for dof in model.dofs], float)
+    return PRINTED * rounding_m * multiply(abs(stiffness), moves)
+
+
+def _arithmetic_rounding(stiffness: Matrix, motions: FloatArray) -> float:
+    """Relative rounding of the stiffness matrix: force on most rows under a rigid motion, which strains nothing.
+
+    It is that of double precision for a model built here, and that of the condensation for one that was condensed.
+    """
+    roundings = [EPS]
+    for motion in motions.T:
+        sizes = multiply(abs(stiffness), np.abs(motion))
+        if sizes.any():
+            forces = np.abs(multiply(stiffness, motion))[sizes > 0] / sizes[sizes > 0]
+            roundings.append(float(np.quantile(forces, FREE_ROWS)))
+    return max(rounding for rounding in roundings if rounding <= MAX_ROUNDING)
 
 
 def _orthonormalised(
-    model: StructuralModel,
-    stiffness: Matrix,
-    mass: Matrix,
-    shapes: FloatArray,
-    factor: Factorization,
-    shift: float,
+    model: StructuralModel, system: _System, shapes: FloatArray, factor: Factorization, shift: float
 ) -> ModalBasis:
     """Make shapes exactly orthonormal, their frequencies exact to second order, and rigid-body modes rigid."""
+    n_rigid = min(system.rigid.shape[1], shapes.shape[1])
+    if n_rigid:
+        shapes = np.column_stack([system.rigid[:, :n_rigid], _beside_rigid(system, shapes)])
     for _ in range(2):  # the second time removes the rounding errors of the first
-        lower = linalg.cholesky(shapes.T @ multiply(mass, shapes), lower=True)
+        lower = linalg.cholesky(shapes.T @ multiply(system.mass, shapes), lower=True)
         shapes = linalg.solve_triangular(lower, shapes.T, lower=True).T
-    eigenvalues = np.sum(shapes * multiply(stiffness, shapes), 0)
-    uncertainty = _energy_uncertainty(model, stiffness, shapes)
+    eigenvalues = system.energies(shapes)
+    eigenvalues[:n_rigid] = 0.0
+    uncertainty = system.energy_uncertainty(shapes)
     if (eigenvalues < -uncertainty).any():
         raise _indefinite_error(model, float(eigenvalues.min()))
     rigid = eigenvalues <= uncertainty
+    rigid[:n_rigid] = True
     eigenvalues = np.where(rigid, 0.0, eigenvalues)
     ascending = np.argsort(eigenvalues, kind="stable")
     shapes = shapes[:, ascending]
@@ -380,25 +494,23 @@ def _orthonormalised(
         eigenvalues=eigenvalues[ascending],
         shapes=shapes * np.sign(top),
         n_rigid=int(np.count_nonzero(rigid)),
-        stiffness=stiffness,
-        mass=mass,
+        stiffness=system.stiffness,
+        mass=system.mass,
         factor=factor,
         shift=shift,
     )
 
 
-def _relative_rounding(model: StructuralModel, stiffness: Matrix) -> float:
-    """Relative rounding of the stiffness matrix: force on most rows under a translation, which strains nothing.
-
-    It is that of double precision for a model built here, and that of the printed digits for one that was exported.
-    """
-    roundings = [EPS]
-    for translation in rigid_body_motions(model.dofs, model.geometry)[:, :3].T:
-        sizes = multiply(abs(stiffness), np.abs(translation))
-        if sizes.any():
-            forces = np.abs(multiply(stiffness, translation))[sizes > 0] / sizes[sizes > 0]
-            roundings.append(float(np.quantile(forces, FREE_ROWS)))
-    return max(rounding for rounding in roundings if rounding <= MAX_ROUNDING)
+def _beside_rigid(system: _System, shapes: FloatArray) -> FloatArray:
+    """Elastic modes among the motions that are orthogonal to the rigid ones, as many as then remain of the shapes."""
+    count = shapes.shape[1] - system.rigid.shape[1]
+    if count <= 0:
+        return shapes[:, :0]
+    shapes = shapes - system.rigid @ (system.rigid.T @ multiply(system.mass, shapes))
+    weights, axes = linalg.eigh(shapes.T @ multiply(system.mass, shapes))
+    shapes = shapes @ (axes[:, -count:] / np.sqrt(weights[-count:]))
+    _, axes = linalg.eigh(shapes.T @ multiply(system.stiffness, shapes))
+    return np.asarray(shapes @ axes)
 
 
 def _indefinite_error(model: StructuralModel, eigenvalue: float) -> IllConditionedError:

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from brick_plate import plate_matrices
 from fe_models import beam, structural_model
 from frf_ipz.dofs import Dof
-from frf_ipz.fe.eigen import _first_shift_hz, solve_modes
+from frf_ipz.fe.eigen import _first_shift_hz, _System, solve_modes
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 
 UNSTRAINED = 1e-12  # of the sum of the terms' sizes: rounding
@@ -55,5 +55,5 @@ def test_bending_turns_the_sections_with_the_slope():
 def test_the_first_frequency_is_guessed_to_a_factor_of_two(model):
     frequency = solve_modes(model, n_modes=8).natural_frequency_hz
     first = frequency[frequency > 0][0]
-    guessed = _first_shift_hz(model, model.stiffness, model.mass, None) / 0.4
+    guessed = _first_shift_hz(model, _System.of(model), None) / 0.4
     assert first <= guessed <= 2 * first
