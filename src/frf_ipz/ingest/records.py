@@ -16,7 +16,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import setup_labels
 from frf_ipz.ingest.recording_files import RecordingFiles
-from frf_ipz.ingest.signals.windows import exponential_window, force_window
+from frf_ipz.ingest.signals.windows import window_impact
 from frf_ipz.ingest.survey.hammer import survey_hammer
 from frf_ipz.ingest.survey.random import survey_random
 from frf_ipz.progress import Progress, silent
@@ -40,7 +40,10 @@ class Record:
     name : str
         As in the table of records.
     labels : tuple of FrfLabel
-        The FRFs that it contributes to, one a row of `responses`: DOFs with their signs, quantities, columns.
+        The FRFs that it contributes to, one a row of `responses`: DOFs with their signs, quantities, columns. Of a
+        record that is used, channels that are bad are missing.
+    outputs : tuple of int
+        Which responses of its set-up these are.
     step_s : float
         Time step, s; the first sample is at time 0.
     force : (n_samples,) array
@@ -67,6 +70,7 @@ class Record:
 
     name: str
     labels: tuple[FrfLabel, ...]
+    outputs: tuple[int, ...]
     step_s: float
     force: FloatArray
     responses: FloatArray
@@ -103,13 +107,8 @@ class Record:
         (1 + n_outputs, n_samples) array
             The force first.
         """
-        signals = np.zeros((1 + len(self.responses), n_samples))
-        signals[0, : self.n_samples] = self.force
-        signals[1:, : self.n_samples] = self.responses
-        signals[0] *= force_window(n_samples, *self.force_interval)
-        if decay_1_s:
-            signals *= exponential_window(n_samples, self.step_s, decay_1_s, self.trigger)
-        return signals
+        signals = np.vstack([self.force, self.responses])
+        return window_impact(signals, n_samples, self.force_interval, decay_1_s * self.step_s, self.trigger)
 
 
 def survey_records(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
@@ -185,12 +184,15 @@ def read_records(
 
 def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:
     signals = signals[1:] - np.array(info.offsets)[:, None]
+    labels = setup_labels(test.channels, info.setup)
+    outputs = info.used_outputs if info.used else tuple(range(len(labels)))
     return Record(
         name=info.name,
-        labels=setup_labels(test.channels, info.setup),
+        labels=tuple(labels[output] for output in outputs),
+        outputs=outputs,
         step_s=info.step_s,
         force=signals[0],
-        responses=signals[1:],
+        responses=signals[1:][list(outputs)],
         trigger=info.trigger,
         force_interval=info.force_interval,
         starts_at_rest=info.starts_at_rest,

@@ -155,14 +155,16 @@ def test_segments_may_be_asked_for(tmp_path):
     assert "as asked for" in result.choices[0]
 
 
-def test_overload_of_a_record_is_left_out(tmp_path):
+def test_an_overload_costs_one_channel_of_one_record(tmp_path):
     rng = np.random.default_rng(7)
     records = [stationary(rng, 20_000, noise=0.01) for _ in range(3)]
     limit = 0.4 * np.abs(records[1][1]).max()
     records[1][1] = np.clip(records[1][1], -limit, limit)
     result = estimate(write(tmp_path, records))
-    assert list(result.records.used) == [True, False, True]
+    assert list(result.records.used) == [True, True, True]
     assert result.records.marks[1] == "overload of acc_1"
+    subrecords = result.frfs.averages[1] // 3
+    assert list(result.frfs.averages) == [2 * subrecords, 3 * subrecords]
 
 
 @pytest.mark.parametrize("segment_s", [1e-3, 1e3])

@@ -82,7 +82,6 @@ def campaign(folder, make_last, *, step_s=STEP_S, n_good=2):
     [
         (hit_twice, "double hit: 30 % of the pulse 20 ms after it"),
         (clipped, "clipping of force"),
-        (overloaded, "overload of acc_1"),
     ],
 )
 def test_bad_impacts_are_left_out_and_reported(tmp_path, make_last, mark):
@@ -105,11 +104,11 @@ def test_bad_impacts_are_left_out_and_reported(tmp_path, make_last, mark):
     ],
 )
 def test_impacts_with_minor_faults_are_marked_and_stay(tmp_path, make_last, mark):
-    result = estimate(campaign(tmp_path, make_last))
-    assert mark in result.records.marks[2]
-    assert list(result.records.marks[:2]) == ["", ""]
+    result = estimate(campaign(tmp_path, make_last, n_good=1))
+    assert mark in result.records.marks[1]
+    assert result.records.marks[0] == ""
     assert result.records.used.all()
-    assert list(result.frfs.averages) == [3, 3]
+    assert list(result.frfs.averages) == [2, 2]
 
 
 def test_a_weak_impact_has_little_weight(tmp_path):
@@ -145,7 +144,7 @@ def test_steps_that_differ_in_their_last_digits_are_one_step(tmp_path):
     assert result.records.used.all()
 
 
-@pytest.mark.parametrize("make_last", [hit_twice, clipped, overloaded])
+@pytest.mark.parametrize("make_last", [hit_twice, clipped])
 def test_the_last_impact_at_a_dof_is_used_with_a_warning(tmp_path, make_last):
     result = estimate(campaign(tmp_path, make_last, n_good=0))
     assert list(result.records.used) == [True]

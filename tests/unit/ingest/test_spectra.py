@@ -79,7 +79,7 @@ def test_hv_does_not_depend_on_units():
 def test_the_coherence_is_the_share_of_power_that_the_force_explains():
     noise = 0.5
     sums = campaign(np.random.default_rng(4), n_records=3000, response_noise=noise)
-    signal = sums.responses.T / sums.count - noise**2
+    signal = sums.responses.T / sums.counts - noise**2
     expected = signal / (signal + noise**2)
     np.testing.assert_allclose(estimate_coherence(sums)[AWAY_FROM_ZERO], expected[AWAY_FROM_ZERO], atol=0.05, rtol=0.0)
 
@@ -92,7 +92,7 @@ def test_one_record_has_neither_coherence_nor_scatter():
 
 def test_lines_without_force_have_no_variance_and_no_frf():
     sums = campaign(np.random.default_rng(5), response_noise=0.1)
-    sums.force[7], sums.cross[:, 7] = 0.0, 0.0
+    sums.force[:, 7], sums.cross[:, 7] = 0.0, 0.0
     assert np.isnan(frf_variance(sums)[7]).all()
     assert (estimate_frf(sums)[7] == 0).all()
 

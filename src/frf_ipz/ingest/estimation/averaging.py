@@ -6,17 +6,18 @@ variance; an FRF that several set-ups measured is the mean of them all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.ingest.campaign import setup_labels
+from frf_ipz.ingest.estimation.impact_noise import ImpactNoise, add_noise, impact_variance, without_force_noise
 from frf_ipz.ingest.estimation.record_table import record_table
 from frf_ipz.ingest.estimation.spectra import SpectrumSums, empty_sums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.estimation.traces import add_traces
-from frf_ipz.ingest.estimation.variance import frf_variance, power_to_variance
+from frf_ipz.ingest.estimation.variance import frf_variance
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records, survey_records
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
-    from frf_ipz.ingest.survey.record_info import Survey
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
 SURVEY_SHARE = 0.6  # of the work
@@ -43,17 +44,31 @@ class SetupAverage:
     ----------
     sums : SpectrumSums
         Of all its impacts, records or segments.
-    independent : float
-        How many independent ones they are worth.
-    response_noise, force_noise : array, optional
-        Noise power of one record's responses, (n_outputs, n_lines), and force, (n_lines,), where it was measured in the
-        record itself.
+    independent : (n_outputs,) array
+        How many independent ones those of each response are worth.
+    noise : ImpactNoise, optional
+        What was measured in the records themselves, where they are impacts.
     """
 
     sums: SpectrumSums
-    independent: float = 0.0
-    response_noise: FloatArray | None = None
-    force_noise: FloatArray | None = None
+    independent: FloatArray
+    noise: ImpactNoise | None = None
+
+    def take(self, rows: Sequence[int]) -> SetupAverage:
+        """Take some responses.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Which.
+
+        Returns
+        -------
+        SetupAverage
+            Theirs.
+        """
+        noise = None if self.noise is None else self.noise.take(rows)
+        return SetupAverage(self.sums.take(rows), self.independent[list(rows)], noise)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,7 +83,7 @@ def average_recordings(
     test: VibrationTest,
     options: IngestOptions,
     progress: Progress,
-    add: Callable[[SetupAverage, Record, Survey], float],
+    add: Callable[[SetupAverage, RecordInfo, Record, Survey], float],
 ) -> FrfEstimate:
     """Average all records of a test.
 
@@ -96,7 +111,7 @@ def average_recordings(
     files = RecordingFiles(test=test)
     survey = survey_records(files, options, lambda fraction, text: progress(SURVEY_SHARE * fraction, text))
     n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
-    averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs)) for setup in test.setups}
+    averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs), np.zeros(n_outputs)) for setup in test.setups}
     energies: list[float] = []
     traces: tuple[Trace, ...] = ()
     records = read_records(test, options, survey=survey, files=files, used_only=False)
@@ -104,7 +119,7 @@ def average_recordings(
         fraction = position / len(survey.records)
         progress(SURVEY_SHARE + (1.0 - SURVEY_SHARE) * fraction, f"averaging {record.name}")
         traces = add_traces(traces, info, record)
-        energies.append(add(averages[info.setup], record, survey) if record.used else 0.0)
+        energies.append(add(averages[info.setup], info, record, survey) if record.used else 0.0)
     return FrfEstimate(
         frfs=_assemble_frfs(test, survey, averages, options),
         records=record_table(survey, energies),
@@ -122,13 +137,14 @@ def _assemble_frfs(
     for setups, labels in _group_labels(test).items():
         pooled_average = _pool(test, [averages[setup] for setup in setups], setups, labels)
         estimates |= _estimate(pooled_average, labels, options.estimator)
-    ordered_estimates = [estimates[label] for label in test.labels]
+    measured_labels = tuple(label for label in test.labels if label in estimates)
+    ordered_estimates = [estimates[label] for label in measured_labels]
     duration = survey.n_samples * survey.step_s
     n_lines = survey.n_samples // 2 + 1
     return FrfSet(
         frequency_hz=np.arange(n_lines) / duration,
         values=np.column_stack([estimate.values for estimate in ordered_estimates]),
-        labels=test.labels,
+        labels=measured_labels,
         variance=np.column_stack([estimate.variance for estimate in ordered_estimates]),
         coherence=np.column_stack([estimate.coherence for estimate in ordered_estimates]),
         averages=np.array([estimate.count for estimate in ordered_estimates], np.int64),
@@ -152,50 +168,48 @@ def _pool(
 ) -> SetupAverage:
     """Add up the averages of some set-ups, of the rows that some labels stand in."""
     rows_of_setup = [[setup_labels(test.channels, setup).index(label) for label in labels] for setup in setups]
-    if len(averages) == 1:
-        first, rows = averages[0], rows_of_setup[0]
-        sums = SpectrumSums(first.sums.force, first.sums.cross[rows], first.sums.responses[rows], first.sums.count)
-        noise = None if first.response_noise is None else first.response_noise[rows]
-        return SetupAverage(sums, first.independent, noise, first.force_noise)
-    parts = list(zip(averages, rows_of_setup, strict=True))
+    parts = [average.take(rows) for average, rows in zip(averages, rows_of_setup, strict=True)]
     sums = SpectrumSums(
-        np.sum([average.sums.force for average in averages], axis=0),
-        np.sum([average.sums.cross[rows] for average, rows in parts], axis=0),
-        np.sum([average.sums.responses[rows] for average, rows in parts], axis=0),
-        sum(average.sums.count for average in averages),
+        np.sum([part.sums.force for part in parts], axis=0),
+        np.sum([part.sums.cross for part in parts], axis=0),
+        np.sum([part.sums.responses for part in parts], axis=0),
+        np.sum([part.sums.counts for part in parts], axis=0),
     )
-    return SetupAverage(sums, sum(average.independent for average in averages))
+    noises = [part.noise for part in parts if part.noise is not None]
+    independent = np.sum([part.independent for part in parts], axis=0)
+    return SetupAverage(sums, independent, add_noise(noises) if noises else None)
 
 
 def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _LabelEstimate]:
-    sums = average.sums
+    """Estimate the FRFs of some labels; none of a response that no record has."""
+    sums, noise = average.sums, average.noise
     values = estimate_frf(sums, estimator)
     coherence = estimate_coherence(sums)
-    variance = _estimate_variance(average, values)
+    if noise is None:
+        variance = frf_variance(sums, average.independent)
+    else:
+        if estimator == "H1":
+            own_power = without_force_noise(sums, noise)
+            values = estimate_frf(replace(sums, force=np.where(own_power > 0.0, own_power, sums.force)))
+        variance = impact_variance(sums, noise, values)
     return {
         label: _LabelEstimate(
             values=values[:, column],
             variance=variance[:, column],
             coherence=coherence[:, column],
-            count=sums.count,
+            count=int(sums.counts[column]),
         )
         for column, label in enumerate(labels)
+        if sums.counts[column]
     }
-
-
-def _estimate_variance(average: SetupAverage, values: ComplexArray) -> FloatArray:
-    """Take the scatter between records, and of a single record the noise in itself."""
-    if average.sums.count == 1 and average.response_noise is not None and average.force_noise is not None:
-        power = average.response_noise.T + average.force_noise[:, None] * np.abs(values) ** 2
-        return power_to_variance(power, average.sums.force)
-    return frf_variance(average.sums, average.independent)
 
 
 def _warn_of_single_records(averages: Mapping[TestSetup, SetupAverage]) -> tuple[str, ...]:
     """Say which FRFs come from a single record, and what their variance is then."""
-    single_dofs = [str(setup.input_dof) for setup, average in averages.items() if average.sums.count == 1]
-    if not single_dofs:
+    single_averages = {setup: average for setup, average in averages.items() if max(average.sums.counts) == 1}
+    if not single_averages:
         return ()
-    is_known = all(average.response_noise is not None for average in averages.values() if average.sums.count == 1)
+    single_dofs = [str(setup.input_dof) for setup in single_averages]
+    is_known = all(average.noise is not None for average in single_averages.values())
     source = "is the noise in that record alone" if is_known else "is not known"
     return (f"a single record at {', '.join(dict.fromkeys(single_dofs))}: no coherence, and the variance {source}",)

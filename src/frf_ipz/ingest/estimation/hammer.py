@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.estimation.averaging import average_recordings
+from frf_ipz.ingest.estimation.impact_noise import empty_noise
 from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.estimation.averaging import SetupAverage
+    from frf_ipz.ingest.estimation.impact_noise import ImpactNoise
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
-    from frf_ipz.ingest.survey.record_info import Survey
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
 
@@ -45,20 +48,32 @@ def estimate_hammer(test: VibrationTest, options: IngestOptions, progress: Progr
     return average_recordings(test, options, progress, _add_impact)
 
 
-def _add_impact(average: SetupAverage, record: Record, survey: Survey) -> float:
+def _add_impact(average: SetupAverage, info: RecordInfo, record: Record, survey: Survey) -> float:
     """Add an impact to the average of its set-up, and return the energy of its force."""
     signals = record.apply_windows(survey.decay_1_s, survey.n_samples)
-    average.sums.add(signals[0], signals[1:])
-    average.independent += 1.0
-    if average.sums.count == 1:  # should it stay the only one, the noise has to come from its own record
-        _measure_noise(average, record, survey)
+    rows = list(record.outputs)
+    average.sums.add(signals[0], signals[1:], rows)
+    average.independent[rows] += 1.0
+    average.noise = average.noise or empty_noise(survey.n_samples // 2 + 1, len(average.sums.cross))
+    _add_noise(average.noise, info, record, survey, np.abs(np.fft.rfft(signals[0])))
     return float(np.sum(signals[0] ** 2))
 
 
-def _measure_noise(average: SetupAverage, record: Record, survey: Survey) -> None:
+def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Survey, force: FloatArray) -> None:
+    """Add what is known of the noise of an impact; `force` is the modulus of its force's transform."""
+    rows = list(record.outputs)
     frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
     decay = exponential_window(record.n_samples, record.step_s, survey.decay_1_s, record.trigger)
     window = decay * force_window(record.n_samples, *record.force_interval)
     responses = [noise_power(response[record.trigger :], record.step_s, frequency_hz) for response in record.responses]
-    average.response_noise = np.array(responses) * np.sum(decay**2)
-    average.force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency_hz) * np.sum(window**2)
+    scales = np.array(info.noise_scales)[rows, None] if info.noise_scales else np.ones((len(rows), 1))
+    noise.response[rows] += np.array(responses) * np.sum(decay**2)
+    noise.force[rows] += noise_power(record.force[record.trigger :], record.step_s, frequency_hz) * np.sum(window**2)
+    noise.scales[rows] += scales
+    noise.scaled_force[rows] += scales * force**2
+    if any(info.missing_force):
+        missing = force * np.abs(np.fft.rfft(info.missing_force, survey.n_samples))
+        first = slice(0, len(info.missing_force) + 1)
+        sizes = np.linalg.norm(record.responses[:, first], axis=1)
+        noise.missing_force[rows] += missing
+        noise.missing_response[rows] += missing * sizes[:, None] / np.linalg.norm(record.force[first])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.records import Record
-    from frf_ipz.ingest.survey.record_info import Survey
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
 
@@ -48,24 +48,26 @@ def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progr
     return average_recordings(test, options, progress, _add_record)
 
 
-def _add_record(average: SetupAverage, record: Record, survey: Survey) -> float:
+def _add_record(average: SetupAverage, info: RecordInfo, record: Record, survey: Survey) -> float:
     """Add a record to the average of its set-up, and return the energy of its force."""
-    before = average.sums.count
+    del info
+    rows = list(record.outputs)
+    before = int(average.sums.counts[rows[0]])
     if survey.subrecord_length:
         energy = _add_subrecords(average, record, survey.subrecord_length)
     else:
         energy = 0.0
         for signals in _window_record(record, survey):
-            average.sums.add(signals[0], signals[1:])
+            average.sums.add(signals[0], signals[1:], rows)
             energy += float(np.sum(signals[0] ** 2))
-    count = average.sums.count - before
-    average.independent += count_independent_segments(count) if survey.segment_length else count
+    count = int(average.sums.counts[rows[0]]) - before
+    average.independent[rows] += count_independent_segments(count) if survey.segment_length else count
     return energy
 
 
 def _add_subrecords(average: SetupAverage, record: Record, length: int) -> float:
     for force, responses in transform_subrecords(record.force, record.responses, length):
-        average.sums.add_spectra(force, responses)
+        average.sums.add_spectra(force, responses, list(record.outputs))
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 
 

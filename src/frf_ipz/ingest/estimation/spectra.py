@@ -8,10 +8,14 @@ Only sums over the records are kept, so memory does not grow with their number.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray, require_shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 @dataclass(slots=True, eq=False)
@@ -20,54 +24,76 @@ class SpectrumSums:
 
     Parameters
     ----------
-    force : (n_lines,) array
-        Sum of the force's squared modulus.
+    force : (n_outputs, n_lines) array
+        Sum of the force's squared modulus over the records of each response.
     cross : (n_outputs, n_lines) complex array
         Sum of the conjugate force spectrum times the responses'.
     responses : (n_outputs, n_lines) array
         Sum of the responses' squared moduli.
-    count : int
-        Records, or segments of records, in the sums.
+    counts : (n_outputs,) int array
+        Records, or segments of records, in the sums of each response.
     """
 
     force: FloatArray
     cross: ComplexArray
     responses: FloatArray
-    count: int = 0
+    counts: IntArray
 
-    def add(self, force: FloatArray, responses: FloatArray) -> None:
+    def add(self, force: FloatArray, responses: FloatArray, rows: Sequence[int] | None = None) -> None:
         """Add one record.
 
         Parameters
         ----------
         force : (n_samples,) array
             With its window applied.
-        responses : (n_outputs, n_samples) array
+        responses : (n_rows, n_samples) array
             With theirs.
+        rows : sequence of int, optional
+            Which responses these are; all of them where it is left out.
 
         Raises
         ------
         ShapeError
             If the number of outputs, or of the lines that the samples give, differs.
         """
-        require_shape("the responses of a record", responses, (len(self.cross), len(force)))
-        require_shape("the spectrum of a record", self.force, (len(force) // 2 + 1,))
-        self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses))
+        n_rows = len(self.cross) if rows is None else len(rows)
+        require_shape("the responses of a record", responses, (n_rows, len(force)))
+        require_shape("the spectrum of a record", self.force, (len(self.force), len(force) // 2 + 1))
+        self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses), rows)
 
-    def add_spectra(self, force: ComplexArray, responses: ComplexArray) -> None:
+    def add_spectra(self, force: ComplexArray, responses: ComplexArray, rows: Sequence[int] | None = None) -> None:
         """Add the spectra of one record or segment.
 
         Parameters
         ----------
         force : (n_lines,) complex array
             Transform of the force.
-        responses : (n_outputs, n_lines) complex array
+        responses : (n_rows, n_lines) complex array
             Transforms of the responses.
+        rows : sequence of int, optional
+            Which responses these are; all of them where it is left out.
         """
-        self.force += force.real**2 + force.imag**2
-        self.responses += responses.real**2 + responses.imag**2
-        self.cross += force.conj() * responses
-        self.count += 1
+        chosen = slice(None) if rows is None else list(rows)
+        self.force[chosen] += force.real**2 + force.imag**2
+        self.responses[chosen] += responses.real**2 + responses.imag**2
+        self.cross[chosen] += force.conj() * responses
+        self.counts[chosen] += 1
+
+    def take(self, rows: Sequence[int]) -> SpectrumSums:
+        """Take the sums of some responses.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Which responses.
+
+        Returns
+        -------
+        SpectrumSums
+            Theirs.
+        """
+        chosen = list(rows)
+        return SpectrumSums(self.force[chosen], self.cross[chosen], self.responses[chosen], self.counts[chosen])
 
 
 def empty_sums(n_lines: int, n_outputs: int) -> SpectrumSums:
@@ -85,7 +111,8 @@ def empty_sums(n_lines: int, n_outputs: int) -> SpectrumSums:
     SpectrumSums
         Zeros.
     """
-    return SpectrumSums(np.zeros(n_lines), np.zeros((n_outputs, n_lines), complex), np.zeros((n_outputs, n_lines)))
+    shape = n_outputs, n_lines
+    return SpectrumSums(np.zeros(shape), np.zeros(shape, complex), np.zeros(shape), np.zeros(n_outputs, np.int64))
 
 
 def estimate_frf(sums: SpectrumSums, estimator: str = "H1") -> ComplexArray:
@@ -115,7 +142,7 @@ def estimate_frf(sums: SpectrumSums, estimator: str = "H1") -> ComplexArray:
     h1 = _divide(sums.cross, sums.force)
     if estimator == "H1":
         return h1
-    h2 = _divide(sums.responses.astype(complex), sums.cross.conj().T)
+    h2 = _divide(sums.responses, sums.cross.conj())
     if estimator == "H2":
         return h2
     magnitude = np.sqrt(np.abs(h1) * np.abs(h2))
@@ -135,10 +162,9 @@ def estimate_coherence(sums: SpectrumSums) -> FloatArray:
     (n_lines, n_outputs) array
         0 to 1; NaN for fewer than two records, for which it says nothing.
     """
-    if sums.count < 2:
-        return np.full(sums.cross.T.shape, np.nan)
     cross = sums.cross.real**2 + sums.cross.imag**2
-    return np.minimum(_divide(cross, (sums.force * sums.responses).T).real, 1.0)
+    coherence = np.minimum(_divide(cross, sums.force * sums.responses).real, 1.0)
+    return np.where(sums.counts < 2, np.nan, coherence)
 
 
 def unexplained_power(sums: SpectrumSums) -> FloatArray:
@@ -152,7 +178,7 @@ def unexplained_power(sums: SpectrumSums) -> FloatArray:
     Returns
     -------
     (n_lines, n_outputs) array
-        Its expectation is (count - 1) times the noise power of one record.
+        Its expectation is the noise power of one record times the number of records less one.
     """
     cross = sums.cross.real**2 + sums.cross.imag**2
     explained = _divide(cross, sums.force).real
@@ -160,7 +186,6 @@ def unexplained_power(sums: SpectrumSums) -> FloatArray:
 
 
 def _divide(numerator: ComplexArray | FloatArray, denominator: ComplexArray | FloatArray) -> ComplexArray:
-    """Divide (n_outputs, n_lines) by (n_lines,) or (n_lines, n_outputs), with 0 for what cannot be divided."""
+    """Divide (n_outputs, n_lines) by the same and transpose, with 0 for what cannot be divided."""
     dividend = np.asarray(numerator.T, complex)
-    divisor = denominator[:, None] if denominator.ndim == 1 else denominator
-    return np.asarray(np.divide(dividend, divisor, out=np.zeros_like(dividend), where=divisor != 0))
+    return np.asarray(np.divide(dividend, denominator.T, out=np.zeros_like(dividend), where=denominator.T != 0))

@@ -29,15 +29,15 @@ OUTLIERS = 1e-3  # lines of an FRF that may stick out by chance
 ROUNDING = 1e-24  # of the responses' power: below this, scatter is rounding
 
 
-def frf_variance(sums: SpectrumSums, independent: float | None = None) -> FloatArray:
+def frf_variance(sums: SpectrumSums, independent: FloatArray | None = None) -> FloatArray:
     """Estimate the variance of H1 from the scatter between records.
 
     Parameters
     ----------
     sums : SpectrumSums
         Of all records.
-    independent : float, optional
-        How many independent ones they are worth, where they overlap.
+    independent : (n_outputs,) array, optional
+        How many independent ones those of each response are worth, where they overlap.
 
     Returns
     -------
@@ -45,19 +45,14 @@ def frf_variance(sums: SpectrumSums, independent: float | None = None) -> FloatA
         E of the squared modulus of the error of `estimate_frf`; NaN for fewer than two records and where there is
         no force.
     """
-    if sums.count < 2:
-        return np.full(sums.cross.T.shape, np.nan)
-    degrees = max((independent or sums.count) - 1.0, 0.5)
-    share = sums.count / (degrees + 1.0)  # overlapping segments: fewer independent ones in the same sums
-    scatter = unexplained_power(sums) / (degrees * share)
-    gains = np.abs(estimate_frf(sums)) ** 2
-    floors = ROUNDING * sums.responses.T.max(axis=0, initial=0.0)
-    power = np.column_stack(
-        [
-            noise_power(np.maximum(scatter_of_output, floor), gain, degrees)
-            for scatter_of_output, gain, floor in zip(scatter.T, gains.T, floors, strict=True)
-        ]
-    )
+    degrees = np.maximum((sums.counts if independent is None else independent) - 1.0, 0.5)
+    share = sums.counts / (degrees + 1.0)  # overlapping segments: fewer independent ones in the same sums
+    power = np.full(sums.cross.T.shape, np.nan)
+    unexplained, gains = unexplained_power(sums), np.abs(estimate_frf(sums)) ** 2
+    floors = ROUNDING * sums.responses.max(axis=1, initial=0.0)
+    for output in np.flatnonzero(sums.counts >= 2):
+        scatter = unexplained[:, output] / (degrees[output] * share[output])
+        power[:, output] = noise_power(np.maximum(scatter, floors[output]), gains[:, output], float(degrees[output]))
     return power_to_variance(power * share, sums.force)
 
 
@@ -68,16 +63,15 @@ def power_to_variance(power: FloatArray, force: FloatArray) -> FloatArray:
     ----------
     power : (n_lines, n_outputs) array
         a + b |H|^2.
-    force : (n_lines,) array
-        Sum of the force's squared modulus over the records.
+    force : (n_outputs, n_lines) array
+        Sum of the force's squared modulus over the records of each response.
 
     Returns
     -------
     (n_lines, n_outputs) array
         Variance; NaN where there is no force.
     """
-    divisor = np.broadcast_to(force[:, None], power.shape)
-    return np.asarray(np.divide(power, divisor, out=np.full(power.shape, np.nan), where=divisor > 0))
+    return np.asarray(np.divide(power, force.T, out=np.full(power.shape, np.nan), where=force.T > 0))
 
 
 def noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> FloatArray:

@@ -83,6 +83,37 @@ def exponential_window(n_samples: int, step_s: float, decay_1_s: float, origin: 
     return np.asarray(np.exp(-decay_1_s * step_s * (np.arange(n_samples) - origin)))
 
 
+def window_impact(
+    signals: FloatArray, n_samples: int, force_interval: tuple[int, int], decay: float, trigger: int
+) -> FloatArray:
+    """Give the force within its pulse and the responses, under a window, filled up with zeros to a common length.
+
+    Parameters
+    ----------
+    signals : (1 + n_outputs, n) array
+        The force first.
+    n_samples : int
+        The common length, at least n.
+    force_interval : pair of int
+        First sample of the force that is kept, and the one after the last.
+    decay : float
+        Rate of the exponential window times the time step; 0 for none.
+    trigger : int
+        Sample at which the window is 1.
+
+    Returns
+    -------
+    (1 + n_outputs, n_samples) array
+        The force first.
+    """
+    windowed = np.zeros((len(signals), n_samples))
+    windowed[:, : signals.shape[1]] = signals
+    windowed[0] *= force_window(n_samples, *force_interval)
+    if decay:
+        windowed *= exponential_window(n_samples, 1.0, decay, trigger)
+    return windowed
+
+
 def correlated_lines(decay: float) -> int:
     """Return over how many lines the noise is correlated by an exponential window: its noise bandwidth.
 

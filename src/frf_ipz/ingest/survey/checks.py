@@ -8,6 +8,7 @@ import numpy as np
 
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
+from frf_ipz.ingest.signals.faults import find_dropout, find_missing_force, is_settling
 from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
 from frf_ipz.ingest.survey.record_info import RecordInfo
 from frf_ipz.ingest.units import si_unit
@@ -68,6 +69,7 @@ def check_impact(
         stop = max(stop, int(pulse.bumps.max()) + stop - pulse.peak)
         start = min(start, int(pulse.bumps.min()) + start - pulse.peak)
     trigger = max(min(pulse.onset, *(int(bump) for bump in pulse.bumps), len(force) - 1), 0)
+    missing_force = find_missing_force(force, pulse) if start <= 0 else (0.0,)
     if offsets is None:
         offsets = tuple(_estimate_offset(response[: max(start, 0)]) for response in responses)
     decays = _measure_decays(test, index.step_s, responses - np.array(offsets)[:, None], trigger)
@@ -92,7 +94,13 @@ def check_impact(
         remaining_amplitude=slowest.remaining_amplitude,
         slowest_mode_hz=slowest.frequency_hz,
         snr_db=snr_db,
-        faults=(*_find_double_hit(pulse, index.step_s), *_find_clipping(test, force, responses)),
+        faults=(
+            *_find_late_start(force, pulse, missing_force),
+            *_find_double_hit(pulse, index.step_s),
+            *_find_clipping(test, force),
+        ),
+        channel_faults=_find_bad_channels(test, index.step_s, responses, max(start, 0)),
+        missing_force=missing_force,
         remarks=(
             *_find_cut_off_decay(slowest),
             *_find_weak_impact(pulse, snr_db),
@@ -145,7 +153,8 @@ def check_record(
         pulse_s=float("nan"),
         force_noise=float("nan"),
         starts_at_rest=starts_at_rest,
-        faults=_find_clipping(test, force, responses),
+        faults=_find_clipping(test, force),
+        channel_faults=_find_bad_channels(test, index.step_s, responses, 0),
         remarks=_find_offsets(test, signals[1:], tuple(offsets)),
     )
 
@@ -159,13 +168,33 @@ def _find_double_hit(pulse: Pulse, step_s: float) -> tuple[str, ...]:
     return (f"double hit: {100 * pulse.ratios[strongest]:.0f} % of the pulse {1e3 * abs(delay):.3g} ms {side} it",)
 
 
-def _find_clipping(test: VibrationTest, force: FloatArray, responses: FloatArray) -> tuple[str, ...]:
-    faults = [f"clipping of {test.input_channel.column}"] if is_clipped(force) else []
-    faults += [
-        f"overload of {channel.column}"
-        for channel, response in zip(test.output_channels, responses, strict=True)
-        if is_clipped(response)
-    ]
+def _find_late_start(force: FloatArray, pulse: Pulse, missing_force: tuple[float, ...]) -> tuple[str, ...]:
+    if not any(missing_force):
+        return ()
+    return (f"begins within the impact, at {100 * (force[0] - pulse.base) / pulse.height:.2g} % of its peak",)
+
+
+def _find_clipping(test: VibrationTest, force: FloatArray) -> tuple[str, ...]:
+    return (f"clipping of {test.input_channel.column}",) if is_clipped(force) else ()
+
+
+def _find_bad_channels(
+    test: VibrationTest, step_s: float, responses: FloatArray, n_before: int
+) -> tuple[tuple[int, str], ...]:
+    """Find responses that are no measurement, which says nothing against the force and the other responses."""
+    faults: list[tuple[int, str]] = []
+    for output, (channel, response) in enumerate(zip(test.output_channels, responses, strict=True)):
+        if not np.ptp(response):
+            faults.append((output, f"{channel.column} is dead: all its samples are {response[0]:.4g}"))
+            continue
+        if is_clipped(response):
+            faults.append((output, f"overload of {channel.column}"))
+        start, length = find_dropout(response)
+        if length:
+            where = f"{length} samples of one value, {start * step_s:.4g} s after its beginning"
+            faults.append((output, f"dropout of {channel.column}: {where}"))
+        if channel.quantity == "acceleration" and is_settling(response, n_before):
+            faults.append((output, f"{channel.column} is settling: it drifts before the impact and on to the end"))
     return tuple(faults)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
 from frf_ipz.ingest.survey.checks import CUT_OFF, FEWEST_BEFORE, check_impact
+from frf_ipz.ingest.survey.comparison import CONTRADICTS, compare_impacts
 from frf_ipz.ingest.survey.file_index import index_file, split_impacts
 from frf_ipz.ingest.survey.record_info import Survey
 from frf_ipz.ingest.survey.selection import check_names, is_named, record_name, select_records
@@ -59,6 +60,25 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
         records += _check_file(files, index, usual_length)
     file_names = [record_name(files.test, path, 1, 1) for _, path in files.test.recordings]
     check_names([*file_names, *(record.name for record in records if "#" in record.name)], options)
+    survey = _plan(indices, records, options)
+    compared_records, pairwise = compare_impacts(files, survey)
+    if any(after.marks != before.marks for after, before in zip(compared_records, survey.records, strict=True)):
+        scales = {record.name: record.noise_scales for record in compared_records}
+        compared = {record.name: record for record in compared_records}
+        marked_records = [_with_contradictions(record, compared[record.name]) for record in records]
+        survey = _plan(indices, marked_records, options)
+        compared_records = tuple(replace(record, noise_scales=scales[record.name]) for record in survey.records)
+    return replace(survey, records=compared_records, warnings=(*survey.warnings, *pairwise))
+
+
+def _with_contradictions(record: RecordInfo, compared: RecordInfo) -> RecordInfo:
+    """Add what the comparison with the other impacts has found."""
+    faults = tuple(text for text in compared.faults if text.startswith(CONTRADICTS))
+    return replace(record, faults=(*record.faults, *faults), channel_faults=compared.channel_faults)
+
+
+def _plan(indices: Sequence[FileIndex], records: Sequence[RecordInfo], options: IngestOptions) -> Survey:
+    """Decide which impacts are used, and on which windows and length of transform."""
     selection = select_records(records, options)
     used = [record for record in selection.records if record.used]
     _check_lengths(indices, used, options)

@@ -54,10 +54,18 @@ class RecordInfo:
         1 for the first impact in its file; at those after it, the structure may still move from the one before.
     faults : tuple of str
         Why it is left out unless the user keeps it.
+    channel_faults : tuple of pairs of int and str
+        Why one response of it, by its place in the set-up, is left out unless the user keeps the record.
     remarks : tuple of str
         What is wrong without being a reason to leave it out.
     used : bool
         It enters the FRFs.
+    keeps_channels : bool
+        It enters them with all channels, whatever is wrong with them.
+    missing_force : tuple of float
+        Samples of the force that its record lacks because it begins within the pulse, N.
+    noise_scales : tuple of float
+        Noise power of each response over that of the other impacts; empty where they cannot be compared.
     """
 
     name: str
@@ -81,8 +89,12 @@ class RecordInfo:
     starts_at_rest: bool = True
     number: int = 1
     faults: tuple[str, ...] = ()
+    channel_faults: tuple[tuple[int, str], ...] = ()
     remarks: tuple[str, ...] = ()
     used: bool = True
+    keeps_channels: bool = False
+    missing_force: tuple[float, ...] = (0.0,)
+    noise_scales: tuple[float, ...] = ()
 
     @property
     def n_samples(self) -> int:
@@ -97,7 +109,13 @@ class RecordInfo:
     @property
     def marks(self) -> tuple[str, ...]:
         """Everything that is wrong, the reasons for leaving it out first."""
-        return self.faults + self.remarks
+        return (*self.faults, *dict.fromkeys(text for _, text in self.channel_faults), *self.remarks)
+
+    @property
+    def used_outputs(self) -> tuple[int, ...]:
+        """The responses, by their place in the set-up, that enter the FRFs."""
+        bad_outputs = () if self.keeps_channels else [output for output, _ in self.channel_faults]
+        return tuple(output for output in range(len(self.setup.output_dofs)) if output not in bad_outputs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -135,21 +135,48 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
     step_s = _usual_step([record.step_s for record in not_dropped or records])
     marked_records = _mark_saturated([_mark_step(record, step_s) for record in records])
     decided_records = [_decide(record, options) for record in marked_records]
-    warnings = [
-        f"{record.name} is left out: {'; '.join(record.faults)}"
-        for record in decided_records
-        if not record.used and record.faults
-    ]
+    fallbacks: list[RecordInfo] = []
     for setup in dict.fromkeys(record.setup for record in records):
         if not any(record.used for record in decided_records if record.setup == setup):
-            fallback = _least_bad(setup, decided_records, options, step_s)
-            decided_records = [
-                replace(record, used=True) if record is fallback else record for record in decided_records
-            ]
-            warnings = [text for text in warnings if not text.startswith(f"{fallback.name} is left out")]
-            reason = f"although it is bad ({'; '.join(fallback.faults)}): no better record at {setup.input_dof}"
-            warnings.append(f"{fallback.name} is used {reason}")
+            fallbacks += _least_bad(setup, decided_records, options, step_s)
+    warnings = [
+        f"{record.name} is left out: {'; '.join(record.faults or dict(record.channel_faults).values())}"
+        for record in decided_records
+        if not record.used and (record.faults or record.channel_faults) and record not in fallbacks
+    ]
+    for record in fallbacks:
+        reasons = record.faults or tuple(dict(record.channel_faults).values())
+        reason = f"although it is bad ({'; '.join(reasons)}): no better record at {record.setup.input_dof}"
+        warnings.append(f"{record.name} is used {reason}")
+    decided_records = [
+        replace(record, used=True, keeps_channels=record.keeps_channels or not record.used_outputs)
+        if record in fallbacks
+        else record
+        for record in decided_records
+    ]
+    warnings += _warn_of_channels(decided_records)
     return Selection(records=tuple(decided_records), step_s=step_s, warnings=tuple(warnings))
+
+
+def _warn_of_channels(records: Sequence[RecordInfo]) -> list[str]:
+    """Say which channels are left out of records that are used; of those that all records lack there is no FRF."""
+    warnings = []
+    for setup in dict.fromkeys(record.setup for record in records):
+        used_records = [record for record in records if record.used and record.setup == setup]
+        for output, dof in enumerate(setup.output_dofs):
+            without = [record for record in used_records if output not in record.used_outputs]
+            reasons = dict.fromkeys(text for record in without for at, text in record.channel_faults if at == output)
+            if without and len(without) == len(used_records):
+                names = "all impacts" if len(without) > 1 else without[0].name
+                warnings.append(f"there is no FRF {dof} / {setup.input_dof}: in {names}, {'; '.join(reasons)}")
+            else:
+                warnings += [
+                    f"{dof} is left out of {record.name}: {text}"
+                    for record in without
+                    for at, text in record.channel_faults
+                    if at == output
+                ]
+    return warnings
 
 
 def _usual_step(steps: Sequence[float]) -> float:
@@ -185,12 +212,15 @@ def _decide(record: RecordInfo, options: IngestOptions) -> RecordInfo:
     if is_named(record.name, options.drop):
         return replace(record, used=False, remarks=(*record.remarks, "dropped by the user"))
     if is_named(record.name, options.keep):
-        remark = ("kept by the user",) if record.faults else ()
-        return replace(record, used=True, remarks=(*record.remarks, *remark))
-    return replace(record, used=not record.faults)
+        remark = ("kept by the user",) if record.faults or record.channel_faults else ()
+        return replace(record, used=True, keeps_channels=True, remarks=(*record.remarks, *remark))
+    return replace(record, used=not record.faults and bool(record.used_outputs))
 
 
-def _least_bad(setup: TestSetup, records: Sequence[RecordInfo], options: IngestOptions, step_s: float) -> RecordInfo:
+def _least_bad(
+    setup: TestSetup, records: Sequence[RecordInfo], options: IngestOptions, step_s: float
+) -> list[RecordInfo]:
+    """Choose what is used where all records are bad: all of which only the beginning is missing, or else one."""
     candidates = [record for record in records if record.setup == setup and not is_named(record.name, options.drop)]
     if not candidates:
         raise InputError(
@@ -202,6 +232,16 @@ def _least_bad(setup: TestSetup, records: Sequence[RecordInfo], options: IngestO
             f"all records at {setup.input_dof} have the time step {candidates[0].step_s:.6g} s, but the others of the "
             f"test have {step_s:.6g} s; export them with one step, or make a test of their own"
         )
-    return min(
-        usable_records, key=lambda record: (len(record.faults), record.second_pulse_ratio, -abs(record.peak_force))
-    )
+    late_records = [record for record in usable_records if any(record.missing_force) and len(record.faults) == 1]
+    if late_records:  # how wrong they are is known
+        return [record for record in late_records if record.used_outputs] or late_records
+    return [
+        min(
+            usable_records,
+            key=lambda record: (
+                len(record.faults) + len(record.channel_faults),
+                record.second_pulse_ratio,
+                -abs(record.peak_force),
+            ),
+        )
+    ]

@@ -1,0 +1,164 @@
+"""What is known of the errors of impacts beside their scatter, and the FRFs and variances that follow from all.
+
+The noise of the force, of power N in each of n impacts, adds to the sum S of the force's squared moduli: H1 is too low
+by (S - n N) / S. The noise is measured outside of the pulses, so its part is subtracted. Where S is what noise alone
+gives (a gamma distribution of n degrees of freedom) nothing is known of the force, and the FRF has no variance.
+Elsewhere, with v the unexplained power of one impact,
+
+    var(H) = (v + |H|^2 N (n N / S)) S / (S - n N)^2
+
+to the second order in the noise. Where the noise of impact k has the power v s_k (amplifiers that choose their range),
+and h_k is its share of S, the scatter of n impacts has the expectation ``v sum s_k (1 - h_k)`` and the variance is
+``v sum s_k h_k / S``. An impact whose record begins within the pulse lacks a part L of the force; its response is that
+to F + L, but for what moved before: H is wrong by about L / F, and by L / F times the ratio of response and force while
+the pulse lasts.
+
+[Bendat2010]: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010 (doi:10.1002/9781118032428), section 6.1,
+for the bias of H1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import gammainccinv
+
+from frf_ipz.ingest.estimation.variance import frf_variance
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.ingest.estimation.spectra import SpectrumSums
+
+CHANCE = 1e-6  # share of lines without a force that are taken for one with
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class ImpactNoise:
+    """Sums over the impacts of each response.
+
+    Parameters
+    ----------
+    response, force : (n_outputs, n_lines) array
+        Noise power of the transforms of responses and force, measured in each impact itself.
+    scaled_force : (n_outputs, n_lines) array
+        Squared modulus of the force times the relative noise power s of the impact.
+    scales : (n_outputs, 1) array
+        Relative noise powers s.
+    missing_force, missing_response : (n_outputs, n_lines) array
+        Modulus of the force times that of what its record lacks of it, and of the response.
+    """
+
+    response: FloatArray
+    force: FloatArray
+    scaled_force: FloatArray
+    scales: FloatArray
+    missing_force: FloatArray
+    missing_response: FloatArray
+
+    def take(self, rows: Sequence[int]) -> ImpactNoise:
+        """Take the sums of some responses.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Which responses.
+
+        Returns
+        -------
+        ImpactNoise
+            Theirs.
+        """
+        return ImpactNoise(**{field.name: getattr(self, field.name)[list(rows)] for field in fields(self)})
+
+
+def empty_noise(n_lines: int, n_outputs: int) -> ImpactNoise:
+    """Make sums to which nothing has been added.
+
+    Parameters
+    ----------
+    n_lines : int
+        Frequency lines.
+    n_outputs : int
+        Responses.
+
+    Returns
+    -------
+    ImpactNoise
+        Zeros.
+    """
+    lengths = {field.name: 1 if field.name == "scales" else n_lines for field in fields(ImpactNoise)}
+    return ImpactNoise(**{name: np.zeros((n_outputs, length)) for name, length in lengths.items()})
+
+
+def add_noise(parts: Sequence[ImpactNoise]) -> ImpactNoise:
+    """Add up the sums of several set-ups.
+
+    Parameters
+    ----------
+    parts : sequence of ImpactNoise
+        Of the same responses.
+
+    Returns
+    -------
+    ImpactNoise
+        The sum.
+    """
+    names = [field.name for field in fields(ImpactNoise)]
+    return ImpactNoise(**{name: np.sum([getattr(part, name) for part in parts], axis=0) for name in names})
+
+
+def without_force_noise(sums: SpectrumSums, noise: ImpactNoise) -> FloatArray:
+    """Subtract the noise of the force from its power.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of the impacts.
+    noise : ImpactNoise
+        Theirs.
+
+    Returns
+    -------
+    (n_outputs, n_lines) array
+        Sum of the squared moduli of the force itself; 0 where it does not stand out from the noise.
+    """
+    counts = np.maximum(sums.counts, 1)[:, None]
+    is_known = sums.force > noise.force * gammainccinv(counts, CHANCE) / counts
+    return np.asarray(np.where(noise.force > 0.0, np.where(is_known, sums.force - noise.force, 0.0), sums.force))
+
+
+def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray) -> FloatArray:
+    """Give the variance of the FRFs of impacts.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of the impacts.
+    noise : ImpactNoise
+        Theirs.
+    values : (n_lines, n_outputs) complex array
+        The FRFs.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        E of the squared modulus of their error; of a single impact it follows from the noise in its own record. NaN
+        where there is no force, or none that stands out from its noise.
+    """
+    gain = np.abs(values) ** 2
+    counts = np.maximum(sums.counts, 1)
+    own_power = without_force_noise(sums, noise).T
+    with np.errstate(divide="ignore", invalid="ignore"):  # lines without force become NaN
+        power, scaled = sums.force.T, (noise.scaled_force / sums.force).T
+        unequal = (counts - 1) * scaled / (noise.scales.T - scaled)
+        scatter = frf_variance(sums) * power * np.where(counts < 3, 1.0, unequal)
+        measured = noise.response.T + noise.force.T * gain
+        unexplained = np.where(sums.counts == 1, measured, scatter)
+        unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)
+        variance = unexplained * power / own_power**2
+        variance += gain * (noise.missing_force / sums.force).T ** 2 + (noise.missing_response / sums.force).T ** 2
+    return np.asarray(np.where(own_power > 0.0, variance, np.nan))

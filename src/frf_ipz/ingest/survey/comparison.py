@@ -1,0 +1,245 @@
+"""Each impact against the others at its point: those that contradict are named by what explains them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations, groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.ingest.signals.decay import noise_power
+from frf_ipz.ingest.signals.lost_samples import find_lost_samples
+from frf_ipz.ingest.signals.windows import window_impact
+from frf_ipz.ingest.survey.contradictions import (
+    ImpactSpectra,
+    compare_output,
+    contradicts_pairwise,
+    follows_force,
+    noise_scales,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.recording_files import RecordingFiles
+    from frf_ipz.ingest.survey.contradictions import OutputComparison
+    from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
+
+CONTRADICTS = "contradicts the other impacts"
+OPPOSITE = "its sign is the opposite"
+UNNAMED = ""
+FEWEST_LINES = 64  # that are compared, however many impacts there are: a band of the scatter's fit
+
+
+def compare_impacts(files: RecordingFiles, survey: Survey) -> tuple[tuple[RecordInfo, ...], tuple[str, ...]]:
+    """Compare the impacts at each point with one another.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings.
+    survey : Survey
+        Which are used, and on which windows.
+
+    Returns
+    -------
+    records : tuple of RecordInfo
+        All of the survey, with what contradicts as faults, and the relative noise of each.
+    warnings : tuple of str
+        Where two impacts contradict each other, and nothing tells which is right.
+    """
+    changed: dict[str, RecordInfo] = {}
+    warnings: list[str] = []
+    for setup in dict.fromkeys(record.setup for record in survey.used):
+        records = [record for record in survey.used if record.setup == setup]
+        if len(records) < 2:
+            continue
+        spectra = _transform(files, survey, records)
+        if len(records) == 2:
+            warnings += _warn_of_pair(files, records, spectra)
+        else:
+            changed |= {record.name: record for record in _compare_setup(files, survey, records, spectra)}
+    return tuple(changed.get(record.name, record) for record in survey.records), tuple(warnings)
+
+
+def _transform(files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo]) -> ImpactSpectra:
+    """Transform the impacts; of all lines so few are kept that they take no more memory than one record."""
+    stride = max(min(len(records), survey.n_samples // 2 // FEWEST_LINES), 1)
+    lines = slice(None, None, stride)
+    frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, survey.step_s)[lines])
+    forces, responses, noises = [], [], []
+    for record, signals in _windowed(files, survey, records):
+        transforms = np.fft.rfft(signals)[:, lines].copy()  # without what is not compared
+        forces.append(transforms[0])
+        responses.append(transforms[1:])
+        window = window_impact(
+            np.ones((2, record.n_samples)),
+            survey.n_samples,
+            record.force_interval,
+            survey.decay_1_s * record.step_s,
+            record.trigger,
+        )[1]
+        unwindowed = signals[1:] / np.maximum(window, np.finfo(float).tiny)
+        noise = [
+            noise_power(response[record.trigger : record.n_samples], record.step_s, frequency_hz)
+            for response in unwindowed
+        ]
+        noises.append(np.nan_to_num(np.array(noise)) * np.sum(window**2))
+    outputs = range(len(records[0].setup.output_dofs))
+    valid = np.array([[output in record.used_outputs for output in outputs] for record in records])
+    return ImpactSpectra(force=np.array(forces), responses=np.array(responses), noise=np.array(noises), valid=valid)
+
+
+def _windowed(
+    files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo]
+) -> Iterator[tuple[RecordInfo, FloatArray]]:
+    for path, group in groupby(records, key=lambda record: record.path):
+        in_file = list(group)
+        segments = files.segments(in_file[0].setup, path, [(record.start, record.stop) for record in in_file])
+        for record, segment in zip(in_file, segments, strict=True):
+            signals = segment[1:] - np.array(record.offsets)[:, None]
+            decay = survey.decay_1_s * record.step_s
+            yield record, window_impact(signals, survey.n_samples, record.force_interval, decay, record.trigger)
+
+
+def _compare_setup(
+    files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], spectra: ImpactSpectra
+) -> list[RecordInfo]:
+    columns = [channel.column for channel in files.test.output_channels]
+    comparisons = [compare_output(spectra, output) for output in range(len(columns))]
+    causes = [_name_causes(columns, spectra, comparisons, impact) for impact in range(len(records))]
+    for impact, named in enumerate(causes):
+        for output, comparison in enumerate(comparisons):
+            if comparison is not None and named.get(output) == UNNAMED:
+                agreeing = [records[number] for number in comparison.agreeing]
+                lost = _find_lost(files, survey, agreeing, records[impact], output)
+                named[output] = f"{CONTRADICTS}: {_explain(survey, spectra, comparison, (impact, output), lost)}"
+    scales = np.ones((len(records), len(columns)))
+    for output, comparison in enumerate(comparisons):
+        if comparison is not None:
+            scales[:, output] = noise_scales(spectra, comparison, output)
+    return [
+        replace(
+            _with_causes(record, causes[impact], columns), noise_scales=tuple(float(scale) for scale in scales[impact])
+        )
+        for impact, record in enumerate(records)
+    ]
+
+
+def _name_causes(
+    columns: Sequence[str],
+    spectra: ImpactSpectra,
+    comparisons: Sequence[OutputComparison | None],
+    impact: int,
+) -> dict[int, str]:
+    """Name what is wrong with responses of an impact, as far as the spectra show it; others are not named yet."""
+    causes: dict[int, str] = {}
+    for output, comparison in enumerate(comparisons):
+        if not spectra.valid[impact, output]:
+            continue
+        if not follows_force(spectra, output):
+            causes[output] = "is dead: nothing in it follows the force"
+        elif comparison is not None and impact in comparison.reversed_sign:
+            causes[output] = f"{CONTRADICTS}: {OPPOSITE}"
+        elif comparison is not None and impact in comparison.contradicting:
+            causes[output] = UNNAMED
+    for pair in combinations([output for output, cause in causes.items() if not cause], 2):
+        if causes[pair[0]] == causes[pair[1]] == UNNAMED and _is_exchange(spectra, comparisons, impact, pair):
+            names = " and ".join(columns[output] for output in pair)
+            causes |= dict.fromkeys(pair, f"{CONTRADICTS}: {names} are exchanged")
+    return causes
+
+
+def _with_causes(record: RecordInfo, causes: Mapping[int, str], columns: Sequence[str]) -> RecordInfo:
+    """Add what contradicts: to the impact where all of its responses say the same, else to the channel."""
+    said = set(causes.values())
+    if len(said) == 1 and len(causes) > 1 and set(causes) == set(record.used_outputs):
+        (text,) = said
+        if text.startswith(CONTRADICTS):
+            text = text.replace(OPPOSITE, "all responses have the opposite sign, as if struck from the other side")
+            return replace(record, faults=(*record.faults, text))
+    faults = tuple(
+        (output, text if "exchanged" in text else f"{columns[output]} {text}") for output, text in causes.items()
+    )
+    return replace(record, channel_faults=(*record.channel_faults, *faults))
+
+
+def _is_exchange(
+    spectra: ImpactSpectra,
+    comparisons: Sequence[OutputComparison | None],
+    impact: int,
+    pair: tuple[int, int],
+) -> bool:
+    """Tell whether two responses of an impact are like those of the others when they change places."""
+    first, second = comparisons[pair[0]], comparisons[pair[1]]
+    if first is None or second is None:
+        return False
+    n_tried = spectra.responses.shape[1] ** 2
+    force = spectra.force[impact]
+    for comparison, own, other in ((first, *pair), (second, *pair[::-1])):
+        responses, noise = spectra.responses[impact], spectra.noise[impact]
+        misfit = comparison.misfit(force, responses[own], noise[own])
+        if not comparison.explains(misfit, comparison.misfit(force, responses[other], noise[other]), n_tried):
+            return False
+    return True
+
+
+def _explain(
+    survey: Survey,
+    spectra: ImpactSpectra,
+    comparison: OutputComparison,
+    place: tuple[int, int],
+    lost_samples: tuple[int, int, float],
+) -> str:
+    """Say by what one response of an impact contradicts those of the others."""
+    impact, output = place
+    force, response, noise = spectra.force[impact], spectra.responses[impact, output], spectra.noise[impact, output]
+    misfit = comparison.misfit(force, response, noise)
+    start, lost, share = lost_samples
+    if lost and comparison.explains(misfit, max(misfit * share, 1.0), 1):
+        what = f"{abs(lost)} samples {'are lost' if lost > 0 else 'came in'}"
+        return f"{what} {start * survey.step_s:.4g} s after its beginning"
+    expected = comparison.frf * force
+    weight = 1.0 / np.maximum(np.maximum(comparison.scatter, noise), np.finfo(float).tiny)
+    factor = complex(np.sum(weight * expected.conj() * response) / np.sum(weight * np.abs(expected) ** 2))
+    if abs(factor) and comparison.explains(misfit, comparison.misfit(force, response / factor, noise), 1):
+        return f"it is {abs(factor):.3g} times as large"
+    difference = np.abs(response - expected) / np.maximum(np.abs(expected), np.finfo(float).tiny)
+    usual = np.sqrt(comparison.scatter) / np.maximum(np.abs(expected), np.finfo(float).tiny)
+    return f"it is {100 * np.median(difference):.2g} % off (median), the others {100 * np.median(usual):.2g} %"
+
+
+def _find_lost(
+    files: RecordingFiles, survey: Survey, agreeing: Sequence[RecordInfo], record: RecordInfo, output: int
+) -> tuple[int, int, float]:
+    """Compare an impact's response with what the FRF of the others makes of its force."""
+    power, cross = np.zeros(survey.n_samples // 2 + 1), np.zeros(survey.n_samples // 2 + 1, complex)
+    for _, signals in _windowed(files, survey, agreeing):
+        force, response = np.fft.rfft(signals[[0, 1 + output]])
+        power += np.abs(force) ** 2
+        cross += force.conj() * response
+    ((_, signals),) = _windowed(files, survey, [record])
+    frf = np.divide(cross, power, out=np.zeros_like(cross), where=power > 0.0)
+    expected = np.fft.irfft(frf * np.fft.rfft(signals[0]), survey.n_samples)
+    n = record.n_samples
+    return find_lost_samples(signals[1 + output, :n], np.asarray(expected[:n]))
+
+
+def _warn_of_pair(files: RecordingFiles, records: Sequence[RecordInfo], spectra: ImpactSpectra) -> list[str]:
+    """Say where two impacts agree only with the opposite sign, or with two channels exchanged."""
+    columns = [channel.column for channel in files.test.output_channels]
+    shared = [output for output in range(len(columns)) if spectra.valid[:, output].all()]
+    opposite = [output for output in shared if contradicts_pairwise(spectra, output)]
+    names = " and ".join(record.name for record in records)
+    texts = []
+    if opposite:
+        texts.append(f"{' and '.join(columns[output] for output in opposite)} agree only with the opposite sign")
+    for first, second in combinations([output for output in shared if output not in opposite], 2):
+        exchanged = spectra.responses.copy()
+        exchanged[0, [first, second]] = -exchanged[0, [second, first]]
+        pair = replace(spectra, responses=exchanged)
+        if contradicts_pairwise(pair, first) and contradicts_pairwise(pair, second):
+            texts.append(f"{columns[first]} and {columns[second]} agree only when exchanged")
+    return [f"{names} contradict each other: {text}; which is right does not show in two" for text in texts]

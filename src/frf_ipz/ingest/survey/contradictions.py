@@ -1,0 +1,294 @@
+"""Impacts at one point that contradict the others: the majority decides, and what explains an impact names its fault.
+
+The impacts that agree best, more than half, give an FRF and its scatter v (a smooth part of the response's noise and
+one of the force's, as in `estimation.variance`). The others are tried in turn, nearest first: what the FRF leaves of
+one, over v or its own noise and what a decay may leave at its end, averages to D over the lines. The errors of an
+impact may be one number common to all lines (it was struck beside the point), so that D counts as one ratio of two
+complex numbers, one from the impact and c - 1 from the c impacts that agree: it is beyond x with the probability
+(1 + x / (c - 1))^(1 - c), an F distribution with 2 and 2 (c - 1) degrees of freedom. An impact with a probability above
+the level is added, and the next is tried.
+
+A reversed sensor explains an impact if the other sign makes D as small as that of the others: the ratio of the
+densities of D with and without must exceed the number of explanations over the level.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.ingest.estimation.variance import ROUNDING, noise_power
+
+CUT_OFF = 1e-3  # of a mode's amplitude at the end of a record that is worth no window
+LEVEL = 1e-3  # probability that a test without faults loses anything
+FEWEST = 3  # impacts of which one can be told from the majority
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ImpactSpectra:
+    """Transforms of all impacts at one point, on some lines.
+
+    Parameters
+    ----------
+    force : (n_impacts, n_lines) complex array
+        N.
+    responses : (n_impacts, n_outputs, n_lines) complex array
+        SI.
+    noise : (n_impacts, n_outputs, n_lines) array
+        Noise power of the responses as each impact shows it.
+    valid : (n_impacts, n_outputs) bool array
+        Which responses are measurements at all.
+    """
+
+    force: ComplexArray
+    responses: ComplexArray
+    noise: FloatArray
+    valid: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OutputComparison:
+    """One response of all impacts.
+
+    Parameters
+    ----------
+    agreeing : tuple of int
+        Impacts that agree, ascending.
+    contradicting : tuple of int
+        Those that contradict them.
+    reversed_sign : tuple of int
+        Of these, those that agree with the opposite sign.
+    frf : (n_lines,) complex array
+        Of those that agree.
+    scatter : (n_lines,) array
+        Unexplained power of one of them.
+    """
+
+    agreeing: tuple[int, ...]
+    contradicting: tuple[int, ...]
+    reversed_sign: tuple[int, ...]
+    frf: ComplexArray
+    scatter: FloatArray
+
+    def misfit(self, force: ComplexArray, response: ComplexArray, noise: FloatArray) -> float:
+        """Average what the FRF leaves of a response, over its expectation.
+
+        Parameters
+        ----------
+        force, response : (n_lines,) complex array
+            Of an impact that is not among those that agree.
+        noise : (n_lines,) array
+            Noise power of the response.
+
+        Returns
+        -------
+        float
+            D: 1 for an impact like those that agree.
+        """
+        power = np.abs(response - self.frf * force) ** 2
+        remainder = CUT_OFF**2 * np.max(np.abs(self.frf * force) ** 2)
+        expected = np.maximum(self.scatter, noise) + remainder
+        return float(np.mean(np.divide(power, expected, out=np.ones_like(power), where=expected > 0.0)))
+
+    def probability(self, misfit: float) -> float:
+        """Give the probability of a larger misfit of an impact without fault.
+
+        Parameters
+        ----------
+        misfit : float
+            D.
+
+        Returns
+        -------
+        float
+            Of the F distribution.
+        """
+        degrees = len(self.agreeing) - 1
+        return float((1.0 + misfit / degrees) ** -degrees)
+
+    def explains(self, misfit: float, explained: float, n_tried: int) -> bool:
+        """Tell whether an explanation makes a misfit so much likelier that it counts.
+
+        Parameters
+        ----------
+        misfit, explained : float
+            D without and with it.
+        n_tried : int
+            Explanations that are tried.
+
+        Returns
+        -------
+        bool
+            True where the ratio of the densities exceeds their number over the level, and the explanation fits.
+        """
+        degrees = len(self.agreeing) - 1
+        log_ratio = (degrees + 1) * (np.log1p(misfit / degrees) - np.log1p(explained / degrees))
+        return bool(log_ratio > np.log(n_tried / LEVEL)) and self.probability(explained) > LEVEL
+
+
+def compare_output(spectra: ImpactSpectra, output: int) -> OutputComparison | None:
+    """Compare one response of all impacts.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    OutputComparison or None
+        None where fewer than three impacts have it.
+    """
+    impacts = np.flatnonzero(spectra.valid[:, output])
+    if len(impacts) < FEWEST:
+        return None
+    level = LEVEL / spectra.valid.sum()
+    force, response, noise = spectra.force, spectra.responses[:, output], spectra.noise[:, output]
+    agreeing = _nearest_majority(spectra.force[impacts], response[impacts])
+    remaining = {int(impact) for place, impact in enumerate(impacts) if place not in agreeing}
+    agreeing = [int(impacts[place]) for place in agreeing]
+    reversed_sign: list[int] = []
+    while True:
+        reference = _agreement(force[agreeing], response[agreeing], agreeing)
+        misfits = {impact: reference.misfit(force[impact], response[impact], noise[impact]) for impact in remaining}
+        signs = {impact: reference.misfit(force[impact], -response[impact], noise[impact]) for impact in remaining}
+        reversed_sign = [
+            impact for impact in sorted(remaining) if reference.explains(misfits[impact], signs[impact], 1)
+        ]
+        others = [impact for impact in remaining if impact not in reversed_sign]
+        nearest = min(others, key=misfits.__getitem__, default=-1)
+        if nearest < 0 or reference.probability(misfits[nearest]) < level:
+            break
+        remaining.remove(nearest)
+        agreeing = sorted([*agreeing, nearest])
+    return OutputComparison(
+        agreeing=tuple(agreeing),
+        contradicting=tuple(sorted(remaining)),
+        reversed_sign=tuple(reversed_sign),
+        frf=reference.frf,
+        scatter=reference.scatter,
+    )
+
+
+def follows_force(spectra: ImpactSpectra, output: int) -> bool:
+    """Tell whether anything in a response follows the force.
+
+    Without that, ``(1 - n) ln(1 - coherence)`` of n impacts has an exponential distribution at each line. Chance puts
+    its mean over L lines beyond ``1 + x / sqrt(L)`` with the probability ``exp(-x^2 / 2)`` at most, for the many lines
+    of a record, and the largest beyond x with ``L exp(-x)``. What has more power than its own noise, such as motion
+    from before, is not asked.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    bool
+        False where both are within what chance gives at the level.
+    """
+    impacts = np.flatnonzero(spectra.valid[:, output])
+    noise = np.sqrt(spectra.noise[impacts, output])
+    stands_out = np.median(np.abs(spectra.responses[impacts, output]) ** 2, axis=1) > 2.0 * np.median(noise**2, axis=1)
+    if len(impacts) < FEWEST or not noise.all() or stands_out.any():
+        return True
+    force, response = spectra.force[impacts] / noise, spectra.responses[impacts, output] / noise
+    cross = np.abs(np.sum(force.conj() * response, axis=0)) ** 2
+    product = np.sum(np.abs(force) ** 2, axis=0) * np.sum(np.abs(response) ** 2, axis=0)
+    coherence = np.divide(cross, product, out=np.zeros_like(cross), where=product > 0.0)
+    statistic = (1 - len(impacts)) * np.log1p(-np.minimum(coherence, 1.0 - np.finfo(float).eps))
+    is_mean_high = np.mean(statistic) > 1.0 + np.sqrt(2.0 * np.log(1.0 / LEVEL) / len(statistic))
+    return bool(is_mean_high or np.max(statistic) > np.log(len(statistic) / LEVEL))
+
+
+def noise_scales(spectra: ImpactSpectra, comparison: OutputComparison, output: int) -> FloatArray:
+    """Estimate the noise power of each impact over the scatter of all.
+
+    What H1 leaves of impact k, whose share of the force's power is h_k, has the expectation
+    ``v (s_k (1 - 2 h_k) + h_k sum h_m s_m)``, which is linear in the relative powers s.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    comparison : OutputComparison
+        Which of them agree.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    (n_impacts,) array
+        s, not negative; 1 for those that do not agree.
+    """
+    scales = np.ones(len(spectra.force))
+    impacts = list(comparison.agreeing)
+    if len(impacts) < FEWEST:
+        return scales
+    force, response = spectra.force[impacts], spectra.responses[impacts, output]
+    power = np.abs(force) ** 2
+    total = power.sum(axis=0)
+    usable = (comparison.scatter > 0.0) & (total > 0.0)
+    if not usable.any():
+        return scales
+    shares = power[:, usable] / total[usable]
+    left = np.abs(response - comparison.frf * force)[:, usable] ** 2 / comparison.scatter[usable]
+    matrix = np.diag(1.0 - 2.0 * shares.mean(axis=1)) + shares @ shares.T / shares.shape[1]
+    scales[impacts] = np.maximum(np.linalg.lstsq(matrix, left.mean(axis=1), rcond=None)[0], 0.0)
+    return scales if scales[impacts].any() else np.ones(len(spectra.force))
+
+
+def contradicts_pairwise(spectra: ImpactSpectra, output: int) -> bool:
+    """Tell whether two impacts agree in one response only with the opposite sign.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        Two impacts.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    bool
+        True where the opposite sign leaves so little that the level is exceeded: one complex number against another.
+    """
+    (first_force, second_force), (first, second) = spectra.force, spectra.responses[:, output]
+    same = np.sum(np.abs(first * second_force - second * first_force) ** 2)
+    opposite = np.sum(np.abs(first * second_force + second * first_force) ** 2)
+    return bool(opposite < LEVEL * same)
+
+
+def _nearest_majority(force: ComplexArray, response: ComplexArray) -> list[int]:
+    """Find the impact and its nearest neighbours, more than half of all, that agree best."""
+    count = len(force)
+    size = count // 2 + 1
+    pairs = np.array([(first, second) for first in range(count) for second in range(first)])
+    difference = response[pairs[:, 0]] * force[pairs[:, 1]] - response[pairs[:, 1]] * force[pairs[:, 0]]
+    power = np.abs(force) ** 2
+    distance = np.abs(difference) ** 2 / np.maximum(power[pairs].sum(axis=1), np.finfo(float).tiny)
+    usual = np.median(distance, axis=0)
+    relative = np.divide(distance, usual, out=np.ones_like(distance), where=usual > 0.0).mean(axis=1)
+    table = np.zeros((count, count))
+    table[pairs[:, 0], pairs[:, 1]] = table[pairs[:, 1], pairs[:, 0]] = relative
+    nearest = np.argsort(table, axis=1)[:, :size]
+    best = int(np.argmin(np.take_along_axis(table, nearest, axis=1).sum(axis=1)))
+    return sorted(int(place) for place in nearest[best])
+
+
+def _agreement(force: ComplexArray, response: ComplexArray, impacts: list[int]) -> OutputComparison:
+    power = np.sum(np.abs(force) ** 2, axis=0)
+    frf = np.sum(force.conj() * response, axis=0) / np.maximum(power, np.finfo(float).tiny)
+    left = np.sum(np.abs(response - frf * force) ** 2, axis=0) / (len(force) - 1)
+    floor = ROUNDING * np.sum(np.abs(response) ** 2, axis=0).max(initial=0.0)
+    scatter = noise_power(np.maximum(left, floor), np.abs(frf) ** 2, len(force) - 1.0)
+    return OutputComparison(
+        agreeing=tuple(impacts), contradicting=(), reversed_sign=(), frf=np.asarray(frf), scatter=scatter
+    )

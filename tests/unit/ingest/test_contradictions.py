@@ -1,0 +1,229 @@
+"""One impact that contradicts the others is named by what it disagrees in; a bad channel costs that channel alone."""
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.options import IngestOptions
+from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
+
+STEP_S = 1 / 2048
+NOISE = 0.02
+HEIGHTS = (100.0, 60.0, 150.0, 80.0, 120.0)
+
+
+def estimate(folder, change, *, impacts=5, bad=(2,), seed=3, **options):
+    """Write impacts, of which some are changed, and estimate their FRFs."""
+    rng = np.random.default_rng(seed)
+    for number in range(impacts):
+        signals = impact(Structure(), noise=NOISE, rng=rng, height=HEIGHTS[number])
+        if number in bad:
+            signals = change(signals)
+        write_csv(folder / "hits" / f"hit_{number + 1}.csv", signals, STEP_S)
+    return estimate_frfs(read_test(write_test(folder, HIT)), options=IngestOptions(**options))
+
+
+def reverse_one(signals):
+    signals[1] *= -1
+    return signals
+
+
+def reverse_all(signals):
+    signals[1:] *= -1
+    return signals
+
+
+def exchange(signals):
+    return signals[[0, 2, 1]]
+
+
+def drop_out(signals):
+    signals[1:, 200:260] = 0.0
+    return signals
+
+
+def lose_samples(signals):
+    return np.delete(signals, slice(200, 230), axis=1)
+
+
+def kill(signals):
+    seed = int(1e6 * abs(signals[1, 0]))  # another one in each impact
+    signals[1] = NOISE * np.random.default_rng(seed).standard_normal(signals.shape[1])
+    return signals
+
+
+def flatten(signals):
+    signals[1] = 0.25
+    return signals
+
+
+def settle(signals):
+    signals[1] += 20.0 * np.exp(-np.arange(signals.shape[1]) * STEP_S / 0.5)
+    return signals
+
+
+def overload(signals):
+    limit = 0.5 * np.abs(signals[1]).max()
+    signals[1] = np.clip(signals[1], -limit, limit)
+    return signals
+
+
+def double(signals):
+    signals[1] *= 2.0
+    return signals
+
+
+def begin_late(signals, share=0.33):
+    start = int(np.argmax(signals[0] > share * signals[0].max()))
+    return signals[:, start:]
+
+
+def truth_error(result):
+    """Largest error over the largest value, of every FRF."""
+    band = result.frfs.in_band((20.0, 250.0))
+    rows = [label.output_dof.node - 1 for label in result.frfs.labels]
+    truth = Structure().accelerance(result.frfs.s[band])[:, rows]
+    return np.abs(result.frfs.values[band] - truth).max(axis=0) / np.abs(truth).max(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "mark"),
+    [
+        (reverse_all, "contradicts the other impacts: all responses have the opposite sign"),
+        (exchange, "contradicts the other impacts: acc_1 and acc_2 are exchanged"),
+        (drop_out, "dropout of acc_1: 60 samples of one value, 0.09766 s after its beginning"),
+        (lose_samples, "contradicts the other impacts: 30 samples are lost 0.0976"),
+    ],
+)
+@pytest.mark.parametrize("impacts", [4, 5])
+def test_an_impact_that_contradicts_is_named_and_left_out(tmp_path, change, mark, impacts):
+    result = estimate(tmp_path, change, impacts=impacts, exponential_window_s=0.2)
+    assert list(result.records.used) == [number != 2 for number in range(impacts)]
+    assert mark in result.records.marks[2]
+    assert any(text.startswith("hits/hit_3.csv is left out: ") and mark in text for text in result.warnings)
+    assert truth_error(result).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "mark"),
+    [
+        (reverse_one, "acc_1 contradicts the other impacts: its sign is the opposite"),
+        (double, "acc_1 contradicts the other impacts: it is 2 times as large"),
+        (kill, "acc_1 contradicts the other impacts"),
+        (flatten, "acc_1 is dead: all its samples are 0.25"),
+        (overload, "overload of acc_1"),
+        (settle, "acc_1 is settling"),
+    ],
+)
+def test_a_bad_channel_costs_that_channel_of_that_impact(tmp_path, change, mark):
+    result = estimate(tmp_path, change)
+    assert result.records.used.all()
+    assert mark in result.records.marks[2]
+    assert list(result.frfs.averages) == [4, 5]
+    assert any(text.startswith("1:+z is left out of hits/hit_3.csv: ") for text in result.warnings)
+    assert truth_error(result).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"), [(overload, "overload of acc_1"), (settle, "is settling"), (kill, "nothing in it follows")]
+)
+def test_a_channel_that_is_bad_in_all_impacts_has_no_frf(tmp_path, change, reason):
+    result = estimate(tmp_path, change, bad=range(5))
+    assert result.records.used.all()
+    assert [str(label.output_dof) for label in result.frfs.labels] == ["2:+z"]
+    assert list(result.frfs.averages) == [5]
+    assert any(
+        text.startswith("there is no FRF 1:+z / 7:+z: in all impacts") and reason in text for text in result.warnings
+    )
+
+
+def test_the_majority_decides(tmp_path):
+    result = estimate(tmp_path, reverse_all, bad=(0, 2))
+    assert list(result.records.used) == [False, True, False, True, True]
+    assert truth_error(result).max() < 0.01
+
+
+def test_of_two_impacts_none_is_right(tmp_path):
+    result = estimate(tmp_path, reverse_all, impacts=2, bad=(1,))
+    (text,) = result.warnings
+    assert text == (
+        "hits/hit_1.csv and hits/hit_2.csv contradict each other: acc_1 and acc_2 agree only with the opposite sign; "
+        "which is right does not show in two"
+    )
+    exchanged = estimate(tmp_path / "exchanged", exchange, impacts=2, bad=(1,))
+    assert "acc_1 and acc_2 agree only when exchanged" in exchanged.warnings[0]
+
+
+def test_the_user_keeps_what_contradicts(tmp_path):
+    result = estimate(tmp_path, reverse_one, keep=("hit_3.csv",))
+    assert list(result.frfs.averages) == [5, 5]
+    assert result.records.marks[2].endswith("kept by the user")
+
+
+@pytest.mark.parametrize("seed", range(20, 30))
+@pytest.mark.parametrize("impacts", [3, 5])
+def test_good_impacts_contradict_nothing(tmp_path, seed, impacts):
+    result = estimate(tmp_path, None, bad=(), seed=seed, impacts=impacts)
+    assert result.records.used.all()
+    assert not any("contradicts" in text or "dead" in text for text in result.records.marks)
+    assert set(result.frfs.averages) == {impacts}
+
+
+def test_a_late_record_is_left_out_beside_good_ones(tmp_path):
+    result = estimate(tmp_path, lambda signals: np.pad(begin_late(signals), ((0, 0), (0, 59)))[:, :4096])
+    assert not result.records.used[2]
+    assert "begins within the impact, at " in result.records.marks[2]
+
+
+def errors_over_std(change, *, force_noise, response_noise, length_s=0.8e-3, seeds=range(100, 106)):
+    """Root mean square of errors over their standard deviations, on lines that have one."""
+    squares = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        recordings = []
+        for number in range(5):
+            clean = change(impact(Structure(), height=30.0 * 2.0**number, length_s=length_s, at_s=0.06))
+            noise = np.array([[force_noise(number)], [response_noise(number)], [response_noise(number)]])
+            signals = clean + noise * rng.standard_normal(clean.shape)
+            recordings.append(
+                frf_ipz.Recording(
+                    force=signals[0],
+                    responses=signals[1:],
+                    sample_rate_hz=1 / STEP_S,
+                    input_dof="7:+z",
+                    output_dofs=["1:+z", "2:+z"],
+                )
+            )
+        frfs = frf_ipz.estimate_frfs(frf_ipz.VibrationTest.from_recordings(recordings)).frfs
+        band = frfs.in_band((10.0, 900.0))
+        error = np.abs(frfs.values[band] - Structure().accelerance(frfs.s[band])) ** 2 / frfs.variance[band]
+        squares.append(error[np.isfinite(error)])
+    return float(np.sqrt(np.concatenate(squares).mean()))
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {"force_noise": lambda _: 0.02, "response_noise": lambda _: 0.02},
+        {"force_noise": lambda number: 0.01 * 2.0**number, "response_noise": lambda number: 0.06 * 2.0**number},
+        {"force_noise": lambda _: 0.3, "response_noise": lambda _: 0.02, "length_s": 2.5e-3},
+    ],
+    ids=["alike", "grows with the level", "soft tip"],
+)
+def test_errors_are_as_large_as_stated(case):
+    assert 0.8 < errors_over_std(lambda signals: signals, **case) < 1.3
+
+
+@pytest.mark.parametrize("share", [0.05, 0.33, 0.7])
+def test_errors_of_late_records_are_stated(share):
+    """The missing part is taken from the falling flank: right to within a factor of two to three."""
+    ratio = errors_over_std(
+        lambda signals: begin_late(signals, share),
+        force_noise=lambda _: 0.02,
+        response_noise=lambda _: 0.02,
+        length_s=2e-3,
+        seeds=range(2),
+    )
+    assert 0.2 < ratio < 2.5
