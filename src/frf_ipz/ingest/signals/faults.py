@@ -56,9 +56,8 @@ def find_missing_force(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
     before, after = falling[below - 1], falling[below]
     crossing = below - 1 + (before - upward[0]) / (before - after) if before > after else float(below)
     samples = np.interp(np.arange(crossing + 1.0, length), np.arange(length), falling[:length])
-    if not (samples > floor).any():
-        return (0.0,)
-    return tuple(float(value) for value in np.sign(pulse.height) * samples[::-1])
+    missing = np.sign(pulse.height) * samples[samples > floor][::-1]
+    return tuple(float(value) for value in missing) or (0.0,)
 
 
 def find_dropout(signal: FloatArray) -> tuple[int, int]:

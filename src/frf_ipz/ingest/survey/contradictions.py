@@ -1,7 +1,7 @@
 """Impacts at one point that contradict the others: the majority decides, and what explains an impact names its fault.
 
 The impacts that agree best, more than half, give an FRF and its scatter v (a smooth part of the response's noise and
-one of the force's, as in `estimation.variance`). The others are tried in turn, nearest first: what the FRF leaves of
+one of the force's, as in `signals.scatter`). The others are tried in turn, nearest first: what the FRF leaves of
 one, over v or its own noise and what a decay may leave at its end, averages to D over the lines. The errors of an
 impact may be one number common to all lines (it was struck beside the point), so that D counts as one ratio of two
 complex numbers, one from the impact and c - 1 from the c impacts that agree: it is beyond x with the probability
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.ingest.estimation.variance import ROUNDING, noise_power
+from frf_ipz.ingest.signals.scatter import ROUNDING, fit_noise_power
 
 CUT_OFF = 1e-3  # of a mode's amplitude at the end of a record that is worth no window
 LEVEL = 1e-3  # probability that a test without faults loses anything
@@ -288,7 +288,7 @@ def _agreement(force: ComplexArray, response: ComplexArray, impacts: list[int]) 
     frf = np.sum(force.conj() * response, axis=0) / np.maximum(power, np.finfo(float).tiny)
     left = np.sum(np.abs(response - frf * force) ** 2, axis=0) / (len(force) - 1)
     floor = ROUNDING * np.sum(np.abs(response) ** 2, axis=0).max(initial=0.0)
-    scatter = noise_power(np.maximum(left, floor), np.abs(frf) ** 2, len(force) - 1.0)
+    scatter = fit_noise_power(np.maximum(left, floor), np.abs(frf) ** 2, len(force) - 1.0)
     return OutputComparison(
         agreeing=tuple(impacts), contradicting=(), reversed_sign=(), frf=np.asarray(frf), scatter=scatter
     )
