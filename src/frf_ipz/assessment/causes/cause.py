@@ -1,0 +1,118 @@
+"""One mistake that may have been made, as a change of the computed modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from frf_ipz.assessment.causes.modal_comparison import ComputedModes, MeasuredModes, log_likelihood
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.dofs import Dof
+    from frf_ipz.structure import StructuralModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Situation:
+    """What is known when a cause is looked for.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    computed : ComputedModes
+        Elastic modes of the FE model as the user handed it in.
+    model : StructuralModel
+        The FE model.
+    test_file, model_file : str
+        Names of the files that a mistake may stand in.
+    """
+
+    measured: MeasuredModes
+    computed: ComputedModes
+    model: StructuralModel
+    test_file: str
+    model_file: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cause:
+    """A mistake, and what the computed modes are once it is taken back.
+
+    Parameters
+    ----------
+    says : str
+        The mistake and what to write instead.
+    file, line_or_key : str
+        Where it stands.
+    frequency_factor : float
+        The right frequencies over the computed ones.
+    gain : complex or (n_frfs,) array
+        What the channels show over what the computed modes give.
+    power : int
+        The channels show this many derivatives more than they are said to.
+    moved_outputs, moved_inputs : mapping of Dof to Dof
+        Where sensors and excited DOFs of the labels really are; those that are not named are where they say.
+    computed : ComputedModes, optional
+        Modes of another model; those of the situation where it is left out.
+    log_prior : float
+        Log probability among the causes of its kind; 0 for the only one.
+    """
+
+    says: str
+    file: str
+    line_or_key: str
+    frequency_factor: float = 1.0
+    gain: complex | ComplexArray = 1.0
+    power: int = 0
+    moved_outputs: Mapping[Dof, Dof] = field(default_factory=dict)
+    moved_inputs: Mapping[Dof, Dof] = field(default_factory=dict)
+    computed: ComputedModes | None = None
+    log_prior: float = 0.0
+
+
+FindCauses: TypeAlias = Callable[[Situation], Iterable[Cause]]
+
+
+def log_evidence(cause: Cause, situation: Situation) -> float:
+    """Give the log likelihood of the measurement under a cause, with the cause's prior among its kind.
+
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    situation : Situation
+        Measurement and model.
+
+    Returns
+    -------
+    float
+        Natural logarithm.
+    """
+    frequency_hz, products = changed_modes(cause, situation)
+    return log_likelihood(situation.measured, frequency_hz, products) + cause.log_prior
+
+
+def changed_modes(cause: Cause, situation: Situation) -> tuple[np.ndarray, np.ndarray]:
+    """Give the computed modes as the measurement would show them under a cause.
+
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    situation : Situation
+        Measurement and model.
+
+    Returns
+    -------
+    pair of arrays
+        (n_modes,) frequencies, Hz, and (n_modes, n_frfs) complex products of shapes.
+    """
+    computed = cause.computed or situation.computed
+    frequency_hz = computed.frequency_hz * cause.frequency_factor
+    products = computed.products(situation.measured.labels, cause.moved_outputs, cause.moved_inputs)
+    return frequency_hz, products * cause.gain * (2j * np.pi * frequency_hz[:, None]) ** cause.power

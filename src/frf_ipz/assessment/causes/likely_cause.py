@@ -1,0 +1,79 @@
+"""The mistake that most likely explains a mismatch of measured and computed modes.
+
+Every kind of mistake, that there is none, and that it is something else have the same probability beforehand, which the
+causes of a kind share. A new kind is one more function in `KINDS`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from frf_ipz.assessment.assessment import LikelyCause
+from frf_ipz.assessment.causes import gains, materials, places, supports
+from frf_ipz.assessment.causes.cause import Cause, Situation, log_evidence
+from frf_ipz.assessment.causes.modal_comparison import unrelated_log_likelihood
+
+if TYPE_CHECKING:
+    from frf_ipz.assessment.causes.cause import FindCauses
+
+KINDS: tuple[FindCauses, ...] = (
+    gains.of_all_outputs,
+    gains.of_the_force,
+    gains.of_one_output,
+    gains.of_signs,
+    gains.of_derivatives,
+    places.exchanged_sensors,
+    places.exchanged_inputs,
+    places.misplaced_sensor,
+    places.mirrored,
+    materials.wrong_units,
+    materials.wrong_values,
+    materials.time_unit,
+    supports.other_supports,
+)
+MORE_LIKELY_THAN_NOT = 0.5
+
+
+def find_likely_cause(situation: Situation) -> LikelyCause | None:
+    """Say what most likely has to be corrected.
+
+    Parameters
+    ----------
+    situation : Situation
+        Measurement and model.
+
+    Returns
+    -------
+    LikelyCause or None
+        None where no mistake is more likely than not.
+    """
+    if not len(situation.measured.frequency_hz) or not len(situation.computed.frequency_hz):
+        return None
+    causes = [cause for kind in KINDS for cause in kind(situation)]
+    nothing = log_evidence(Cause(says="", file="", line_or_key=""), situation)
+    something_else = unrelated_log_likelihood(situation.measured, situation.computed)
+    logs = np.array([nothing, something_else, *(log_evidence(cause, situation) for cause in causes)])
+    probability = np.exp(logs - logsumexp(logs))
+    if probability[2:].sum() <= MORE_LIKELY_THAN_NOT:
+        return None
+    return _worded(causes, probability[2:])
+
+
+def _worded(causes: list[Cause], probability: np.ndarray) -> LikelyCause:
+    """Put the best cause into words, with the others that are nearly as likely and stand elsewhere."""
+    order = np.argsort(-probability)
+    best = causes[order[0]]
+    alike = [
+        causes[place]
+        for place in order[1:]
+        if probability[place] > probability[order[0]] / np.e and causes[place].line_or_key != best.line_or_key
+    ]
+    keys = dict.fromkeys(cause.line_or_key for cause in (best, *alike))
+    total = sum(probability[place] for place, cause in enumerate(causes) if cause.line_or_key in keys)
+    says = best.says + "".join(f"; or {cause.says}" for cause in alike)
+    return LikelyCause(
+        says=says, file=best.file, line_or_key="; or ".join(keys), probability=float(min(total, 1.0))
+    )

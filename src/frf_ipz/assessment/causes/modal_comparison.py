@@ -1,0 +1,225 @@
+"""Measured and computed modes in one form, so that a mistake of the user's is a change of the computed ones.
+
+The residue of a receptance at a normal mode is ``phi_output phi_input / (2 i omega_d)``, sec. 2.6 of [Ewins2000]: what
+is compared is the product of the two, which needs no scale and no sign of a shape.
+
+[Ewins2000] D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed., Research Studies Press, 2000.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfLabel
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.modes import ModeSet
+
+# How far a model is off that is nearly right: what lies beyond is worth a cause.
+FREQUENCY_SCALE = 0.03  # of a frequency, relative: 6 % of a stiffness, the scatter of moduli and thicknesses
+SHAPE_SCALE = 0.2  # of a product of shapes, relative: what an unmodelled mass or joint of that size does
+FAR = 10.0  # frequency scales: a mode further from every computed one has no counterpart, be it false or missing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredModes:
+    """What the fit says of each mode.
+
+    Parameters
+    ----------
+    frequency_hz : (n_modes,) array
+        Natural frequencies, Hz.
+    products : (n_modes, n_frfs) complex array
+        ``phi_output phi_input``, 1/kg, with the signs of the labels taken out.
+    deviations : (n_modes, n_frfs) array
+        Their standard deviations.
+    labels : tuple of FrfLabel
+        What each FRF connects.
+    """
+
+    frequency_hz: FloatArray
+    products: ComplexArray
+    deviations: FloatArray
+    labels: tuple[FrfLabel, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ComputedModes:
+    """Elastic modes of the FE model at the measured DOFs.
+
+    Parameters
+    ----------
+    frequency_hz : (n_modes,) array
+        Natural frequencies, Hz.
+    shapes : mapping of Dof to (n_modes,) array
+        Mass-normalised, by unsigned DOF.
+    """
+
+    frequency_hz: FloatArray
+    shapes: Mapping[Dof, FloatArray]
+
+    def products(
+        self, labels: tuple[FrfLabel, ...], moved_outputs: Mapping[Dof, Dof], moved_inputs: Mapping[Dof, Dof]
+    ) -> FloatArray:
+        """Give ``phi_output phi_input`` of each mode and FRF.
+
+        Parameters
+        ----------
+        labels : tuple of FrfLabel
+            What each FRF connects.
+        moved_outputs, moved_inputs : mapping of Dof to Dof
+            Where a DOF of the labels really is; those that are not named are where they say.
+
+        Returns
+        -------
+        (n_modes, n_frfs) array
+            1/kg.
+        """
+        outputs = [label.output_dof.unsigned for label in labels]
+        inputs = [label.input_dof.unsigned for label in labels]
+        at_outputs = np.stack([self.shapes[moved_outputs.get(dof, dof)] for dof in outputs], 1)
+        at_inputs = np.stack([self.shapes[moved_inputs.get(dof, dof)] for dof in inputs], 1)
+        return at_outputs * at_inputs
+
+
+def measured_modes(fit: ModalFit) -> MeasuredModes:
+    """Take the modes out of a fit.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    MeasuredModes
+        Of the band.
+    """
+    poles = fit.model.poles[: fit.n_modes]
+    powers = np.array([label.quantity.power for label in fit.labels])
+    signs = np.array([label.sign for label in fit.labels])
+    delays = np.exp(-poles[:, None] * fit.model.delay_s)
+    to_products = signs * 2j * poles.imag[:, None] * delays / poles[:, None] ** powers
+    deviations = np.sqrt(np.maximum(np.trace(fit.residue_covariance, axis1=2, axis2=3), 0.0))
+    return MeasuredModes(
+        frequency_hz=np.abs(poles) / (2 * np.pi),
+        products=fit.model.residues[: fit.n_modes] * to_products,
+        deviations=deviations * np.abs(to_products),
+        labels=fit.labels,
+    )
+
+
+def computed_modes(modes: ModeSet) -> ComputedModes:
+    """Take the elastic modes out of a set.
+
+    Parameters
+    ----------
+    modes : ModeSet
+        Of the FE model, mass-normalised.
+
+    Returns
+    -------
+    ComputedModes
+        Without the rigid-body modes.
+    """
+    elastic = modes.natural_frequency_hz > 0
+    return ComputedModes(
+        frequency_hz=modes.natural_frequency_hz[elastic],
+        shapes={dof: row[elastic].real for dof, row in zip(modes.dofs, modes.shapes, strict=True)},
+    )
+
+
+def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> float:
+    """Give the log likelihood of the measured modes, where the model is nearly right but for what was changed in it.
+
+    Every measured mode is assigned a computed one. Errors of frequencies and of products of shapes are drawn from
+    Cauchy's distribution, so that one mode or one FRF that is off for reasons of its own does not decide.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    frequency_hz : (n_computed,) array
+        Of the changed model.
+    products : (n_computed, n_frfs) array
+        Of the changed model, as its channels would have measured them.
+
+    Returns
+    -------
+    float
+        Natural logarithm; 0 where all agrees.
+    """
+    costs = _costs(measured, frequency_hz, products)
+    most = _cost_of_no_counterpart(products.shape[1])
+    rows, columns = _assign(costs, most)
+    return float(-costs[rows, columns].sum() - (len(costs) - len(rows)) * most)
+
+
+def assign(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> tuple[IntArray, IntArray]:
+    """Assign a computed mode to each measured one.
+
+    Parameters
+    ----------
+    measured, frequency_hz, products
+        As for `log_likelihood`.
+
+    Returns
+    -------
+    pair of (n,) int array
+        Measured modes and their computed ones.
+    """
+    return _assign(_costs(measured, frequency_hz, products), _cost_of_no_counterpart(products.shape[1]))
+
+
+def _assign(costs: FloatArray, most: float) -> tuple[IntArray, IntArray]:
+    """Assign one to one; a measured mode that finds no computed one for less than `most` stays alone."""
+    alone = np.full((len(costs), len(costs)), most)
+    rows, columns = linear_sum_assignment(np.hstack([costs, alone]))
+    assigned = columns < costs.shape[1]
+    return rows[assigned], columns[assigned]
+
+
+def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
+    """Costs of assigning each measured mode (rows) to each computed one (columns)."""
+    ratios = np.log(measured.frequency_hz[:, None] / frequency_hz)
+    first, second = measured.products[:, None, :], products[None]
+    sizes = np.sqrt((np.abs(first) ** 2 + np.abs(second) ** 2) / 2)
+    floor = np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=1))[:, None, None]
+    noise = measured.deviations[:, None, :]
+    scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + noise**2)
+    errors = np.abs(first - second) / np.maximum(scales, np.finfo(float).tiny)
+    return np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2)
+
+
+def _cost_of_no_counterpart(n_frfs: int) -> float:
+    """Cost of a measured mode that is alone: far in frequency, and products of shapes off by their own size."""
+    return float(np.log1p(FAR**2) + n_frfs * np.log1p(1 / SHAPE_SCALE**2))
+
+
+def unrelated_log_likelihood(measured: MeasuredModes, computed: ComputedModes) -> float:
+    """Give the log likelihood where something else is wrong: any computed mode fits as well as the typical one.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    computed : ComputedModes
+        Of the model as it was handed in.
+
+    Returns
+    -------
+    float
+        Natural logarithm.
+    """
+    costs = _costs(measured, computed.frequency_hz, computed.products(measured.labels, {}, {}).astype(complex))
+    most = _cost_of_no_counterpart(len(measured.labels))
+    return float(-np.minimum(np.median(costs, axis=1), most).sum())

@@ -1,0 +1,1 @@
+"""Mistakes that users make with a sound campaign: in a unit, a sign, a place, a file or the model."""
