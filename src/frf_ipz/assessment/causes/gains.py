@@ -33,8 +33,8 @@ OF_FORCE = {
     1 / STANDARD_GRAVITY: "is in kgf, and is read as N: write unit = 'kgf'",
 }
 DERIVATIVES = {
-    1: "shows one derivative more than its quantity says (an acceleration is called velocity, or a velocity displacement)",
-    -1: "shows one derivative less than its quantity says (a velocity is called acceleration, or a displacement velocity)",
+    1: "shows one derivative more than its quantity says (an acceleration called velocity, or a velocity displacement)",
+    -1: "shows one derivative less than its quantity says (a velocity called acceleration, or a displacement velocity)",
     2: "is an acceleration, and is called displacement",
     -2: "is a displacement, and is called acceleration",
 }
@@ -149,7 +149,7 @@ def of_derivatives(situation: Situation) -> Iterator[Cause]:
         yield _test_cause(situation, f"every response {text}", key, power=power, log_prior=prior)
 
 
-def _test_cause(  # noqa: PLR0913  the parts of a cause
+def _test_cause(
     situation: Situation,
     says: str,
     key: str,

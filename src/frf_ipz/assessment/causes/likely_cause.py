@@ -74,6 +74,4 @@ def _worded(causes: list[Cause], probability: np.ndarray) -> LikelyCause:
     keys = dict.fromkeys(cause.line_or_key for cause in (best, *alike))
     total = sum(probability[place] for place, cause in enumerate(causes) if cause.line_or_key in keys)
     says = best.says + "".join(f"; or {cause.says}" for cause in alike)
-    return LikelyCause(
-        says=says, file=best.file, line_or_key="; or ".join(keys), probability=float(min(total, 1.0))
-    )
+    return LikelyCause(says=says, file=best.file, line_or_key="; or ".join(keys), probability=float(min(total, 1.0)))

@@ -57,16 +57,36 @@ METRE = ((1e-3, "mm"), (1e-2, "cm"), (0.0254, "inches"))
 DENSITY = ((1e3, "g/cm^3"), (1e12, "t/mm^3"))
 NUMBERS = {
     "beam": (
-        Number(
-            key="[beam] youngs_modulus_Pa", what="Young's modulus", stiffness_power=1, mass_power=0, units=PASCAL
-        ),
+        Number(key="[beam] youngs_modulus_Pa", what="Young's modulus", stiffness_power=1, mass_power=0, units=PASCAL),
         Number(key="[beam] density_kg_m3", what="the density", stiffness_power=0, mass_power=1, units=DENSITY),
-        Number(key="[beam] thickness_m", what="the thickness", dimensions=("thickness_m",), stiffness_power=3, mass_power=1, units=METRE),
-        Number(key="[beam] width_m", what="the width", dimensions=("width_m",), stiffness_power=1, mass_power=1, units=METRE),
-        Number(key="[beam] length_m", what="the length", dimensions=("length_m",), stiffness_power=-3, mass_power=1, units=METRE),
+        Number(
+            key="[beam] thickness_m",
+            what="the thickness",
+            dimensions=("thickness_m",),
+            stiffness_power=3,
+            mass_power=1,
+            units=METRE,
+        ),
+        Number(
+            key="[beam] width_m",
+            what="the width",
+            dimensions=("width_m",),
+            stiffness_power=1,
+            mass_power=1,
+            units=METRE,
+        ),
+        Number(
+            key="[beam] length_m",
+            what="the length",
+            dimensions=("length_m",),
+            stiffness_power=-3,
+            mass_power=1,
+            units=METRE,
+        ),
         Number(
             key="[beam] length_m, width_m, thickness_m",
-            what="all dimensions", dimensions=("length_m", "width_m", "thickness_m"),
+            what="all dimensions",
+            dimensions=("length_m", "width_m", "thickness_m"),
             stiffness_power=1,
             mass_power=3,
             units=METRE,

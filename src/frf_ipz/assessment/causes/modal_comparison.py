@@ -197,7 +197,7 @@ def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexA
     noise = measured.deviations[:, None, :]
     scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + noise**2)
     errors = np.abs(first - second) / np.maximum(scales, np.finfo(float).tiny)
-    return np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2)
+    return np.asarray(np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2))
 
 
 def _cost_of_no_counterpart(n_frfs: int) -> float:

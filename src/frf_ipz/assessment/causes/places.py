@@ -121,7 +121,7 @@ def mirrored(situation: Situation) -> Iterator[Cause]:
             yield _moved(situation, says, key, moved, moved, 3)
 
 
-def _moved(  # noqa: PLR0913  the parts of a cause
+def _moved(
     situation: Situation, says: str, key: str, outputs: Mapping[Dof, Dof], inputs: Mapping[Dof, Dof], count: int
 ) -> Cause:
     return Cause(

@@ -60,7 +60,6 @@ def other_supports(situation: Situation) -> Iterator[Cause]:
 
 
 def _with_end(model: StructuralModel, node: int, held: tuple[str, ...]) -> StructuralModel:
-    fixed = np.array(
-        [dof.direction in held if dof.node == node else bool(old) for dof, old in zip(model.all_dofs, model.fixed, strict=True)]
-    )
-    return replace(model, fixed=fixed)
+    rows = zip(model.all_dofs, model.fixed, strict=True)
+    fixed = [dof.direction in held if dof.node == node else bool(is_held) for dof, is_held in rows]
+    return replace(model, fixed=np.array(fixed))

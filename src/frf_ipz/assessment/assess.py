@@ -1,0 +1,85 @@
+"""The assessment of a run: every check, and the likely cause of a mismatch.
+
+Sits after prediction and diagnosis, before export and report. A new check is one more function in `CHECKS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, TypeAlias
+
+from frf_ipz.assessment.assessment import Assessment, Check
+from frf_ipz.assessment.causes.cause import Situation
+from frf_ipz.assessment.causes.likely_cause import find_likely_cause
+from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
+from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
+from frf_ipz.errors import NumericalError
+from frf_ipz.fe.eigen import solve_modes
+
+if TYPE_CHECKING:
+    from frf_ipz.assessment.assessment import LikelyCause
+    from frf_ipz.assessment.evidence import Evidence
+
+Ask: TypeAlias = "Callable[[Evidence], Iterator[Check]]"
+CHECKS: tuple[Ask, ...] = (
+    quality.targets,
+    agreement.amplitude,
+    agreement.phase,
+    agreement.improvement,
+    agreement.own_band,
+    counterparts.modes,
+    counterparts.zeros,
+    prediction.reference,
+    prediction.band_width,
+    quality.parameters,
+    quality.fit,
+    quality.scale,
+    quality.diagnosis,
+)
+MODES_BEYOND = 12  # of the model, besides twice the measured ones: a model that is too soft has more in the band
+
+
+def assess(evidence: Evidence) -> Assessment:
+    """Say whether the result of a run can be used.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The results of the run.
+
+    Returns
+    -------
+    Assessment
+        Verdict, checks and likely cause.
+    """
+    checks = [check for ask in CHECKS for check in ask(evidence)]
+    return Assessment.of_checks(checks, likely_cause(evidence))
+
+
+def likely_cause(evidence: Evidence) -> LikelyCause | None:
+    """Look for a mistake that explains how measured and computed modes differ.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The results of the run.
+
+    Returns
+    -------
+    LikelyCause or None
+        None where no mistake is more likely than not.
+    """
+    model = evidence.fe_model
+    n_modes = min(2 * evidence.fit.n_modes + MODES_BEYOND, len(model.dofs))
+    try:
+        modes = solve_modes(model, n_modes=n_modes)
+    except NumericalError:
+        return None
+    situation = Situation(
+        measured=measured_modes(evidence.fit),
+        computed=computed_modes(modes),
+        model=model,
+        test_file=evidence.test_file,
+        model_file=evidence.model_file,
+    )
+    return find_likely_cause(situation)

@@ -1,0 +1,196 @@
+"""The updated model against every measured FRF: amplitude, phase, better than before, inside its own band.
+
+Limits are those of the controller that the model is for: a loop is designed with a gain margin of 6 dB and a phase
+margin of 45 degrees or more ([Skogestad2005], sec. 2.4.3). A model that spends half of either is no use, one that
+spends a sixth takes care.
+
+[Skogestad2005] S. Skogestad, I. Postlethwaite, Multivariable Feedback Control, 2nd ed., Wiley, 2005.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.assessment.assessment import Check, Verdict
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.assessment.evidence import Evidence
+
+GAIN_MARGIN_DB, PHASE_MARGIN_DEG = 6.0, 45.0
+HALF, SIXTH = 1 / 2, 1 / 6
+NORMAL_90 = 1.645  # standard deviations that hold 90 % of a normal distribution
+INSIDE = 0.75  # of the lines: of a 90 % band, a quarter outside is no chance
+MOSTLY_OUTSIDE = 0.25
+
+
+def amplitude(evidence: Evidence) -> Iterator[Check]:
+    """Compare the amplitudes.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where anything was measured above its noise.
+    """
+    after, worst = _worst(_decibels(evidence, evidence.updated))
+    if worst < 0:
+        return
+    before = float(np.nanmedian(_decibels(evidence, evidence.nominal)[:, worst]))
+    where = str(evidence.frfs.labels[worst])
+    relative = " (a gain of each FRF is fitted: the scale is unknown)" if evidence.is_relative else ""
+    yield Check(
+        name="amplitude at the measured points",
+        verdict=judge(after, SIXTH * GAIN_MARGIN_DB, HALF * GAIN_MARGIN_DB),
+        figure=after,
+        limit=SIXTH * GAIN_MARGIN_DB,
+        unit="dB",
+        where=where,
+        says=f"the updated model is {after:.2g} dB off the measured FRF {where} in the median, before {before:.2g} dB"
+        f"{relative}; half of a gain margin of {GAIN_MARGIN_DB:g} dB is the most that a controller can bear",
+        advice="" if after <= SIXTH * GAIN_MARGIN_DB else "compare model and measurement there; see the likely cause",
+    )
+
+
+def phase(evidence: Evidence) -> Iterator[Check]:
+    """Compare the phases, the sign among them.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where anything was measured above its noise.
+    """
+    with np.errstate(invalid="ignore"):  # an FRF may be 0
+        angle = np.degrees(np.abs(np.angle(evidence.updated / evidence.measured)))
+    after, worst = _worst(np.where(evidence.is_heard, angle, np.nan))
+    if worst < 0:
+        return
+    where = str(evidence.frfs.labels[worst])
+    is_reversed = after > 180 * HALF
+    says = f"the updated model is {after:.2g} degrees off the measured FRF {where} in the median"
+    yield Check(
+        name="phase at the measured points",
+        verdict=judge(after, SIXTH * PHASE_MARGIN_DEG, HALF * PHASE_MARGIN_DEG),
+        figure=after,
+        limit=SIXTH * PHASE_MARGIN_DEG,
+        unit="deg",
+        where=where,
+        says=says + (": its sign is reversed" if is_reversed else ""),
+        advice=f"turn the sign of the sensor's or the input's dof of {where}" if is_reversed else "",
+    )
+
+
+def improvement(evidence: Evidence) -> Iterator[Check]:
+    """Ask whether updating has made the model better where it was measured.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where anything was measured above its noise.
+    """
+    after, before = (
+        float(np.nanmedian(_decibels(evidence, values))) if evidence.is_heard.any() else float("nan")
+        for values in (evidence.updated, evidence.nominal)
+    )
+    if not np.isfinite(after):
+        return
+    noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[evidence.is_heard])))
+    is_worse = after > before + noise
+    says = f"over all measured FRFs the model was {before:.2g} dB off in the median and is {after:.2g} dB off"
+    yield Check(
+        name="better than before",
+        verdict=Verdict.WITH_CARE if is_worse else Verdict.USABLE,
+        figure=after,
+        limit=before,
+        unit="dB",
+        says=says + (": updating has made it worse" if is_worse else ""),
+        advice="look at the pairs, and for what the model leaves out: frf-ipz diagnose" if is_worse else "",
+    )
+
+
+def own_band(evidence: Evidence) -> Iterator[Check]:
+    """Ask whether the band that the prediction has at the points of interest holds where it can be looked at.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where the method of updating gives a band.
+    """
+    low, high = evidence.band
+    if not np.isfinite(low).any():
+        return
+    reach = NORMAL_90 * evidence.noise / np.sqrt(2)  # half of the variance lies along the value
+    magnitude = np.abs(evidence.measured)
+    inside = (magnitude >= low - reach) & (magnitude <= high + reach)
+    share = float(np.mean(inside[evidence.is_heard])) if evidence.is_heard.any() else float("nan")
+    if not np.isfinite(share):
+        return
+    worst = int(np.argmin(np.mean(inside, axis=0)))
+    narrow = share < INSIDE
+    says = f"the 90 % band of the updated model holds {share:.0%} of the lines of the FRFs that were measured"
+    yield Check(
+        name="measured FRFs in the band",
+        verdict=judge(1 - share, 1 - INSIDE, 1 - MOSTLY_OUTSIDE),
+        figure=share,
+        limit=INSIDE,
+        unit="1",
+        where=str(evidence.frfs.labels[worst]),
+        says=says + (", so at the points of interest it is too narrow too" if narrow else ""),
+        advice="something is missing in the model: frf-ipz diagnose" if narrow else "",
+    )
+
+
+def _decibels(evidence: Evidence, values: ComplexArray) -> FloatArray:
+    """(n_lines, n_frfs) differences of magnitudes, dB; NaN where an FRF does not stand above its noise."""
+    with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0
+        difference = np.abs(20 * np.log10(np.abs(values) / np.abs(evidence.measured)))
+    return np.where(evidence.is_heard, difference, np.nan)
+
+
+def _worst(values: FloatArray) -> tuple[float, int]:
+    """Give the largest median of the columns and its place; -1 where no column has a value."""
+    columns = np.flatnonzero(np.isfinite(values).any(axis=0))
+    if not len(columns):
+        return float("nan"), -1
+    medians = np.nanmedian(values[:, columns], axis=0)
+    return float(medians.max()), int(columns[np.argmax(medians)])
+
+
+def judge(figure: float, care: float, no_use: float) -> Verdict:
+    """Set a figure against two limits.
+
+    Parameters
+    ----------
+    figure, care, no_use : float
+        The figure; from where on it takes care; from where on the result is no use.
+
+    Returns
+    -------
+    Verdict
+        What follows.
+    """
+    if figure > no_use:
+        return Verdict.NOT_USABLE
+    return Verdict.WITH_CARE if figure > care else Verdict.USABLE

@@ -1,0 +1,86 @@
+"""Measured modes and zeros that the model has, with the likeness of their shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.assessment.assessment import Check, Verdict
+from frf_ipz.pairing.pairs import PairVerdict
+
+if TYPE_CHECKING:
+    from frf_ipz.assessment.evidence import Evidence
+
+MOST_MISSING = 0.5  # of the measured modes: the model is one of another machine
+
+
+def modes(evidence: Evidence) -> Iterator[Check]:
+    """Count the measured modes that the model lacks.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where modes were measured.
+    """
+    rows = [row for row in evidence.pairs.rows if row.kind == "pole" and row.measured >= 0]
+    if not rows:
+        return
+    missing = [row for row in rows if row.verdict is PairVerdict.MISSING_IN_MODEL]
+    share = 1 - len(missing) / len(rows)
+    verdict = Verdict.USABLE
+    if missing:
+        verdict = Verdict.NOT_USABLE if 1 - share > MOST_MISSING else Verdict.WITH_CARE
+    where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in missing)
+    says = f"{len(rows) - len(missing)} of {len(rows)} measured modes have a counterpart in the model"
+    yield Check(
+        name="modes with a counterpart",
+        verdict=verdict,
+        figure=share,
+        limit=1.0,
+        unit="1",
+        where=f"{where} Hz" if missing else "",
+        says=says + (f"; without one: {where} Hz" if missing else ""),
+        advice="look for what the model leaves out, or whether such a mode is false" if missing else "",
+    )
+
+
+def zeros(evidence: Evidence) -> Iterator[Check]:
+    """Count the identified zeros that the model lacks.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where zeros were identified.
+    """
+    rows = [
+        row
+        for row in evidence.pairs.rows
+        if row.kind == "zero" and row.measured >= 0 and evidence.fit.zeros.identifiable[row.measured]
+    ]
+    if not rows:
+        return
+    missing = [row for row in rows if row.verdict is PairVerdict.MISSING_IN_MODEL]
+    share = 1 - len(missing) / len(rows)
+    many = 1 - share > MOST_MISSING
+    yield Check(
+        name="zeros with a counterpart",
+        verdict=Verdict.WITH_CARE if many else Verdict.USABLE,
+        figure=share,
+        limit=1 - MOST_MISSING,
+        unit="1",
+        where=str(evidence.pairs.labels[missing[0].frf]) if missing else "",
+        says=f"{len(rows) - len(missing)} of {len(rows)} identified zeros have a counterpart in the model",
+        advice="zeros depend on where sensors and excitation are: check the dofs of the test" if many else "",
+    )

@@ -1,0 +1,154 @@
+"""What a prediction rests on: the fit, the size of the changes, the scale, and whether causes were looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.assessment.assessment import Check, Verdict
+
+if TYPE_CHECKING:
+    from frf_ipz.assessment.evidence import Evidence
+
+WORST_MISFIT = 10.0  # times the noise: stated deviations of poles and zeros then mean nothing
+PLAUSIBLE_RATIO = 2.0  # of a stiffness: no tolerance of a material or a joint doubles or halves it
+
+
+def fit(evidence: Evidence) -> Iterator[Check]:
+    """Ask how well the fitted model reproduces the measured FRFs.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where the misfit is known.
+    """
+    misfit = evidence.fit.misfit
+    if "ratio" not in misfit or not np.isfinite(misfit["ratio"]).any():
+        return
+    row = misfit.iloc[int(np.nanargmax(misfit["ratio"].to_numpy(float)))]
+    ratio, where = float(row["ratio"]), f"{row['output_dof']} / {row['input_dof']}"
+    too_much = ratio > WORST_MISFIT
+    yield Check(
+        name="misfit of the fit",
+        verdict=Verdict.WITH_CARE if too_much else Verdict.USABLE,
+        figure=ratio,
+        limit=WORST_MISFIT,
+        unit="noise",
+        where=where,
+        says=f"the fit leaves {ratio:.2g} times the noise of {where}; 1 is all that the measurement can tell",
+        advice="narrow [fit] band_hz, or look at the recordings of that FRF" if too_much else "",
+    )
+
+
+def parameters(evidence: Evidence) -> Iterator[Check]:
+    """Ask whether the update had to change parts of the model beyond what is plausible.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where parts were changed.
+    """
+    parts = evidence.updated_model.parts
+    if not len(parts):
+        return
+    ratios = parts["stiffness_ratio"].to_numpy(float)
+    extent = np.maximum(ratios, 1 / np.maximum(ratios, np.finfo(float).tiny))
+    worst = int(np.argmax(extent))
+    where = f"{parts['kind'].iloc[worst]} {parts['name'].iloc[worst]}"
+    too_much = bool(extent[worst] > PLAUSIBLE_RATIO)
+    yield Check(
+        name="changes of the model",
+        verdict=Verdict.WITH_CARE if too_much else Verdict.USABLE,
+        figure=float(extent[worst]),
+        limit=PLAUSIBLE_RATIO,
+        unit="1",
+        where=where,
+        says=f"the largest change of a stiffness is to {ratios[worst]:.3g} times its value, of {where}",
+        advice="no tolerance explains that: look for what the model leaves out" if too_much else "",
+    )
+
+
+def targets(evidence: Evidence) -> Iterator[Check]:
+    """Say where nothing could be updated.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where there was no target.
+    """
+    if not len(evidence.updated_model.after):
+        yield Check(
+            name="targets of the update",
+            verdict=Verdict.NOT_USABLE,
+            figure=0.0,
+            limit=1.0,
+            unit="1",
+            says="no measured pole or zero has a counterpart in the model, so the model is left as it was",
+            advice="check units, materials, supports and node numbers of the FE model",
+        )
+
+
+def scale(evidence: Evidence) -> Iterator[Check]:
+    """Say where predictions are relative, because the scale of the measurement is not known.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where the scale is unknown.
+    """
+    if evidence.is_relative:
+        yield Check(
+            name="scale",
+            verdict=Verdict.WITH_CARE,
+            says="the scale of the measurement is unknown: amplitudes at the points of interest are those of the model",
+            advice="calibrate the test, or use the prediction's shape only",
+        )
+
+
+def diagnosis(evidence: Evidence) -> Iterator[Check]:
+    """Say what a diagnosis found, or that none was made.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One.
+    """
+    found = evidence.diagnosis
+    if found is None:
+        says, verdict, advice = "not looked for", Verdict.USABLE, "frf-ipz diagnose looks for what the model leaves out"
+    elif found.verdict == "unexplained":
+        says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
+        advice = "see the section on the diagnosis"
+    elif found.verdict == "explained":
+        says, verdict = "what is missing in the model was found", Verdict.USABLE
+        advice = "put it into the model, or set [diagnose] apply = true"
+    else:
+        says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""
+    yield Check(name="diagnosis", verdict=verdict, says=says, advice=advice)
