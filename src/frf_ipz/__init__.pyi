@@ -1,4 +1,8 @@
 from . import plotting as plotting
+from .assessment.assessment import Assessment as Assessment
+from .assessment.assessment import Check as Check
+from .assessment.assessment import LikelyCause as LikelyCause
+from .assessment.assessment import Verdict as Verdict
 from .diagnosis.apply import correct_frfs as correct_frfs
 from .diagnosis.apply import correct_model as correct_model
 from .diagnosis.catalogue.effect import Effect as Effect

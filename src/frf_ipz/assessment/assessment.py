@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import Enum
 
@@ -154,28 +153,6 @@ class Assessment(Tabulated):
         verdict = max([least, *(check.verdict for check in checks)], key=lambda verdict: verdict.severity)
         return cls(verdict=verdict, checks=tuple(order), likely_cause=likely_cause)
 
-    @classmethod
-    def from_json(cls, value: Mapping[str, object]) -> Assessment:
-        """Read what stands in `run.json`.
-
-        Parameters
-        ----------
-        value : mapping
-            As `to_json` gives it.
-
-        Returns
-        -------
-        Assessment
-            The same.
-        """
-        checks = [_check(entry) for entry in _list(value.get("checks"))]
-        cause = value.get("likely_cause")
-        return cls(
-            verdict=Verdict(value.get("verdict")),
-            checks=tuple(checks),
-            likely_cause=None if not isinstance(cause, Mapping) else LikelyCause(**cause),
-        )
-
     def to_json(self) -> dict[str, object]:
         """Give what stands in `run.json`: plain values, null for what is not a number.
 
@@ -195,16 +172,6 @@ class Assessment(Tabulated):
         ]
         cause = None if self.likely_cause is None else asdict(self.likely_cause)
         return {"verdict": self.verdict.value, "checks": checks, "likely_cause": cause}
-
-
-def _check(entry: Mapping[str, object]) -> Check:
-    figures = {name: float("nan") if entry.get(name) is None else float(entry[name]) for name in ("figure", "limit")}  # type: ignore[arg-type]
-    texts = {name: str(entry.get(name, "")) for name in ("name", "unit", "where", "says", "advice")}
-    return Check(verdict=Verdict(entry.get("verdict")), **figures, **texts)  # type: ignore[arg-type]
-
-
-def _list(value: object) -> list[Mapping[str, object]]:
-    return [entry for entry in value if isinstance(entry, Mapping)] if isinstance(value, list) else []
 
 
 def _number(value: float) -> float | None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pandas as pd
 
+from frf_ipz.assessment.assessment import Assessment, Check
 from frf_ipz.diagnosis.result import Diagnosis, Estimate
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export import run_tables
@@ -97,6 +99,11 @@ def _data_checks(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["name", "value", "limit", "passed", "statement"])
 
 
+def _checks(assessment: Assessment) -> pd.DataFrame:
+    rows = [{**asdict(check), "verdict": check.verdict.value} for check in assessment.checks]
+    return pd.DataFrame(rows, columns=[field.name for field in fields(Check)])
+
+
 FRAMES: dict[type, dict[str, MakeFrame]] = {
     FrfSet: {"frf": _of(run_tables.frf_table)},
     FrfEstimate: {
@@ -114,6 +121,7 @@ FRAMES: dict[type, dict[str, MakeFrame]] = {
     Pairs: {"pairs": _of(run_tables.pair_table)},
     UpdatedModel: {"parameters": _of(run_tables.history_table), "parts": lambda updated: updated.parts},
     Prediction: {"poi_frf": _of(run_tables.prediction_table)},
+    Assessment: {"checks": _checks},
     Diagnosis: {
         "findings": _findings,
         "mismatch": lambda diagnosis: diagnosis.mismatch,

@@ -49,7 +49,7 @@ def chain(
     yield "ingest"
     frfs, model = recordings.frfs, inputs.fe_model
     options = inputs.options.diagnose
-    diagnosis = None
+    diagnosis = found = None
     if model is not None and diagnosing and options is not None and options.apply:
         diagnosis = mismatch.diagnose(runner, model, frfs)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
@@ -59,7 +59,7 @@ def chain(
         modelling.outline(runner, model, corrected_by=diagnosis)
         if diagnosing:
             if diagnosis is None:
-                mismatch.diagnose(runner, model, frfs)
+                found = mismatch.diagnose(runner, model, frfs)
             mismatch.levels(runner, fit, recordings.frfs)
             if until == "diagnose":
                 outputs.report(runner)
@@ -69,7 +69,10 @@ def chain(
         yield "pair"
         updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
         yield "update"
-        outputs.predict(runner, updated, fit, frfs)
+        prediction = outputs.predict(runner, updated, fit, frfs)
+        outputs.assess(
+            runner, frfs, fit, model, pairs, updated, prediction, diagnosis=found if diagnosis is None else diagnosis
+        )
         yield "predict"
         outputs.export(runner, updated, fit, corrected_by=diagnosis)
         yield "export"

@@ -29,6 +29,7 @@ NEEDS = {
     "pair": ("fit", "reduce"),
     "update": ("pair",),
     "predict": ("update",),
+    "assess": ("predict", "diagnose"),
     "export": ("update",),
 }
 

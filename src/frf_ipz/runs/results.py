@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import Dof
@@ -166,6 +167,7 @@ class Results:
             If there is no such table, or its stage has not run.
         """
         results = [self.estimate, self.fit, self.pairs, self.updated_model, self.prediction, self.diagnosis]
+        results = [*results, self.assessment]
         tables = {name: result for result in results if result is not None for name in FRAMES[type(result)]}
         if table not in tables:
             raise InputError(f"{self.name} has no table '{table}'; {did_you_mean(table, list(tables))}")
@@ -260,6 +262,11 @@ class Results:
     def reference(self) -> FrfSet | None:
         """Measured FRFs at points of interest that were kept aside."""
         return self._load("reference")  # type: ignore[no-any-return]
+
+    @cached_property
+    def assessment(self) -> Assessment | None:
+        """Whether the result can be used: verdict, checks and likely cause."""
+        return self._load("assess")  # type: ignore[no-any-return]
 
     @cached_property
     def state_space_arrays(self) -> StateSpaceModel | None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.assessment.assessment import Verdict
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.visible_text import one_line
@@ -13,6 +14,7 @@ from frf_ipz.visible_text import one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 MOST_MODES = 12
+MOST_CHECKS = 3  # on the first screen; the others are on the page
 
 
 def summarise(results: Results) -> str:
@@ -48,6 +51,8 @@ def summarise(results: Results) -> str:
         "predict": (results.prediction, prediction_lines),
     }
     lines = [results.name]
+    if results.assessment is not None and "assess" not in results.stale:
+        lines += [f"{title:<12}{text}" for title, text in assessment_lines(results.assessment)]
     for stage, (result, write) in writers.items():
         if result is not None:
             stale = " (stale: made before the last change; run it again)" if stage in results.stale else ""
@@ -57,6 +62,33 @@ def summarise(results: Results) -> str:
     if results.path is not None and "report" in results.stages and "report" not in results.stale:
         lines.append(f"{'page':<12}{results.path / 'report.html'}")
     return "\n".join(map(one_line, lines))
+
+
+def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
+    """Sum up the assessment: the verdict, what most likely has to be corrected, and the checks that cost it.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        Whether the result can be used.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    costly = [check for check in assessment.checks if check.verdict is not Verdict.USABLE]
+    lines = [("verdict", assessment.verdict.value)]
+    cause = assessment.likely_cause
+    if cause is not None:
+        place = f"{cause.file}, {cause.line_or_key}; probability {cause.probability:.2f}"
+        lines.append(("cause", f"{cause.says} ({place})"))
+    for check in costly[:MOST_CHECKS]:
+        advice = f": {check.advice}" if check.advice and cause is None else ""
+        lines.append(("because" if check is costly[0] else "", check.says + advice))
+    if len(costly) > MOST_CHECKS:
+        lines.append(("", f"and {len(costly) - MOST_CHECKS} more, on the page and in run.json"))
+    return lines
 
 
 def estimate_lines(estimate: FrfEstimate) -> list[tuple[str, str]]:

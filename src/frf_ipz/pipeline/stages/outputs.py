@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.assessment.assess import assess as judge_run
+from frf_ipz.assessment.evidence import Evidence
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
 from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble
@@ -23,14 +26,17 @@ from frf_ipz.updating.updated_model import UpdateStatus
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import Dof
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import Writers
+    from frf_ipz.structure import StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
@@ -65,6 +71,66 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
         lambda _: predict_frfs(modal_fit, updated, points=inputs.points, frequency_hz=lines),
         lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
     )
+
+
+def assess(
+    runner: StageRunner,
+    frfs: FrfSet,
+    modal_fit: ModalFit,
+    fe_model: StructuralModel,
+    pairs: Pairs,
+    updated: UpdatedModel,
+    prediction: Prediction,
+    *,
+    diagnosis: Diagnosis | None,
+) -> Assessment:
+    """Say whether the result can be used, in `run.json` too.
+
+    Parameters
+    ----------
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
+    frfs : FrfSet
+        The measured FRFs.
+    modal_fit : ModalFit
+        The fitted model.
+    fe_model : StructuralModel
+        The FE model.
+    pairs : Pairs
+        Who belongs to whom.
+    updated : UpdatedModel
+        The updated model.
+    prediction : Prediction
+        FRFs at the points of interest.
+    diagnosis : Diagnosis, optional
+        What the model left out; None where it was not looked for.
+
+    Returns
+    -------
+    Assessment
+        The verdict with its checks.
+    """
+    inputs = runner.inputs
+    named = {"test_file": inputs.test.path.name, "model_file": Path(next(iter(inputs.model_names), "FE model")).name}
+    assessment = runner.stage(
+        "assess",
+        {"after": runner.after("predict", *(["diagnose"] if diagnosis is not None else [])), **named},
+        lambda _: judge_run(
+            Evidence(
+                frfs=frfs,
+                fit=modal_fit,
+                fe_model=fe_model,
+                pairs=pairs,
+                updated_model=updated,
+                prediction=prediction,
+                reference=inputs.reference,
+                diagnosis=diagnosis,
+                **named,
+            )
+        ),
+    )
+    runner.store.manifest["assessment"] = assessment.to_json()
+    return assessment
 
 
 def export(
