@@ -44,12 +44,15 @@ class MeasuredModes:
         Their standard deviations.
     labels : tuple of FrfLabel
         What each FRF connects.
+    band_hz : pair of float
+        The band that was fitted: modes of the model in it should have been measured.
     """
 
     frequency_hz: FloatArray
     products: ComplexArray
     deviations: FloatArray
     labels: tuple[FrfLabel, ...]
+    band_hz: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,6 +118,7 @@ def measured_modes(fit: ModalFit) -> MeasuredModes:
         products=fit.model.residues[: fit.n_modes] * to_products,
         deviations=deviations * np.abs(to_products),
         labels=fit.labels,
+        band_hz=fit.band_hz,
     )
 
 
@@ -161,7 +165,9 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
     costs = _costs(measured, frequency_hz, products)
     most = _cost_of_no_counterpart(products.shape[1])
     rows, columns = _assign(costs, most)
-    return float(-costs[rows, columns].sum() - (len(costs) - len(rows)) * most)
+    alone = np.setdiff1d(np.arange(len(frequency_hz)), columns)
+    not_measured = np.minimum(_costs_of_silence(measured, frequency_hz[alone], products[alone]), most)
+    return float(-costs[rows, columns].sum() - (len(costs) - len(rows)) * most - not_measured.sum())
 
 
 def assign(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> tuple[IntArray, IntArray]:
@@ -198,6 +204,14 @@ def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexA
     scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + noise**2)
     errors = np.abs(first - second) / np.maximum(scales, np.finfo(float).tiny)
     return np.asarray(np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2))
+
+
+def _costs_of_silence(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
+    """Costs of computed modes that nobody has measured: nothing outside of the band, little for one that hardly shows."""
+    inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
+    scale = SHAPE_SCALE * np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=0))
+    visible = np.abs(products) / np.maximum(scale, np.finfo(float).tiny)
+    return np.asarray(inside * (np.log1p(FAR**2) * visible.max(axis=1).clip(max=1) + np.log1p(visible**2).sum(axis=1)))
 
 
 def _cost_of_no_counterpart(n_frfs: int) -> float:

@@ -112,7 +112,7 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
     if not np.isfinite(after):
         return
     noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[evidence.is_heard])))
-    is_worse = after > before + noise
+    is_worse = after > before + noise and after > SIXTH * GAIN_MARGIN_DB
     says = f"over all measured FRFs the model was {before:.2g} dB off in the median and is {after:.2g} dB off"
     yield Check(
         name="better than before",

@@ -1,0 +1,168 @@
+"""A mistake of a user's is named with the line to correct; where none was made, none is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from frf_ipz.assessment.causes.cause import Situation
+from frf_ipz.assessment.causes.likely_cause import find_likely_cause
+from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
+
+BEAM = {
+    "length_m": 0.5,
+    "width_m": 0.02,
+    "thickness_m": 0.005,
+    "youngs_modulus_Pa": 70e9,
+    "density_kg_m3": 2700,
+    "elements": 20,
+    "left": "clamped",
+    "modal_ratio": 0.005,
+}
+OUTPUTS, INPUTS = ("8:+z", "15:+z", "21:+z"), ("11:+z", "19:+z")
+LINES = np.arange(5.0, 900.0, 0.5)
+NOISE = 1e-3  # of the root mean square of an FRF
+COLUMNS = {output: f"acc_{place}" for place, output in enumerate(OUTPUTS)}
+FRF = tuple(
+    frf_ipz.FrfLabel(output, source, "accelerance", COLUMNS[output], "force") for output in OUTPUTS for source in INPUTS
+)
+
+
+def measure(*, seed=0, **changed):
+    """FRFs of a machine that is 2 % stiffer than its model, and has 3 g more at a node."""
+    machine = frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71.4e9, **changed}, point_mass=[EXTRA])
+    values = frf_ipz.compute_frfs(machine, FRF, 2j * np.pi * LINES)
+    rng = np.random.default_rng(seed)
+    std = NOISE * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    noise = rng.normal(size=(2, *values.shape)) * std / np.sqrt(2)
+    return frf_ipz.FrfSet(
+        frequency_hz=LINES,
+        values=values + noise[0] + 1j * noise[1],
+        labels=FRF,
+        variance=np.tile(std**2, (len(LINES), 1)),
+        coherence=np.full(values.shape, np.nan),
+        averages=np.zeros(len(FRF), int),
+    )
+
+
+EXTRA = frf_ipz.BeamPointMass(node=14, mass_kg=0.003)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    """The measurement as it should have been written down."""
+    return frf_ipz.fit_modes(measure())
+
+
+def cause_of(fit, *, labels=None, gain=1.0, frequency_factor=1.0, **model):
+    """Look for the cause where labels, gains or the model are not what they should be."""
+    measured = measured_modes(fit)
+    measured = replace(
+        measured,
+        labels=labels or measured.labels,
+        products=measured.products * gain,
+        deviations=measured.deviations * np.abs(gain),
+        frequency_hz=measured.frequency_hz * frequency_factor,
+        band_hz=tuple(edge * frequency_factor for edge in measured.band_hz),
+    )
+    beam = frf_ipz.make_beam(**{**BEAM, **model})
+    modes = computed_modes(frf_ipz.solve_modes(beam, n_modes=min(24, len(beam.dofs))))
+    situation = Situation(
+        measured=measured, computed=modes, model=beam, test_file="test.toml", model_file="model.toml"
+    )
+    return find_likely_cause(situation)
+
+
+def relabelled(outputs=None, inputs=None):
+    """The labels with sensors and excited points where somebody wrote that they are."""
+    outputs, inputs = outputs or {}, inputs or {}
+    return tuple(
+        frf_ipz.FrfLabel(
+            outputs.get(str(label.output_dof), label.output_dof),
+            inputs.get(str(label.input_dof), label.input_dof),
+            label.quantity,
+            label.output_channel,
+            label.input_channel,
+        )
+        for label in FRF
+    )
+
+
+def column_gain(column, gain):
+    return np.array([gain if label.output_channel == column else 1.0 for label in FRF])
+
+
+def test_nothing_is_named_where_nothing_is_wrong(fit):
+    assert cause_of(fit) is None
+
+
+@pytest.mark.parametrize("changed", [{"youngs_modulus_Pa": 66e9}, {"thickness_m": 0.0051}, {"length_m": 0.505}])
+def test_nothing_is_named_where_the_model_is_nearly_right(fit, changed):
+    assert cause_of(fit, **changed) is None
+
+
+@pytest.mark.parametrize(
+    ("gain", "words", "key"),
+    [
+        (1 / 9.80665, "in g", "unit"),
+        (1e3, "thousandths", "unit"),
+        (4.4482216152605, "lbf", "'force': unit"),
+        (-1.0, "other sign", "dof"),
+        (column_gain("acc_1", 1 / 9.80665), "'acc_1' is in g", "'acc_1': unit"),
+        (column_gain("acc_2", -1.0), "'acc_2' measures the other way round", "'acc_2': dof"),
+    ],
+)
+def test_a_factor_of_channels_is_named(fit, gain, words, key):
+    cause = cause_of(fit, gain=gain)
+    assert words in cause.says
+    assert cause.file == "test.toml"
+    assert key in cause.line_or_key
+    assert cause.probability > 0.8  # 1000 is a unit of other things too
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (relabelled(outputs={"8:+z": "21:+z", "21:+z": "8:+z"}), "sensors at 21:z and 8:z are exchanged"),
+        (relabelled(inputs={"11:+z": "19:+z", "19:+z": "11:+z"}), "points 19:z and 11:z are exchanged"),
+    ],
+)
+def test_exchanged_places_are_named(fit, labels, words):
+    assert words in cause_of(fit, labels=labels).says
+
+
+def test_a_sensor_at_another_node_is_found_to_a_node(fit):
+    cause = cause_of(fit, labels=relabelled(outputs={"15:+z": "4:+z"}))
+    assert "'acc_1'" in cause.line_or_key
+    assert any(f"near {node}:z, not at 4:z" in cause.says for node in (14, 15, 16))
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [
+        ({"youngs_modulus_Pa": 70.0}, "youngs_modulus_Pa"),
+        ({"youngs_modulus_Pa": 210e9}, "youngs_modulus_Pa"),
+        ({"youngs_modulus_Pa": 7e9}, "youngs_modulus_Pa"),
+        ({"density_kg_m3": 2.7}, "density_kg_m3"),
+        ({"thickness_m": 5.0}, "thickness_m"),
+    ],
+)
+def test_a_wrong_number_of_the_model_is_named(fit, changed, key):
+    cause = cause_of(fit, **changed)
+    assert cause.file == "model.toml"
+    assert key in cause.line_or_key
+
+
+def test_the_time_in_ms_is_named(fit):
+    cause = cause_of(fit, frequency_factor=1e-3)
+    assert "time is in ms" in cause.says
+
+
+def test_a_gain_that_no_unit_explains_is_no_cause(fit):
+    assert cause_of(fit, gain=1.13) is None
+
+
+def test_a_wrong_end_is_named():
+    pinned = frf_ipz.fit_modes(measure(left="free"))
+    assert "[beam] left" in cause_of(pinned).line_or_key
