@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from frf_ipz.assessment.assessment import Assessment, Check
 from frf_ipz.assessment.causes.cause import Situation
+from frf_ipz.assessment.causes.columns import find_exchanged_columns
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
@@ -69,6 +70,9 @@ def likely_cause(evidence: Evidence) -> LikelyCause | None:
     LikelyCause or None
         None where no mistake is more likely than not.
     """
+    exchanged = find_exchanged_columns(evidence.impacts, evidence.frfs.labels, test_file=evidence.test_file)
+    if exchanged is not None:
+        return exchanged
     model = evidence.fe_model
     n_modes = min(2 * evidence.fit.n_modes + MODES_BEYOND, len(model.dofs))
     try:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import Trace
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.structure import ReducedModel, StructuralModel
@@ -44,6 +45,8 @@ class Evidence:
         Measured FRFs at points of interest that were kept aside.
     diagnosis : Diagnosis, optional
         What the FE model left out; None where it was not looked for.
+    impacts : tuple of Trace
+        Forces and responses of a hammer's impacts; empty for other tests.
     test_file, model_file : str
         Where a mistake would stand.
     """
@@ -56,6 +59,7 @@ class Evidence:
     prediction: Prediction
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
+    impacts: tuple[Trace, ...] = ()
     test_file: str = "test.toml"
     model_file: str = "model.toml"
 

@@ -71,7 +71,15 @@ def chain(
         yield "update"
         prediction = outputs.predict(runner, updated, fit, frfs)
         outputs.assess(
-            runner, frfs, fit, model, pairs, updated, prediction, diagnosis=found if diagnosis is None else diagnosis
+            runner,
+            frfs,
+            recordings.traces,
+            fit,
+            model,
+            pairs,
+            updated,
+            prediction,
+            diagnosis=found if diagnosis is None else diagnosis,
         )
         yield "predict"
         outputs.export(runner, updated, fit, corrected_by=diagnosis)

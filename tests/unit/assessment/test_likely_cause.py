@@ -68,9 +68,7 @@ def cause_of(fit, *, labels=None, gain=1.0, frequency_factor=1.0, **model):
     )
     beam = frf_ipz.make_beam(**{**BEAM, **model})
     modes = computed_modes(frf_ipz.solve_modes(beam, n_modes=min(24, len(beam.dofs))))
-    situation = Situation(
-        measured=measured, computed=modes, model=beam, test_file="test.toml", model_file="model.toml"
-    )
+    situation = Situation(measured=measured, computed=modes, model=beam, test_file="test.toml", model_file="model.toml")
     return find_likely_cause(situation)
 
 

@@ -128,7 +128,9 @@ def test_warnings_and_faults_are_shown_as_letters(monkeypatch, capsys, campaign)
         raise RuntimeError(EVIL)
 
     hooks = {}
-    monkeypatch.setattr("frf_ipz.cli.commands.app", lambda: hooks.update(fault=sys.excepthook, warn=warnings.showwarning))
+    monkeypatch.setattr(
+        "frf_ipz.cli.commands.app", lambda: hooks.update(fault=sys.excepthook, warn=warnings.showwarning)
+    )
     with warnings.catch_warnings(), monkeypatch.context() as patched:
         patched.setattr(sys, "excepthook", sys.excepthook)
         command.main()

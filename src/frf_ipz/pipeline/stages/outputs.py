@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import Trace
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
@@ -76,6 +77,7 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
 def assess(
     runner: StageRunner,
     frfs: FrfSet,
+    traces: tuple[Trace, ...],
     modal_fit: ModalFit,
     fe_model: StructuralModel,
     pairs: Pairs,
@@ -92,6 +94,8 @@ def assess(
         Inputs, folder and keys of the earlier stages.
     frfs : FrfSet
         The measured FRFs.
+    traces : tuple of Trace
+        Forces and responses of records.
     modal_fit : ModalFit
         The fitted model.
     fe_model : StructuralModel
@@ -125,6 +129,7 @@ def assess(
                 prediction=prediction,
                 reference=inputs.reference,
                 diagnosis=diagnosis,
+                impacts=traces if inputs.test.kind == "hammer" else (),
                 **named,
             )
         ),
