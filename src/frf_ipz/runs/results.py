@@ -166,8 +166,8 @@ class Results:
         InputError
             If there is no such table, or its stage has not run.
         """
-        results = [self.estimate, self.fit, self.pairs, self.updated_model, self.prediction, self.diagnosis]
-        results = [*results, self.assessment]
+        named = ("estimate", "fit", "pairs", "updated_model", "prediction", "diagnosis", "assessment")
+        results = [getattr(self, name) for name in named]
         tables = {name: result for result in results if result is not None for name in FRAMES[type(result)]}
         if table not in tables:
             raise InputError(f"{self.name} has no table '{table}'; {did_you_mean(table, list(tables))}")

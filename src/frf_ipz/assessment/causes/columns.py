@@ -1,7 +1,7 @@
 """Columns of recordings that are exchanged: a force that rings, and a response that is a pulse.
 
-The effective duration of a signal is that of a rectangle with the same energy and the same integral of its fourth power,
-``(int x^2)^2 / int x^4``: a pulse is short however high it is, a lightly damped response is long however weak.
+The effective duration of a signal is that of a rectangle with the same energy and the same integral of its fourth
+power, ``(int x^2)^2 / int x^4``: a pulse is short however high it is, a lightly damped response is long however weak.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 def find_exchanged_columns(
-    traces: Sequence[Trace], labels: Sequence[FrfLabel], *, test_file: str
+    impacts: Sequence[Trace], labels: Sequence[FrfLabel], *, test_file: str
 ) -> LikelyCause | None:
     """Find a response that looks like the hammer's force, and a force that looks like a response.
 
     Parameters
     ----------
-    traces : sequence of Trace
-        Forces and responses of impacts.
+    impacts : sequence of Trace
+        Forces and responses of a hammer's impacts.
     labels : sequence of FrfLabel
         Name the channels.
     test_file : str
@@ -39,11 +39,11 @@ def find_exchanged_columns(
         None where every response lasts longer than the force, or there are no recordings.
     """
     inputs = {label.input_channel for label in labels}
-    records = dict.fromkeys(trace.name for trace in traces)
+    records = dict.fromkeys(trace.name for trace in impacts)
     found: list[tuple[str, str]] = []
     looked_at = 0
     for record in records:
-        durations = {trace.channel: _duration(trace) for trace in traces if trace.name == record}
+        durations = {trace.channel: _duration(trace) for trace in impacts if trace.name == record}
         forces = [channel for channel in durations if channel in inputs]
         responses = {channel: length for channel, length in durations.items() if channel not in inputs}
         if len(forces) != 1 or not responses:

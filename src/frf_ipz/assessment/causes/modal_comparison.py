@@ -207,7 +207,7 @@ def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexA
 
 
 def _costs_of_silence(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
-    """Costs of computed modes that nobody has measured: nothing outside of the band, little for one that hardly shows."""
+    """Costs of computed modes that were not measured: nothing out of the band, little for one that hardly shows."""
     inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
     scale = SHAPE_SCALE * np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=0))
     visible = np.abs(products) / np.maximum(scale, np.finfo(float).tiny)
