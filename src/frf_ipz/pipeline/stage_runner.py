@@ -156,7 +156,7 @@ def dependents(name: str) -> list[str]:
     Examples
     --------
     >>> dependents("update")
-    ['predict', 'export']
+    ['predict', 'assess', 'export']
     """
     stale = {name}
     for stage, needs in NEEDS.items():

@@ -173,7 +173,8 @@ class Results:
             raise InputError(f"{self.name} has no table '{table}'; {did_you_mean(table, list(tables))}")
         if table == "pairs" and self.pairs is not None and self.updated_model is not None:
             return as_frame(pair_table(self.pairs, self.updated_model.after))
-        return tables[table].to_frame(table)
+        frame: pd.DataFrame = tables[table].to_frame(table)
+        return frame
 
     def plot(self, picture: str) -> Figure:
         """Draw a picture of the run, as ``frf-ipz plot`` does.
