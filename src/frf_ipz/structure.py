@@ -476,6 +476,8 @@ class ReducedModel:
     dashpots : (r, r) array
         The part of `damping` that the full model states as a matrix beside damping ratios of its modes; (0, 0) where it
         does not state both.
+    rigid : (r, n_rigid) array
+        Mass-normalised rigid-body modes, which strain nothing; (0, 0) where there is none.
 
     Examples
     --------
@@ -509,6 +511,7 @@ class ReducedModel:
     residual_dofs: tuple[Dof, ...] = ()
     choices: tuple[str, ...] = ()
     dashpots: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    rigid: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __repr__(self) -> str:
         dofs = ", ".join(map(str, self.dofs[:DOFS_SHOWN])) + (", ..." if len(self.dofs) > DOFS_SHOWN else "")
@@ -518,6 +521,8 @@ class ReducedModel:
         order = len(self.dofs)
         if self.dashpots.size:
             require_shape("the reduced matrix of dashpots", self.dashpots, (order, order))
+        if self.rigid.size:
+            require_shape("the rigid-body modes", self.rigid, (order, self.rigid.shape[1]))
         for name in ("mass", "damping", "stiffness"):
             require_shape(f"the reduced {name} matrix", getattr(self, name), (order, order))
         require_shape("the expansion", self.expansion, (len(self.expanded_dofs), order))

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Finding
 
 STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly linear in it
-RIGID = 1e-9  # of the largest squared frequency: below it a mode is one of a rigid body
 PRIOR = 0.1  # standard deviation of a value, relative: an update refines a diagnosis, and does not begin anew
 
 
@@ -143,7 +142,7 @@ def _modal_damping_matrix(model: StructuralModel, reduced: ReducedModel) -> Floa
     """Damping matrix of a model's modal damping ratios, N s/m."""
     poles = undamped_poles(reduced.mass, reduced.stiffness)
     squares = np.maximum(poles.values.real, 0.0)
-    n_rigid = int(np.count_nonzero(squares < RIGID * squares.max()))
-    ratios, omega = stated_damping_ratios(model.modal_damping, len(squares), n_rigid), np.sqrt(squares)
+    ratios = stated_damping_ratios(model.modal_damping, len(squares), reduced.rigid.shape[1])
+    omega = np.sqrt(squares)
     shapes = reduced.mass @ poles.right_vectors.real
     return np.asarray((shapes * (2 * ratios * omega)) @ shapes.T)

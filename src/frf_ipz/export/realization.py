@@ -4,6 +4,9 @@ The states are each mode's displacement times a rate w and its velocity, in mass
 ``w = omega`` a mode is a rotation, ``[[0, omega], [-omega, -2 zeta omega]]``, and the matrices are of one size, which
 is what the solvers of control design need. The modes are those without damping of the symmetric part; their
 coupling (damping that is not modal, an unsymmetric stiffness by `ipz`) stays in the matrices, so nothing is lost.
+
+Rigid-body modes are those that the FE model has found, not modes of a low frequency of the reduced matrices, whose
+rounding would turn a double integrator into a stable and an unstable pole: ``[[0, w], [0, 0]]``, exactly.
 """
 
 from __future__ import annotations
@@ -14,16 +17,22 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag, expm
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.errors import InputError
 from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.numerics.rigid_motions import mass_normalise, meet_no_force
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.structure import ReducedModel
 
-RIGID = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
+EPS = float(np.finfo(float).eps)
+ROUNDING = (
+    1e3 * EPS
+)  # of the sum of all terms' sizes: a reduced model's matrices hold the condition number of its modes
+LOWEST_RATE = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
+UNSEEN = 1e-9  # of the largest share of a mode in a port: no resonance lifts what is below to where it matters
 
 
 class Matrices(NamedTuple):
@@ -39,7 +48,8 @@ class SecondOrder(NamedTuple):
     """``z'' + G z' + L z = P u``, ``y_j = d^p_j/dt^p_j (Q z)_j``.
 
     ``damping`` (n, n) in 1/s, ``stiffness`` (n, n) in 1/s^2, ``inputs`` (n, n_inputs), ``outputs`` (n_outputs, n), and
-    ``flexibility`` (n_outputs, n_inputs): displacement per force of the part without states.
+    ``flexibility`` (n_outputs, n_inputs): displacement per force of the part without states. The first ``n_rigid``
+    coordinates are rigid-body modes that nothing strains or damps: their rows and columns of both matrices are 0.
     """
 
     damping: FloatArray
@@ -47,6 +57,19 @@ class SecondOrder(NamedTuple):
     inputs: FloatArray
     outputs: FloatArray
     flexibility: FloatArray
+    n_rigid: int = 0
+
+
+class Selection(NamedTuple):
+    """States that ports drive and see.
+
+    ``driven`` rigid-body modes, or combinations of them, are moved by inputs, and ``seen`` of these by outputs;
+    ``elastic`` marks the modes behind the rigid ones.
+    """
+
+    driven: int
+    seen: int
+    elastic: BoolArray
 
 
 def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatArray) -> SecondOrder:
@@ -66,14 +89,130 @@ def modal_form(model: ReducedModel, input_rows: FloatArray, output_rows: FloatAr
     SecondOrder
         Modes by ascending frequency.
     """
-    shapes = undamped_poles(model.mass, (model.stiffness + model.stiffness.T) / 2).right_vectors.real
+    rigid = _unstrained(model)
+    shapes = np.column_stack([rigid, _elastic_modes(model, rigid)])
+    stiffness, damping = (shapes.T @ matrix @ shapes for matrix in (model.stiffness, model.damping))
+    n_rigid = rigid.shape[1]
+    for matrix in (stiffness, damping):
+        matrix[:n_rigid] = 0.0
+        matrix[:, :n_rigid] = 0.0
     return SecondOrder(
-        damping=shapes.T @ model.damping @ shapes,
-        stiffness=shapes.T @ model.stiffness @ shapes,
+        damping=damping,
+        stiffness=stiffness,
         inputs=shapes.T @ input_rows.T,
         outputs=output_rows @ shapes,
         flexibility=np.zeros((len(output_rows), len(input_rows))),
+        n_rigid=n_rigid,
     )
+
+
+def _unstrained(model: ReducedModel) -> FloatArray:
+    """Rigid-body modes that an update has left without stiffness and damping, mass-normalised, (r, n_rigid) array."""
+    if not model.rigid.size:
+        return np.zeros((len(model.mass), 0))
+    free = meet_no_force(model.stiffness, model.rigid) & meet_no_force(model.damping, model.rigid)
+    return mass_normalise(model.rigid[:, free], model.mass)
+
+
+def _elastic_modes(model: ReducedModel, rigid: FloatArray) -> FloatArray:
+    """Mass-normalised modes of the symmetric part beside the rigid ones, by ascending frequency."""
+    stiffness = (model.stiffness + model.stiffness.T) / 2
+    shapes = undamped_poles(model.mass, stiffness).right_vectors.real[:, rigid.shape[1] :]
+    shapes = shapes - rigid @ (rigid.T @ model.mass @ shapes)
+    if not shapes.shape[1]:
+        return shapes
+    modes = undamped_poles(shapes.T @ model.mass @ shapes, shapes.T @ stiffness @ shapes)
+    return np.asarray(shapes @ modes.right_vectors.real)
+
+
+def select_states(system: SecondOrder) -> Selection:
+    """Find the modes that some input drives and some output sees.
+
+    A mode that is coupled to others, by damping or by an unsymmetric stiffness, is among them.
+
+    Parameters
+    ----------
+    system : SecondOrder
+        Modes by ascending frequency.
+
+    Returns
+    -------
+    Selection
+        All modes where no port sees any.
+    """
+    n_rigid = system.n_rigid
+    share_in, share_out = _shares(system.inputs.T).max(0), _shares(system.outputs).max(0)
+    elastic = np.minimum(share_in, share_out)[n_rigid:] > UNSEEN
+    rates = np.sqrt(np.abs(np.diag(system.stiffness)))[n_rigid:]
+    with np.errstate(divide="ignore", invalid="ignore"):  # a mode without stiffness that is no rigid-body mode
+        coupling = np.abs(system.damping[n_rigid:, n_rigid:]) / np.sqrt(np.outer(rates, rates))
+        coupling = np.maximum(coupling, np.abs(system.stiffness[n_rigid:, n_rigid:]) / np.outer(rates, rates))
+    coupled = ~(coupling <= UNSEEN) & ~np.eye(len(rates), dtype=bool)
+    elastic |= (coupled | coupled.T).any(0)
+    driven = _rank(system, system.inputs.T, np.eye(n_rigid))
+    seen = _rank(system, system.outputs, _leading(system, system.inputs.T, np.eye(n_rigid), driven))
+    if not seen and not elastic.any():
+        return Selection(n_rigid, n_rigid, np.ones(len(rates), bool))
+    return Selection(driven, seen, elastic)
+
+
+def take_states(system: SecondOrder, selection: Selection) -> SecondOrder:
+    """Leave the other modes out.
+
+    Parameters
+    ----------
+    system : SecondOrder
+        Modes by ascending frequency.
+    selection : Selection
+        Of this system, or of one with the same ports.
+
+    Returns
+    -------
+    SecondOrder
+        With the same FRFs. Its rigid-body modes are combinations of all where not every one is driven and seen.
+    """
+    n_rigid = system.n_rigid
+    turn = _leading(system, system.inputs.T, np.eye(n_rigid), selection.driven)
+    turn = _leading(system, system.outputs, turn, selection.seen)
+    kept = n_rigid + np.flatnonzero(selection.elastic)
+    block = np.ix_(kept, kept)
+    zero = np.zeros((selection.seen, selection.seen))
+    return SecondOrder(
+        damping=block_diag(zero, system.damping[block]),
+        stiffness=block_diag(zero, system.stiffness[block]),
+        inputs=np.vstack([turn.T @ system.inputs[:n_rigid], system.inputs[kept]]),
+        outputs=np.hstack([system.outputs[:, :n_rigid] @ turn, system.outputs[:, kept]]),
+        flexibility=system.flexibility,
+        n_rigid=selection.seen,
+    )
+
+
+def _shares(rows: FloatArray) -> FloatArray:
+    """Share of each mode in each port, of the largest one."""
+    largest = np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
+    return np.abs(rows) / np.where(largest > 0, largest, 1.0)
+
+
+def _rank(system: SecondOrder, rows: FloatArray, turn: FloatArray) -> int:
+    """Count the combinations of rigid-body modes that take part in some port."""
+    sizes = np.linalg.svd(_in_ports(system, rows, turn), compute_uv=False)
+    return int(np.count_nonzero(sizes > UNSEEN))
+
+
+def _leading(system: SecondOrder, rows: FloatArray, turn: FloatArray, count: int) -> FloatArray:
+    """Orthogonal combinations of rigid-body modes that take part in ports most, (n_rigid, count) array.
+
+    All have the frequency 0, so that any turn of them is as good; where all take part they stay as they are.
+    """
+    if count == turn.shape[1]:
+        return turn
+    _, _, directions = np.linalg.svd(_in_ports(system, rows, turn))
+    return np.asarray(turn @ directions[:count].T)
+
+
+def _in_ports(system: SecondOrder, rows: FloatArray, turn: FloatArray) -> FloatArray:
+    largest = np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
+    return np.asarray(rows[:, : system.n_rigid] @ turn / np.where(largest > 0, largest, 1.0))
 
 
 def condense_high_modes(system: SecondOrder, n_modes: int) -> SecondOrder:
@@ -101,6 +240,7 @@ def condense_high_modes(system: SecondOrder, n_modes: int) -> SecondOrder:
         inputs=system.inputs[low] - coupling @ by_inputs,
         outputs=system.outputs[:, low] - system.outputs[:, high] @ by_low,
         flexibility=system.flexibility + system.outputs[:, high] @ by_inputs,
+        n_rigid=system.n_rigid,
     )
 
 
@@ -132,7 +272,10 @@ def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
         )
     count = len(system.stiffness)
     rates = np.sqrt(np.abs(np.diag(system.stiffness)))
-    rates = np.maximum(rates, RIGID * rates.max())
+    elastic = np.maximum(rates[system.n_rigid :], LOWEST_RATE * rates.max(initial=0.0))
+    elastic = np.where(elastic > 0, elastic, 1.0)
+    rates = np.concatenate([np.full(system.n_rigid, elastic.min(initial=np.inf)), elastic])
+    rates = np.where(np.isfinite(rates), rates, 1.0)  # nothing is elastic: any rate will do
     A, B = np.zeros((2 * count, 2 * count)), np.zeros((2 * count, system.inputs.shape[1]))
     A[::2, 1::2] = np.diag(rates)
     A[1::2, ::2], A[1::2, 1::2] = -system.stiffness / rates, -system.damping
@@ -234,4 +377,20 @@ def discretise(system: Matrices, sample_time_s: float) -> Matrices:
     augmented = np.zeros((states + inputs, states + inputs))
     augmented[:states] = np.hstack([system.A, system.B]) * sample_time_s
     transition = expm(augmented)
+    for place in _double_integrators(system.A):  # to the last bit: a pole of 1 + 1e-16 is an unstable one
+        rate = system.A[place, place + 1] * sample_time_s
+        force = system.B[place + 1] * sample_time_s
+        transition[place : place + 2] = 0.0
+        transition[place, place : place + 2] = 1.0, rate
+        transition[place + 1, place + 1] = 1.0
+        transition[place : place + 2, states:] = rate * force / 2, force
     return Matrices(transition[:states, :states], transition[:states, states:], system.C, system.D)
+
+
+def _double_integrators(A: FloatArray) -> list[int]:
+    """Places of displacements whose rate is their velocity's, which nothing but inputs changes."""
+    return [
+        place
+        for place in range(len(A) - 1)
+        if not A[place + 1].any() and A[place, place + 1] and np.count_nonzero(A[place]) == 1
+    ]

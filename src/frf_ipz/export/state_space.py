@@ -18,7 +18,17 @@ from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
-from frf_ipz.export.realization import condense_high_modes, discretise, modal_form, to_first_order, with_delays
+from frf_ipz.export.realization import (
+    SecondOrder,
+    Selection,
+    condense_high_modes,
+    discretise,
+    modal_form,
+    select_states,
+    take_states,
+    to_first_order,
+    with_delays,
+)
 from frf_ipz.frf import require_measured
 from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -32,6 +42,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
 
 ARRAYS = ("A", "B", "C", "D")
+MODES_SHOWN = 6
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
 
@@ -57,6 +68,8 @@ class StateSpaceModel(Concise):
         Names of the states.
     input_units, output_units : tuple of str
         SI units.
+    notes : tuple of str
+        What was left out, and which poles lie at 0 exactly.
 
     Examples
     --------
@@ -80,6 +93,7 @@ class StateSpaceModel(Concise):
     state_names: tuple[str, ...]
     input_units: tuple[str, ...]
     output_units: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, shape in matrix_shapes({name: getattr(self, name) for name in NAMES}).items():
@@ -139,7 +153,9 @@ def make_state_space(
     """
     _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
-    return _to_state_space(updated_model.model, _ports(measured, points, chosen, delays_s), chosen)
+    ports = _ports(measured, points, chosen, delays_s)
+    system = _modal_system(updated_model.model, ports, chosen)
+    return _to_state_space(system, select_states(system), ports, chosen)
 
 
 def make_state_space_ensemble(
@@ -179,10 +195,14 @@ def make_state_space_ensemble(
     chosen = options or ExportOptions()
     ports = _ports(measured, points, chosen, delays_s)
     members = updated_model.ensemble[: chosen.ensemble]
-    return tuple(
-        _to_state_space(replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
+    selection = select_states(
+        _modal_system(updated_model.model, ports, chosen)
+    )  # one for all: they have the same states
+    systems = (
+        _modal_system(replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
         for mass, damping, stiffness in members
     )
+    return tuple(_to_state_space(system, selection, ports, chosen) for system in systems)
 
 
 def to_state_space(
@@ -329,7 +349,7 @@ def from_control(system: control.StateSpace) -> StateSpaceModel:
         If it is no state space.
     """
     try:
-        arrays = {name: np.array(getattr(system, name), float) for name in ARRAYS}
+        arrays: dict[str, Any] = {name: np.array(getattr(system, name), float) for name in ARRAYS}
         return StateSpaceModel(
             **arrays,
             dt=float(system.dt or 0.0),
@@ -352,32 +372,55 @@ def _require_exported(
     require_type("delays_s", delays_s, Mapping, optional=True)
 
 
-def _to_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
-    outputs = ports.outputs
-    rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [output.dof for output in outputs])]
+def _modal_system(model: ReducedModel, ports: Ports, options: ExportOptions) -> SecondOrder:
+    rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [port.dof for port in ports.outputs])]
     system = modal_form(model, *rows)
-    if options.residual == "feedthrough":
-        system = condense_high_modes(system, model.n_modes)
-    matrices = to_first_order(system, [output.quantity.power for output in outputs])
-    names = [
-        f"mode {mode + 1} {quantity}"
-        for mode in range(len(system.stiffness))
-        for quantity in ("displacement", "velocity")
-    ]
+    return condense_high_modes(system, model.n_modes) if options.residual == "feedthrough" else system
+
+
+def _to_state_space(system: SecondOrder, selection: Selection, ports: Ports, options: ExportOptions) -> StateSpaceModel:
+    outputs = ports.outputs
+    matrices = to_first_order(take_states(system, selection), [output.quantity.power for output in outputs])
+    modes = [f"rigid-body mode {number + 1}" for number in range(selection.seen)]
+    modes += [f"mode {system.n_rigid + place + 1}" for place in np.flatnonzero(selection.elastic)]
+    names = [f"{mode} {quantity}" for mode in modes for quantity in ("displacement", "velocity")]
     delayed = [output for output in outputs if output.delay_s > 0 and options.pade_order]
     names += [f"delay of {output.dof} {order + 1}" for output in delayed for order in range(options.pade_order)]
     matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
     if options.sample_time_s > 0:
         matrices = discretise(matrices, options.sample_time_s)
+    A, B, C, D = matrices
     return StateSpaceModel(
-        **matrices._asdict(),
+        A=A,
+        B=B,
+        C=C,
+        D=D,
         dt=options.sample_time_s,
         input_names=tuple(str(dof) for dof in ports.inputs),
         output_names=tuple(str(output.dof) for output in outputs),
         state_names=tuple(names),
         input_units=ports.input_units,
         output_units=tuple(output.unit for output in outputs),
+        notes=_notes(system, selection),
     )
+
+
+def _notes(system: SecondOrder, selection: Selection) -> tuple[str, ...]:
+    notes = []
+    if selection.seen:
+        many = selection.seen > 1
+        notes.append(
+            f"{selection.seen} rigid-body {'modes are double integrators' if many else 'mode is a double integrator'}, "
+            "with poles at 0 exactly; methods that want none on the axis need a shift of your choice"
+        )
+    hertz = np.sqrt(np.abs(np.diag(system.stiffness)[system.n_rigid :])) / (2 * np.pi)
+    left_out = [f"a mode at {value:.4g} Hz" for value in hertz[~selection.elastic]]
+    count = system.n_rigid - selection.seen
+    left_out = [*([f"{count} rigid-body mode{'s' if count > 1 else ''}"] if count else []), *left_out]
+    if left_out:
+        shown = ", ".join(left_out[:MODES_SHOWN]) + (", ..." if len(left_out) > MODES_SHOWN else "")
+        notes.append(f"left out, since no input drives it or no output sees it: {shown}")
+    return tuple(notes)
 
 
 def _ports(

@@ -93,7 +93,7 @@ def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | 
             plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
             path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
         else:
-            savemat(path, {**values, **_names_for_matlab(arrays)})
+            savemat(path, {**values, **_names_for_matlab(arrays), "notes": np.array(arrays.notes, dtype=object)})
 
 
 def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
@@ -120,11 +120,12 @@ def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
         names = _names_in(values)
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
+        notes = tuple(str(_text_in(text)) for text in np.ravel(values.get("notes", ())))
     except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
-    fields: dict[str, Any] = {**arrays, **names, "dt": dt}
+    fields: dict[str, Any] = {**arrays, **names, "dt": dt, "notes": notes}
     return StateSpaceModel(**fields)
 
 

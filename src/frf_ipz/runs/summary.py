@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.result import Diagnosis
+    from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
@@ -49,6 +50,7 @@ def summarise(results: Results) -> str:
         "pair": (results.pairs, pairs_lines),
         "update": (results.updated_model, update_lines),
         "predict": (results.prediction, prediction_lines),
+        "export": (results.state_space_arrays, state_space_lines),
     }
     lines = [results.name]
     if results.assessment is not None and "assess" not in results.stale:
@@ -242,6 +244,22 @@ def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
         band = f", 90 % band +-{np.nanmedian(width):.2g} dB (median)" if np.isfinite(width).any() else ""
         lines.append(("prediction", f"{label}{band}"))
     return [*lines, *_warnings(prediction.warnings)]
+
+
+def state_space_lines(model: StateSpaceModel) -> list[tuple[str, str]]:
+    """Sum up the state space, where there is something to say about it.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+        What was exported.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    return [("export" if not place else "", text) for place, text in enumerate(model.notes)]
 
 
 def _warnings(texts: Sequence[str]) -> list[tuple[str, str]]:

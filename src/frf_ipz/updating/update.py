@@ -23,11 +23,11 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
+from frf_ipz.updating.updated_model import UpdatedModel, with_free_rigid_bodies
 
 if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.updating.position_uncertainty import PositionUncertainty
-    from frf_ipz.updating.updated_model import UpdatedModel
 
 
 class Method(Protocol):
@@ -133,7 +133,7 @@ def update_model(
         basis = make_structural_basis(fe_model, reduced_model, mass=chosen.mass)
     problem = make_problem(reduced_model, fit, pairs or pair_roots(fit, reduced_model), basis)
     problem = replace(problem, covariance=with_position_uncertainty(problem, position_uncertainty))
-    return cast("Method", module).update(problem, chosen, progress)
+    return with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
 
 
 def method_names() -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -10,6 +10,7 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Drawn, Tabulated
+from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
 from frf_ipz.structure import ReducedModel
 
 UNCERTAIN = (
@@ -143,4 +144,36 @@ def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:
         after=no_roots,
         ensemble=np.zeros((0, 3, order, order)),
         warnings=(UNCERTAIN,),
+    )
+
+
+def with_free_rigid_bodies(updated: UpdatedModel) -> UpdatedModel:
+    """Take the rounding of an update off the rigid-body modes: what met no force before meets none now.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The result of a method, which may change everything but what holds the structure.
+
+    Returns
+    -------
+    UpdatedModel
+        With the same elastic modes.
+    """
+    nominal = updated.nominal
+    if not nominal.rigid.size or updated.model is nominal:
+        return updated
+    unstrained, undamped = (
+        nominal.rigid[:, meet_no_force(matrix, nominal.rigid)] for matrix in (nominal.stiffness, nominal.damping)
+    )
+
+    def free(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return mass, without_force(damping, mass, undamped), without_force(stiffness, mass, unstrained)
+
+    model = updated.model
+    mass, damping, stiffness = free(model.mass, model.damping, model.stiffness)
+    return replace(
+        updated,
+        model=replace(model, mass=mass, damping=damping, stiffness=stiffness),
+        ensemble=np.array([free(*member) for member in updated.ensemble]).reshape(updated.ensemble.shape),
     )

@@ -226,6 +226,7 @@ def test_one_input_one_output_survives_matlab(tmp_path):
 
 def test_the_files_hold_what_the_contract_says(tmp_path):
     keys = {"A", "B", "C", "D", "dt", "input_names", "output_names", "state_names", "input_units", "output_units"}
+    keys |= {"notes"}
     space = make_state_space(measured(LABELS), updated(MODELS["chain"]), points=(POINT,))
     for suffix in (".json", ".mat"):
         write_state_space(space, tmp_path / f"statespace{suffix}")

@@ -9,7 +9,7 @@ from frf_ipz.report.sections.state_space import build
 from frf_ipz.runs.results import Results
 from synthetic_run import synthetic_folder, with_results
 
-PORTS = ("dt", "state_names", "input_names", "input_units", "output_names", "output_units")
+PORTS = ("dt", "state_names", "input_names", "input_units", "output_names", "output_units", "notes")
 
 
 @pytest.fixture(scope="module")

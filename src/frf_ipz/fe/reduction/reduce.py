@@ -325,6 +325,7 @@ def _reduced_model(
         residual_dofs=ritz.residual,
         choices=notes,
         dashpots=(dashpots + dashpots.T) / 2 if states_both else np.zeros((0, 0)),
+        rigid=ritz.shapes[rows, : ritz.n_rigid] if ritz.n_rigid else np.zeros((0, 0)),
     )
 
 

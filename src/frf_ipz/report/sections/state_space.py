@@ -48,7 +48,9 @@ def build(run: Results) -> Section | None:
         rows=ports,
         file="statespace.json, statespace.mat",
     )
-    return Section(anchor="state-space", title="State space", lead=lead, blocks=(table, _poles(model)))
+    return Section(
+        anchor="state-space", title="State space", lead=lead, blocks=(table, _poles(model)), choices=model.notes
+    )
 
 
 def _poles(model: StateSpaceModel) -> Table:
