@@ -21,6 +21,8 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
@@ -201,6 +203,36 @@ def errors_of_file(path: Path | str, *, where: str = "") -> Iterator[None]:
         raise
     except InputError as error:
         raise FileFormatError(path, str(error), where=where) from None
+
+
+@contextmanager
+def errors_of_arithmetic(what: str) -> Iterator[None]:
+    """Say as an error of the package that numbers leave double precision, or memory does not hold them.
+
+    Parameters
+    ----------
+    what : str
+        What is computed.
+
+    Yields
+    ------
+    None
+        While it is computed.
+
+    Raises
+    ------
+    IllConditionedError
+        In the place of what a solver of NumPy or SciPy, or the system, says.
+    """
+    try:
+        yield
+    except (np.linalg.LinAlgError, FloatingPointError, OverflowError):
+        raise IllConditionedError(
+            f"{what}: numbers lie too many decades apart for double precision; check the units and sizes of the model "
+            "(masses, springs, lengths) and of what was measured"
+        ) from None
+    except MemoryError:
+        raise IllConditionedError(f"{what}: memory does not hold it; use a smaller model or fewer lines") from None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -8,17 +8,28 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+LARGEST = 1e30  # in SI units: beyond, squares and products overflow, and nothing is so large
+SMALLEST = 1e-30  # of what is above 0
+MOST = 10**6  # of what is counted; beyond, memory and time have no end
 LARGEST_HZ = 1e9  # beyond any vibration: a frequency that was meant otherwise
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+
+def _require_size(value: float) -> float:
+    if value < SMALLEST:
+        raise ValueError(f"must be greater than {SMALLEST:g}: smaller sizes are those of nothing")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False, strict=True), AfterValidator(_require_size)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False, strict=True)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]
 Frequency = Annotated[float, Field(ge=0, le=LARGEST_HZ, allow_inf_nan=False, strict=True)]
-Count = Annotated[int, Field(ge=1, strict=True)]
-CountOrNone = Annotated[int, Field(ge=0, strict=True)]
+Count = Annotated[int, Field(ge=1, le=MOST, strict=True)]
+CountOrNone = Annotated[int, Field(ge=0, le=MOST, strict=True)]
+Seed = Annotated[int, Field(ge=0, strict=True)]
 Node = Annotated[int, Field(ge=1, strict=True)]
 NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(min_length=1)]

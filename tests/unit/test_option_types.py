@@ -38,3 +38,27 @@ def test_a_list_is_as_good_as_a_tuple():
 def test_a_stop_of_zero_lets_the_published_method_go_on():
     options = frf_ipz.UpdateOptions(method="ipz", delta=0.0, delta_damping=0.0)
     assert (options.delta, options.delta_damping) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e300, "text", [], {}, True])
+@pytest.mark.parametrize(
+    ("options", "key"),
+    [
+        (frf_ipz.IngestOptions, "exponential_window_s"),
+        (frf_ipz.IngestOptions, "segment_s"),
+        (frf_ipz.UpdateOptions, "alpha"),
+        (frf_ipz.UpdateOptions, "ensemble"),
+        (frf_ipz.ExportOptions, "sample_time_s"),
+        (frf_ipz.DiagnoseOptions, "gain_tolerance"),
+        (frf_ipz.ReduceOptions, "modes"),
+        (frf_ipz.FitOptions, "max_order"),
+    ],
+)
+def test_no_number_is_without_bounds(options, key, value):
+    with pytest.raises(InputError, match=rf"{options.__name__}\.{key}.*: .*given is"):
+        options(**{key: value})
+
+
+def test_counts_end_before_memory_does():
+    with pytest.raises(InputError, match=r"UpdateOptions\.ensemble.*1000000"):
+        frf_ipz.UpdateOptions(ensemble=10**15)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from frf_ipz.option_types import CountOrNone, NotNegative
+from frf_ipz.option_types import NotNegative, Seed
 from frf_ipz.toml_files import STRICT, check_values
 
 
@@ -53,7 +53,7 @@ class DiagnoseOptions:
     damping_tolerance: NotNegative = 0.3
     gain_tolerance: NotNegative = 5e-3
     position_tolerance_m_per_m: NotNegative = 1e-3
-    seed: CountOrNone | None = None
+    seed: Seed | None = None
 
     def __post_init__(self) -> None:
         check_values(self)

@@ -20,7 +20,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError
+from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError, errors_of_arithmetic
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
@@ -254,14 +254,18 @@ def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
         raise InputError(f"{n_modes} modes are requested; the model '{model.name}' has {order} free DOFs")
     if up_to_hz is not None and not up_to_hz > 0:
         raise InputError(f"modes up to {up_to_hz:g} Hz are requested; give a frequency above 0")
-    if order < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
-        basis = _solve_dense(model, n_modes or order, up_to_hz)
-    elif n_modes is None and up_to_hz is None:
+    if order >= DENSE_ORDER and n_modes is None and up_to_hz is None:
         raise InputError(
             f"the model '{model.name}' has {order} free DOFs: say how many modes, or up to which frequency"
         )
-    else:
-        basis = _solve_sparse(model, n_modes, up_to_hz)
+    for matrix in (model.mass, model.stiffness):
+        if not np.isfinite(matrix.data).all():
+            raise IllConditionedError(f"the model '{model.name}' has masses or springs beyond any; check their units")
+    with errors_of_arithmetic(f"the modes of the model '{model.name}'"):
+        if order < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
+            basis = _solve_dense(model, n_modes or order, up_to_hz)
+        else:
+            basis = _solve_sparse(model, n_modes, up_to_hz)
     if up_to_hz is not None:
         basis = basis.first(int(np.count_nonzero(basis.natural_frequency_hz <= up_to_hz)))
     return basis
@@ -278,10 +282,11 @@ def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -
     elastic = rough[max(int(np.count_nonzero(rough <= LOST * shift)), system.rigid.shape[1]) :]
     shift = SHIFT**2 * float(elastic[0]) if elastic.size else shift
     shifted = system.stiffness + shift * system.mass
-    inverses, shapes = linalg.eigh(
+    _, shapes = linalg.eigh(
         system.mass.toarray(), shifted.toarray(), subset_by_index=[order - min(n_modes, order), order - 1]
     )
-    shapes = shapes[:, ::-1] / np.sqrt(inverses[::-1])
+    shapes = shapes[:, ::-1]
+    shapes = shapes / np.sqrt(np.sum(shapes * multiply(system.mass, shapes), 0))
     return _orthonormalised(model, system, shapes, factorize(shifted, _nodes(model)), shift)
 
 
@@ -375,11 +380,13 @@ def _first_elastic_hz(model: StructuralModel, system: _System, up_to_hz: float |
 
 def _ritz(system: _System, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rayleigh-Ritz: mass-normalised combinations of motions that are stiffness-orthogonal; weights and motions."""
-    weights, axes = linalg.eigh(motions.T @ multiply(system.mass, motions))
+    weights, axes = np.linalg.eigh(motions.T @ multiply(system.mass, motions))
     independent = weights > DEPENDENT * weights[-1]
+    if not independent.any():
+        raise np.linalg.LinAlgError
     normalised = axes[:, independent] / np.sqrt(weights[independent])
     reduced = motions @ normalised
-    _, axes = linalg.eigh(reduced.T @ multiply(system.stiffness, reduced))
+    _, axes = np.linalg.eigh(reduced.T @ multiply(system.stiffness, reduced))
     return normalised @ axes, reduced @ axes
 
 

@@ -76,7 +76,7 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     inputs = np.array([model.row(label.input_dof) for label in labels])
     products = (outputs @ roots.right_vectors) * (inputs @ roots.left_vectors)
     # a rigid-body mode is a double root: it has no residue, and no measured mode is one
-    is_simple = np.abs(roots.slope) > RIGID * np.abs(roots.slope).max()
+    is_simple = np.abs(roots.slope) > RIGID * np.abs(roots.slope).max(initial=0.0)
     residues = np.where(is_simple, products / np.where(is_simple, roots.slope, 1.0), 0.0)
     return ModelPoles(values=roots.values, amplitudes=(residues * 2j * np.abs(roots.values)).T)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from frf_ipz import __version__
+from frf_ipz.errors import errors_of_arithmetic
 from frf_ipz.runs.digests import digest
 
 if TYPE_CHECKING:
@@ -81,7 +82,8 @@ class StageRunner:
             The result.
         """
         key = self.make_key(name, depends)
-        result = self.store.stage(name, key, lambda: compute(self.stage_progress(name)), files)
+        with errors_of_arithmetic(f"the stage '{name}'"):
+            result = self.store.stage(name, key, lambda: compute(self.stage_progress(name)), files)
         if name in self.store.computed:
             self.store.mark_stale(dependents(name))
         return result

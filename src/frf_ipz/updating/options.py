@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive
+from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Seed
 from frf_ipz.toml_files import STRICT, check_values
 
 
@@ -65,7 +65,7 @@ class UpdateOptions:
     delta_damping: NotNegative = 0.1
     cross_sensitivities: bool = True
     ensemble: CountOrNone = 200
-    seed: CountOrNone = 0
+    seed: Seed = 0
 
     def __post_init__(self) -> None:
         check_values(self)
