@@ -64,6 +64,12 @@ def _make_frf(
     output_dof = source.output_dof or _make_dof(source, node, direction, "rsp_dir")
     input_dof = source.input_dof or _make_dof(source, reference, reference_direction, "ref_dir")
     _check_quantity(source, item, f"{output_dof} / {input_dof}")
+    n_lines, n_values = len(item["x"]), len(item["data"])
+    if n_lines != n_values:
+        raise FileFormatError(
+            source.path,
+            f"announces {n_lines} lines for the FRF {output_dof} / {input_dof}, but holds {n_values}; is it cut off?",
+        )
     return MeasuredFrf(
         source=source,
         output_dof=output_dof,
