@@ -35,6 +35,7 @@ KINDS: tuple[FindCauses, ...] = (
     supports.other_supports,
 )
 MORE_LIKELY_THAN_NOT = 0.5
+EXPECTED_COST = 2 * np.log(2)  # of a datum whose error is drawn from Cauchy's distribution: the mean of log(1 + x^2)
 
 
 def find_likely_cause(situation: Situation) -> LikelyCause | None:
@@ -54,12 +55,21 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
         return None
     causes = [cause for kind in KINDS for cause in kind(situation)]
     nothing = log_evidence(Cause(says="", file="", line_or_key=""), situation)
-    something_else = unrelated_log_likelihood(situation.measured, situation.computed)
+    something_else = unrelated_log_likelihood(situation.measured)
     logs = np.array([nothing, something_else, *(log_evidence(cause, situation) for cause in causes)])
     probability = np.exp(logs - logsumexp(logs))
     if probability[2:].sum() <= MORE_LIKELY_THAN_NOT:
         return None
+    if not _explains(causes[int(np.argmax(probability[2:]))], situation):
+        return None
     return _worded(causes, probability[2:])
+
+
+def _explains(cause: Cause, situation: Situation) -> bool:
+    """Tell whether the modes agree under a cause as those of a nearly right model do: the best of many may be bad."""
+    measured = situation.measured
+    cost = cause.log_prior - log_evidence(cause, situation)
+    return bool(cost <= EXPECTED_COST * (measured.products.size + len(measured.frequency_hz)))
 
 
 def _worded(causes: list[Cause], probability: np.ndarray) -> LikelyCause:
