@@ -220,7 +220,7 @@ def _cost_of_no_counterpart(n_frfs: int) -> float:
 
 
 def unrelated_log_likelihood(measured: MeasuredModes) -> float:
-    """Give the log likelihood where something else is wrong: shapes are off by their own size, frequencies fit by chance.
+    """Give the log likelihood where something else is wrong: shapes are off by their size, frequencies fit by chance.
 
     Parameters
     ----------

@@ -6,21 +6,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.assessment.assessment import Verdict
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.findings import card_texts, verdict_of
-from frf_ipz.report.section import Card, Headline, Section, run_figures
+from frf_ipz.report.section import Card, Headline, Section, Table, run_figures
 from frf_ipz.runs.picture_data import fitted_lines, model_values, update_targets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.runs.results import Results
     from frf_ipz.updating.targets import Target
 
+VERDICTS = {
+    Verdict.USABLE: "Usable",
+    Verdict.WITH_CARE: "To be used with care",
+    Verdict.NOT_USABLE: "Not usable",
+}
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
 
@@ -46,7 +53,7 @@ def build(run: Results) -> Section:
         anchor="overview",
         title="Overview",
         lead="",
-        blocks=(headline, *run_figures(run, "structure")),
+        blocks=(headline, *_checks(run), *run_figures(run, "structure")),
         notes=notes,
     )
 
@@ -64,7 +71,8 @@ def verdict(run: Results) -> tuple[str, str]:
     pair of str
         The verdict in a sentence, and what there is to add.
     """
-    parts = list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
+    parts = [] if run.assessment is None else [assessment_sentence(run.assessment)]
+    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
     if run.updated_model is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
@@ -76,6 +84,62 @@ def verdict(run: Results) -> tuple[str, str]:
         parts.append(f"{counted(run.frfs.n_frfs, 'FRF')} estimated; nothing fitted yet.")
     sentence, *additions = parts or ["This run holds no results yet."]
     return sentence, " ".join(filter(None, additions))
+
+
+def assessment_sentence(assessment: Assessment) -> str:
+    """Say whether the result can be used, and what stands against it first.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        The verdict with its checks.
+
+    Returns
+    -------
+    str
+        A sentence.
+    """
+    word = VERDICTS[assessment.verdict]
+    cause = assessment.likely_cause
+    if cause is not None:
+        place = f"{cause.file}, {cause.line_or_key}; probability {cause.probability:.2f}"
+        return f"{word}: most likely {cause.says} ({place})."
+    costly = [check for check in assessment.checks if check.verdict is not Verdict.USABLE]
+    return f"{word}: {costly[0].says}." if costly else f"{word}: all checks are within their limits."
+
+
+def _checks(run: Results) -> list[Table]:
+    """List the checks of the assessment, the worst first."""
+    if run.assessment is None:
+        return []
+    checks = run.assessment.checks
+    rows = [
+        (
+            check.name,
+            check.verdict.value,
+            _figure(check.figure, check.unit),
+            _figure(check.limit, check.unit),
+            check.where,
+        )
+        for check in checks
+    ]
+    return [
+        Table(
+            caption="What the verdict rests on",
+            columns=("check", "verdict", "figure", "limit", "where"),
+            rows=rows,
+            marked=frozenset(place for place, check in enumerate(checks) if check.verdict is not Verdict.USABLE),
+            file="run.json",
+        )
+    ]
+
+
+def _figure(value: float, unit: str) -> str:
+    if not np.isfinite(value):
+        return ""
+    return (
+        percent(value, 2) if unit == "1" and value <= 1 else f"{number(value, 2)} {'' if unit == '1' else unit}".strip()
+    )
 
 
 def _of_update(run: Results) -> str:
