@@ -66,7 +66,7 @@ def parameters(evidence: Evidence) -> Iterator[Check]:
     ratios = parts["stiffness_ratio"].to_numpy(float)
     extent = np.maximum(ratios, 1 / np.maximum(ratios, np.finfo(float).tiny))
     worst = int(np.argmax(extent))
-    where = f"{parts['kind'].iloc[worst]} {parts['name'].iloc[worst]}"
+    where = str(parts["name"].iloc[worst])
     too_much = bool(extent[worst] > PLAUSIBLE_RATIO)
     yield Check(
         name="changes of the model",
