@@ -277,3 +277,15 @@ def test_frfs_of_others_have_no_records(tmp_path):
     path = write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
     with pytest.raises(InputError, match="has no recordings"):
         list(read_records(read_test(path), IngestOptions()))
+
+
+def test_rest_before_an_impact_in_coarse_digital_steps_is_no_dropout(tmp_path):
+    rng = np.random.default_rng(12)
+    for number in range(3):
+        signals = noisy(rng, height=100.0, at_s=0.8)
+        step = np.abs(signals[1]).max() / 500
+        signals[1] = step * np.round(signals[1] / step)
+        signals[1, [700, 800]] = 50 * step  # somebody touched the cable: the rest between is a run of one value
+        write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
+    result = estimate(write_test(tmp_path, HIT))
+    assert not any("dropout" in marks for marks in result.records.marks)

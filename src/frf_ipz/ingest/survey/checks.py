@@ -189,9 +189,9 @@ def _find_bad_channels(
             continue
         if is_clipped(response):
             faults.append((output, f"overload of {channel.column}"))
-        start, length = find_dropout(response)
+        start, length = find_dropout(response[n_before:])  # at rest, a coarse converter shows one value for long
         if length:
-            where = f"{length} samples of one value, {start * step_s:.4g} s after its beginning"
+            where = f"{length} samples of one value, {(n_before + start) * step_s:.4g} s after its beginning"
             faults.append((output, f"dropout of {channel.column}: {where}"))
         if channel.quantity == "acceleration" and is_settling(response, n_before):
             faults.append((output, f"{channel.column} is settling: it drifts before the impact and on to the end"))
