@@ -333,9 +333,11 @@ class FrfSet(Tabulated, Drawn):
         for low, high in exclude_hz:
             used &= (frequency < low) | (frequency > high)
         if not used.any():
+            in_ms = frequency[-1] < band_hz[0] <= 1e3 * frequency[-1]
             raise InputError(
                 f"no frequency line remains in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; the measured lines go "
                 f"from {frequency[0]:g} to {frequency[-1]:g} Hz, so set another [fit] band_hz"
+                + ("; or the time of the recordings is in ms: name that unit in the column's header" if in_ms else "")
             )
         return used
 

@@ -90,3 +90,10 @@ def test_a_label_takes_the_names_of_dofs_and_quantities():
     assert label == FrfLabel(parse_dof("20:-z"), parse_dof("18:+z"), FrfQuantity.MOBILITY)
     with pytest.raises(InputError, match="20z"):
         FrfLabel("20z", "18:+z", "mobility")
+
+
+@pytest.mark.parametrize(("band_hz", "is_named"), [((2000, 4000), True), ((8000, 9000), False), ((0.1, 0.2), False)])
+def test_a_band_a_thousand_times_too_high_is_taken_for_time_in_ms(band_hz, is_named):
+    with pytest.raises(InputError) as raised:
+        frf_set().in_band(band_hz)
+    assert ("time of the recordings is in ms" in str(raised.value)) == is_named
