@@ -10,6 +10,7 @@ from frf_ipz.errors import InputError
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _LABEL = re.compile(r"^\s*([0-9]{1,18})\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
+_DIRECTION = re.compile(r"[+-]?r?[xyz]")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -135,3 +136,33 @@ def parse_dof(text: str) -> Dof:
         raise InputError(f"'{text}' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'")
     node, sign, direction = match.groups()
     return Dof(int(node), direction, -1 if sign == "-" else 1)
+
+
+def as_direction(text: str) -> str:
+    """Check a direction that stands without a node.
+
+    Parameters
+    ----------
+    text : str
+        ``z``, ``+z``, ``-rx`` and the like, or nothing.
+
+    Returns
+    -------
+    str
+        The same.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    Examples
+    --------
+    >>> as_direction("-z")
+    '-z'
+    """
+    if text and _DIRECTION.fullmatch(text) is None:
+        raise InputError(
+            f"'{text}' is no direction; expected is one of {', '.join(DIRECTIONS)}, with a sign or without"
+        )
+    return text

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Literal
 
 from frf_ipz.arguments import as_path
-from frf_ipz.dofs import Dof, parse_dof
-from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
+from frf_ipz.dofs import Dof, as_direction, parse_dof
+from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
-from frf_ipz.option_types import CountOrNone, NotNegative, Ratio
+from frf_ipz.option_types import Count, CountOrNone, NotNegative, Ratio
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
@@ -120,6 +120,12 @@ class FrfKeys:
         ``magnitude_db`` with ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``, ``skip``.
     skip_rows : int
         Lines before the numbers of a text file; further lines of text are skipped without being counted.
+    direction : str
+        Direction of the nodes of a universal file that have none, such as ``"z"`` or ``"-z"``.
+    sets : tuple of int
+        Which data sets of a universal file to read, counted from 1; all FRFs where it is left out.
+    conjugated : bool
+        The file has the time convention exp(-i omega t): its FRFs are the complex conjugate of ours.
     """
 
     __pydantic_config__ = STRICT
@@ -131,6 +137,9 @@ class FrfKeys:
     input_dof: str | None = None
     columns: tuple[str, ...] = ()
     skip_rows: CountOrNone = 0
+    direction: str = ""
+    sets: tuple[Count, ...] = ()
+    conjugated: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,7 +359,15 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         input_dof=None if keys.input_dof is None else _parse_dof(path, keys.input_dof, where),
         columns=keys.columns,
         skip_rows=keys.skip_rows,
+        direction=_parse_direction(path, keys.direction, where),
+        sets=keys.sets,
+        is_conjugated=keys.conjugated,
     )
+
+
+def _parse_direction(path: Path, text: str, where: str) -> str:
+    with errors_of_file(path, where=where):
+        return as_direction(text)
 
 
 def _parse_dof(path: Path, text: str, where: str) -> Dof:

@@ -5,6 +5,7 @@ Files are streamed; small ones are cached within a fixed budget of memory, since
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.registry import open_recording
-from frf_ipz.ingest.units import GRAVITY_SYMBOLS, same_unit, sensitivity_factor, unit_factor
+from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -174,18 +175,27 @@ def _time_factor(recording: RawRecording) -> float:
 def _channel_factor(path: Path, channel: Channel, dof: Dof, file_unit: str) -> float:
     """Return the factor to SI; the units of test and file must agree, and one of them must be stated."""
     rotational = dof.direction.startswith("r")
-    if channel.quantity == "acceleration":
-        file_unit = GRAVITY_SYMBOLS.get(file_unit, file_unit)
+    file_unit = file_unit if is_stated(file_unit) else ""
     test_unit = channel.column_unit
+    where = f"{path}, column '{channel.column}'"
     if not test_unit and not file_unit:
         problem = "has no unit: give the [[channel]] a 'unit' or a 'sensitivity', or the file a row of units"
-        raise QuantityError(f"{path}, column '{channel.column}': {problem}")
-    if test_unit and file_unit and same_unit(test_unit, file_unit) is False:
-        problem = f"is in '{file_unit}' by the file and in '{test_unit}' by the test; correct the one that is wrong"
-        raise QuantityError(f"{path}, column '{channel.column}': {problem}")
+        raise QuantityError(f"{where}: {problem}")
+    ratio = unit_ratio(file_unit, test_unit) if test_unit and file_unit else None
     if channel.sensitivity:
-        return sensitivity_factor(channel.sensitivity, channel.quantity, rotational=rotational)
+        if ratio is not None and math.isnan(ratio):
+            problem = (
+                f"is in '{file_unit}' by the file, and the sensitivity '{channel.sensitivity}' wants '{test_unit}'"
+            )
+            raise QuantityError(
+                f"{where}: {problem}; where the file is in that unit already, leave the sensitivity out"
+            )
+        factor = sensitivity_factor(channel.sensitivity, channel.quantity, rotational=rotational)
+        return factor if ratio is None else factor * ratio
+    if ratio not in {None, 1.0}:
+        problem = f"is in '{file_unit}' by the file and in '{test_unit}' by the test; correct the one that is wrong"
+        raise QuantityError(f"{where}: {problem}")
     try:
         return unit_factor(test_unit or file_unit, channel.quantity, rotational=rotational)
     except QuantityError as error:
-        raise QuantityError(f"{path}, column '{channel.column}': {error}") from None
+        raise QuantityError(f"{where}: {error}") from None

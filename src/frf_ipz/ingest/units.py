@@ -1,6 +1,8 @@
 """Units at the edge: what a column is in, as one factor to SI.
 
-pint reads units here and nowhere else; behind this module every value is SI.
+pint reads units here and nowhere else; behind this module every value is SI. Before pint sees it, a text is brought
+from the ways of analysers to that of pint: ``m/s2``, ``ms-2``, ``(1/N)*(g)``. In tests of vibrations ``g`` is the
+acceleration of gravity and ``lb`` the pound of force: no gram and no mass is measured.
 """
 
 from __future__ import annotations
@@ -17,15 +19,70 @@ from frf_ipz.quantities import FrfQuantity, frf_quantity_of
 
 EXAMPLES = {
     "force": "N, kN or lbf",
-    "acceleration": "m/s^2 or g_0",
+    "acceleration": "m/s^2 or g",
     "velocity": "m/s or mm/s",
     "displacement": "m, mm or um",
     "time": "s or ms",
 }
-UNREADABLE = (pint.PintError, ValueError, TypeError, AttributeError, AssertionError, TokenError, ZeroDivisionError)
-NUMBER = re.compile(r"^\s*[+-]?[\d.]*([eE][+-]?\d+)?")
+UNREADABLE = (
+    pint.PintError,
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    KeyError,
+    RecursionError,
+    SyntaxError,
+    TokenError,
+    TypeError,
+    ValueError,
+)
+RECORDED = ("s", "N", "N m", "m", "m/s", "m/s^2", "rad/s", "rad/s^2", "V", "C", "V/N", "C/N")
+LONGEST = 80  # letters of a unit
+NUMBER = re.compile(r"^\s*[+-]?[0-9.]*([eE][+-]?[0-9]+)?")
 SAME = 1e-9  # relative: two factors that differ by less are one unit, written in two ways
-GRAVITY_SYMBOLS = {"g": "g_0", "G": "g_0", "gn": "g_0"}  # how analysers write the acceleration of gravity
+FREQUENCIES = {
+    **dict.fromkeys(("hz", "hertz", "1/s", "cps"), 1.0),
+    "khz": 1e3,
+    **dict.fromkeys(("rad/s", "rad/sec", "radians/s"), 1.0 / (2.0 * math.pi)),
+    **dict.fromkeys(("rpm", "cpm", "1/min"), 1.0 / 60.0),
+}
+NOT_STATED = {"", "-", "--", "?", "none", "null", "n/a", "unknown", "no unit", "unitless"}
+
+# What stands in files, and what pint reads. The second line: UTF-8 taken for Latin-1, and the code page of DOS.
+LETTERS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "∙": "*", "•": "*", "×": "*", "−": "-", "°": "deg"})
+MANGLED = (("Â²", "²"), ("Â³", "³"), ("Âµ", "µ"), ("Â·", "·"), ("ý", "²"), ("æ", "µ"), ("^", "**"))
+SUPERSCRIPTS = re.compile(r"[⁻⁺]?[¹²³⁴]")
+DIGITS_OF_SUPERSCRIPTS = str.maketrans("⁻⁺¹²³⁴", "-+1234")
+LENGTH_PER_TIME = re.compile(r"(?<![A-Za-z])([kmcdun]?m|in|ft)s(?:\*\*)?(-[12])(?![0-9])")  # ms-2 is m s-2
+EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])([A-Za-z]+)(-[1-4]|[2-4])(?![A-Za-z0-9_.])")  # s2, s-2
+INTEGER = re.compile(r"(?<![\w.])(?<![0-9.][eE][+-])([0-9]+)(?![\w.])")
+POWER = re.compile(r"(?:[A-Za-z)]|g_0)\s*\*\*\s*\(?[+-]?[1-9]\)?(?![0-9.\s]*\*\*)")
+MOST_POWERS = 6
+WORD = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
+WORDS = {
+    **dict.fromkeys(("g", "G", "gn", "Gn", "g_n", "g0", "gs", "Gs", "gee"), "g_0"),
+    **dict.fromkeys(("mg", "mG", "mgn"), "(1e-3*g_0)"),
+    **dict.fromkeys(("ug", "ugn"), "(1e-6*g_0)"),
+    "KN": "kN",
+    **{f"{prefix}N{length}": f"({prefix}N*{length})" for prefix in ("", "k", "m") for length in ("m", "mm", "cm")},
+    "Kgf": "kgf",
+}
+WORDS_IN_ANY_CASE = {
+    **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("lb", "lbs", "lbf", "lbsf", "pound", "pounds"), "lbf"),
+    **dict.fromkeys(("volt", "volts"), "V"),
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sek"), "s"),
+    **dict.fromkeys(("msec", "msecs", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("inch", "inches"), "inch"),
+    **dict.fromkeys(("mil", "mils", "thou"), "(1e-3*inch)"),
+    "in": "inch",
+    "ips": "(inch/s)",
+    "kp": "kgf",
+}
+CAPITALS = re.compile(r"[A-Z0-9/*()\-. ]+")  # units as programs write them that know no small letters
+WORDS_IN_CAPITALS = {"M": "m", "MM": "mm", "CM": "cm", "FT": "ft", "S": "s", "RAD": "rad", "DEG": "deg"}
 
 
 def si_unit(quantity: str, *, rotational: bool = False) -> str:
@@ -61,7 +118,7 @@ def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:
     Parameters
     ----------
     unit : str
-        Anything pint reads.
+        Anything pint reads, and what analysers write.
     quantity : str
         As in `si_unit`.
     rotational : bool
@@ -93,7 +150,7 @@ def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = Fa
     Parameters
     ----------
     sensitivity : str
-        Output over measured quantity, such as ``10.2 mV/g_0``; the column is in the unit of the numerator.
+        Output over measured quantity, such as ``10.2 mV/g``; the column is in the unit of the numerator.
     quantity : str
         What is measured.
     rotational : bool
@@ -114,12 +171,19 @@ def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = Fa
     >>> round(sensitivity_factor("10 mV/N", "force"), 3)
     0.1
     """
-    output = _parse(sensitivity)
-    if output.magnitude == 0:
-        raise QuantityError(f"the sensitivity '{sensitivity}' is zero")
-    measured_unit = _parse(numerator_of(sensitivity)) / output
     problem = f"the sensitivity '{sensitivity}' is not per unit of {quantity}"
-    return _convert(measured_unit, si_unit(quantity, rotational=rotational), problem, quantity)
+    si = si_unit(quantity, rotational=rotational)
+    column_unit = _parse(numerator_of(sensitivity))
+    readings = [_parse(sensitivity)]
+    numerator, _, denominator = sensitivity.partition("/")
+    if "/" in denominator and "(" not in denominator:  # mV/m/s^2
+        readings.append(_parse(f"{numerator}/({denominator})"))
+    if any(output.magnitude == 0 for output in readings):
+        raise QuantityError(f"the sensitivity '{sensitivity}' is zero")
+    measured = [column_unit / output for output in readings]
+    return _convert(
+        next((unit for unit in measured if unit.is_compatible_with(si)), measured[0]), si, problem, quantity
+    )
 
 
 def numerator_of(sensitivity: str) -> str:
@@ -128,7 +192,7 @@ def numerator_of(sensitivity: str) -> str:
     Parameters
     ----------
     sensitivity : str
-        Such as ``10.2 mV/g_0``.
+        Such as ``10.2 mV/g``.
 
     Returns
     -------
@@ -142,13 +206,13 @@ def numerator_of(sensitivity: str) -> str:
 
     Examples
     --------
-    >>> numerator_of("10.2 mV/g_0")
+    >>> numerator_of("10.2 mV/g")
     'mV'
     """
     numerator, slash, _ = sensitivity.partition("/")
     unit = NUMBER.sub("", numerator).strip()
     if not slash or not unit:
-        raise QuantityError(f"the sensitivity '{sensitivity}' is no ratio of units; write it as in '10.2 mV/g_0'")
+        raise QuantityError(f"the sensitivity '{sensitivity}' is no ratio of units; write it as in '10.2 mV/g'")
     return unit
 
 
@@ -183,8 +247,37 @@ def frf_factor(unit: str, quantity: FrfQuantity, output_direction: str, input_di
     return _convert(_parse(unit), si, f"'{unit}' is no unit of {quantity.value}", "")
 
 
-def same_unit(first: str, second: str) -> bool | None:
-    """Tell whether two texts mean the same unit.
+def frequency_factor(unit: str) -> float:
+    """Return the factor from frequencies in a unit to Hz.
+
+    Parameters
+    ----------
+    unit : str
+        ``Hz``, ``rad/s``, ``rpm`` and the like; nothing stated is Hz.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Raises
+    ------
+    QuantityError
+        If it is none of them.
+
+    Examples
+    --------
+    >>> frequency_factor("kHz"), frequency_factor("cpm") * 60
+    (1000.0, 1.0)
+    """
+    name = unit.strip(" []()").lower()
+    if name not in FREQUENCIES and is_stated(unit):
+        raise QuantityError(f"'{unit}' is no unit of frequency; expected is {', '.join(FREQUENCIES)}")
+    return FREQUENCIES.get(name, 1.0)
+
+
+def unit_ratio(first: str, second: str) -> float | None:
+    """Return how many of a second unit a first one is.
 
     Parameters
     ----------
@@ -193,16 +286,63 @@ def same_unit(first: str, second: str) -> bool | None:
 
     Returns
     -------
-    bool or None
-        None where one of them cannot be read: an analyser's own way of writing it says nothing.
+    float or None
+        1 for one unit that is written in two ways; NaN for units of different quantities; None where one of them
+        cannot be read: an analyser's own way of writing it says nothing.
+
+    Examples
+    --------
+    >>> unit_ratio("V", "mV"), unit_ratio("m/s2", "m s**-2"), unit_ratio("N", "m"), unit_ratio("N", "channel 1")
+    (1000.0, 1.0, nan, None)
     """
     try:
         ratio = float((_parse(first) / _parse(second)).to("").magnitude)
     except QuantityError:
         return None
     except pint.PintError:
+        return math.nan
+    return 1.0 if abs(ratio - 1.0) < SAME else ratio
+
+
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a unit of what recordings hold: of time, force, motion, voltage or charge.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``mm/s2``.
+
+    Returns
+    -------
+    bool
+        True for a unit, False for a number, a word, or nothing.
+
+    Examples
+    --------
+    >>> is_unit("mm/s2"), is_unit("Volt"), is_unit("force"), is_unit("1")
+    (True, True, False, False)
+    """
+    try:
+        unit = _parse(text) if is_stated(text) else None
+    except QuantityError:
         return False
-    return abs(ratio - 1.0) < SAME
+    return unit is not None and any(unit.is_compatible_with(known) for known in RECORDED)
+
+
+def is_stated(text: str) -> bool:
+    """Tell whether a text of a file claims to be a unit.
+
+    Parameters
+    ----------
+    text : str
+        What stands where the unit should.
+
+    Returns
+    -------
+    bool
+        False for nothing, ``NONE``, ``unknown`` and the like.
+    """
+    return text.strip().lower() not in NOT_STATED
 
 
 @cache
@@ -212,11 +352,37 @@ def _registry() -> pint.UnitRegistry[float]:
 
 @cache
 def _parse(text: str) -> pint.Quantity[float]:
+    expression = _expression(text)
     try:
-        value: pint.Quantity[float] = _registry().Quantity(_registry().parse_expression(text)) * 1.0
+        value: pint.Quantity[float] = _registry().Quantity(_registry().parse_expression(expression)) * 1.0
+        value.to_base_units()
     except UNREADABLE:
-        raise QuantityError(f"'{text}' is no unit that can be read; write it as in N, m/s^2, g_0, mm/s or um") from None
+        comma = "; write its number with a decimal point" if "," in text else ""
+        examples = "write it as in N, m/s^2, g, mm/s or um"
+        raise QuantityError(f"'{text}' is no unit that can be read; {examples}{comma}") from None
     return value
+
+
+def _expression(text: str) -> str:
+    """Bring a unit to pint's way of writing; empty for what cannot be one, as pint skips what it does not know."""
+    for mangled, right in MANGLED:
+        text = text.replace(mangled, right)
+    text = SUPERSCRIPTS.sub(lambda match: f"**{match[0].translate(DIGITS_OF_SUPERSCRIPTS)}", text.translate(LETTERS))
+    text = text.strip(" \t[]{}'\"")
+    if len(text) > LONGEST or not text.isascii() or set(text) & set(",#$!?&|=<>@~%;:\\"):
+        return "("
+    text = re.sub(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])|(?<=[A-Za-z])-(?=[A-Za-z])", "*", text)  # N.m, lbf-in
+    text = re.sub(r"(?<=[A-Za-z])\.", "", text)  # in./sec.
+    text = EXPONENT.sub(r"\1**\2", LENGTH_PER_TIME.sub(r"(\1*s**\2)", text))
+    words = WORDS_IN_CAPITALS if CAPITALS.fullmatch(text) else {}
+    text = WORD.sub(lambda match: _word(match[0], words), text)
+    if len(POWER.findall(text)) != text.count("**") or text.count("**") > MOST_POWERS:  # 9**9**9 never ends
+        return "("
+    return INTEGER.sub(r"\1.0", text)  # a power of floats overflows
+
+
+def _word(word: str, words: dict[str, str]) -> str:
+    return words.get(word) or WORDS.get(word) or WORDS_IN_ANY_CASE.get(word.lower()) or word
 
 
 def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) -> float:
@@ -224,9 +390,7 @@ def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) 
         factor = float(value.to(si).magnitude)
     except pint.PintError:
         hint = EXAMPLES.get(quantity, "")
-        gram = "; 'g' is the gram, the acceleration of gravity is 'g_0'" if quantity == "acceleration" else ""
-        expected = f"expected is {hint}" if hint else f"expected is a unit like {si}"
-        raise QuantityError(f"{problem}; {expected}{gram}") from None
+        raise QuantityError(f"{problem}; expected is {hint or f'a unit like {si}'}") from None
     if not math.isfinite(factor) or factor == 0.0:
         raise QuantityError(f"{problem}: it is {factor:g} {si}; write a unit, without a number that is zero or NaN")
     return factor

@@ -288,7 +288,8 @@ def test_one_frf_twice(tmp_path):
 def test_files_without_common_lines(tmp_path):
     long_csv(tmp_path, outputs=("1:+z",))
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)
-    assert re.search(r"b\.csv: its lines .* are not those of frf\.csv", message(tmp_path, entry(), entry("b.csv")))
+    text = message(tmp_path, entry(), entry("b.csv"))
+    assert re.search(r"b\.csv: the lines of 2:.* are not those of 1:.* in frf\.csv", text), text
 
 
 def test_a_channel_in_a_test_of_frfs(tmp_path):
@@ -303,7 +304,9 @@ def test_a_channel_in_a_test_of_frfs(tmp_path):
     ("fields", "says"),
     [
         ({"func_type": 1}, "holds no data set 58 with a frequency response function"),
-        ({"rsp_dir": 0}, "states no direction .rsp_dir 0 at node 3.; name output_dof and input_dof"),
+        ({"rsp_dir": 0}, "states no direction of the response .direction 0 at node 3.; give.*direction = .z."),
+        ({"rsp_node": 0}, "the response is at node 0, and node 0 is the ground; name output_dof and input_dof"),
+        ({"ref_node": 0}, "the reference is at node 0, and node 0 is the ground; name output_dof and input_dof"),
         ({"ordinate_spec_data_type": 8}, "is stated to be receptance, but the test says accelerance"),
         ({"orddenom_spec_data_type": 12}, "is not a ratio to a force"),
     ],
@@ -348,7 +351,7 @@ def test_a_file_is_read_alone(tmp_path):
 def test_every_line_of_uneven_lines_is_taken_from_where_it_is(tmp_path):
     hertz = np.geomspace(1.0, 1000.0, 61)
     for file, output in (("a.csv", "1:+z"), ("b.csv", "3:+z")):
-        lines = "\n".join(f"{value!r},{output},2:+z,{value!r},0.0" for value in hertz.tolist())
+        lines = "\n".join(f"{value!r},{output},2:+z,{value!r},1.0" for value in hertz.tolist())
         (tmp_path / file).write_text(f"frequency_hz,output_dof,input_dof,real,imag\n{lines}\n", encoding="utf-8")
     entries = '[[frf]]\nfile = "a.csv"\nquantity = "accelerance"\n[[frf]]\nfile = "b.csv"\nquantity = "accelerance"\n'
     (tmp_path / "test.toml").write_text(f'[test]\nkind = "frf"\n{entries}', encoding="utf-8")

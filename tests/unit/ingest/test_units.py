@@ -1,9 +1,21 @@
 """Units are read by pint; what is no unit of its quantity is refused."""
 
+import math
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from frf_ipz.errors import QuantityError
-from frf_ipz.ingest.units import frf_factor, numerator_of, same_unit, sensitivity_factor, si_unit, unit_factor
+from frf_ipz.ingest.units import (
+    frf_factor,
+    is_unit,
+    numerator_of,
+    sensitivity_factor,
+    si_unit,
+    unit_factor,
+    unit_ratio,
+)
 from frf_ipz.quantities import FrfQuantity
 
 POUND_FORCE, GRAVITY = 4.4482216152605, 9.80665  # by definition
@@ -24,6 +36,23 @@ POUND_FORCE, GRAVITY = 4.4482216152605, 9.80665  # by definition
         ("um", "displacement", 1e-6),
         ("µm", "displacement", 1e-6),
         ("ms", "time", 1e-3),
+        *(
+            (unit, "acceleration", 1.0)
+            for unit in ("m/s2", "ms-2", "m.s-2", "m·s⁻²", "m s-2", "m/sec^2", "M/S2", "(m/s²)")
+        ),
+        *((unit, "acceleration", 1.0) for unit in ("ms⁻²", "m/s/s", "Meters/sec2", "[m/s2]")),
+        *((unit, "acceleration", 1e-3) for unit in ("mm/s2", "mm/s²", "mm/sÂ²", "mm/sý", "MM/S2", "mms-2")),
+        *((unit, "acceleration", GRAVITY) for unit in ("g", "gn", "G", "g_n", "gee")),
+        ("mg", "acceleration", 1e-3 * GRAVITY),
+        *((unit, "acceleration", 0.0254) for unit in ("in/s2", "IN/SEC2", "in./sec.^2", "inch/s²")),
+        *((unit, "force", POUND_FORCE) for unit in ("lb", "lbs", "LBF", "pounds")),
+        *((unit, "force", 1.0) for unit in ("Newton", "Newtons", "newton", "kg*m/s2")),
+        *((unit, "velocity", 0.0254) for unit in ("ips", "in/s", "IPS")),
+        *((unit, "velocity", 1.0) for unit in ("ms-1", "m.s-1")),
+        ("μm", "displacement", 1e-6),
+        ("mils", "displacement", 2.54e-5),
+        *((unit, "time", 1.0) for unit in ("sec", "second", "Seconds", "SEC")),
+        ("msec", "time", 1e-3),
     ],
 )
 def test_units_of_signals(unit, quantity, factor):
@@ -32,6 +61,9 @@ def test_units_of_signals(unit, quantity, factor):
 
 def test_units_of_rotations():
     assert unit_factor("N mm", "force", rotational=True) == pytest.approx(1e-3, rel=1e-12)
+    for unit in ("Nm", "N.m", "N-m"):
+        assert unit_factor(unit, "force", rotational=True) == pytest.approx(1.0, rel=1e-12)
+    assert unit_factor("deg/s2", "acceleration", rotational=True) == pytest.approx(0.017453292519943295, rel=1e-12)
     assert unit_factor("mrad/s^2", "acceleration", rotational=True) == pytest.approx(1e-3, rel=1e-12)
     assert si_unit("velocity", rotational=True) == "rad/s"
 
@@ -46,6 +78,10 @@ def test_units_of_rotations():
         ("50 pC/N", "force", 0.02),
         ("-4 mV/N", "force", -0.25),
         ("1e-3 V/N", "force", 1e3),
+        ("10 mV/g", "acceleration", GRAVITY / 10),
+        ("10 mV/ms-2", "acceleration", 0.1),
+        ("10 mV/m/s²", "acceleration", 0.1),
+        ("2 mV/lb", "force", POUND_FORCE / 2),
     ],
 )
 def test_sensitivities_turn_the_numerators_unit_into_si(sensitivity, quantity, factor):
@@ -66,6 +102,14 @@ def test_the_numerator_is_the_columns_unit(text, unit):
         ("mm/s/lbf", FrfQuantity.MOBILITY, "zz", 1e-3 / POUND_FORCE),
         ("um/N", FrfQuantity.RECEPTANCE, "zx", 1e-6),
         ("1/kg", FrfQuantity.ACCELERANCE, "zz", 1.0),
+        ("g/N", FrfQuantity.ACCELERANCE, "zz", GRAVITY),
+        ("(1/N)*(g)", FrfQuantity.ACCELERANCE, "zz", GRAVITY),
+        ("(1/N)*(mm/s²)", FrfQuantity.ACCELERANCE, "zz", 1e-3),
+        ("(m/s²)/N", FrfQuantity.ACCELERANCE, "zz", 1.0),
+        ("in/s2/lbf", FrfQuantity.ACCELERANCE, "zz", 0.0254 / POUND_FORCE),
+        ("g/lb", FrfQuantity.ACCELERANCE, "zz", GRAVITY / POUND_FORCE),
+        ("m.s-2.N-1", FrfQuantity.ACCELERANCE, "zz", 1.0),
+        ("rad/s2/N", FrfQuantity.ACCELERANCE, ("ry", "z"), 1.0),
     ],
 )
 def test_units_of_frfs(unit, quantity, directions, factor):
@@ -75,7 +119,18 @@ def test_units_of_frfs(unit, quantity, directions, factor):
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: unit_factor("g", "acceleration"), "'g' is the gram, the acceleration of gravity is 'g_0'"),
+        (lambda: unit_factor("kg", "acceleration"), "'kg' is no unit of acceleration; expected is m/s.2 or g"),
+        (lambda: unit_factor("10,5 N", "force"), "no unit that can be read.*decimal point"),
+        (lambda: sensitivity_factor("10,2 mV/g", "acceleration"), "no unit that can be read"),
+        (lambda: unit_factor("9**9**9**9 N", "force"), "no unit that can be read"),
+        (lambda: unit_factor("((9*1)**9)**9**9 N", "force"), "no unit"),
+        (lambda: unit_factor("m/s� ", "acceleration"), "no unit that can be read"),
+        (lambda: unit_factor("g rms", "acceleration"), "no unit"),
+        (lambda: unit_factor("EU", "force"), "no unit"),
+        (lambda: unit_factor("m/s2", "acceleration", rotational=True), "no unit of acceleration"),
+        (lambda: frf_factor("m/s2/N", FrfQuantity.ACCELERANCE, "ry", "z"), "a unit like rad/s.2/N"),
+        (lambda: frf_factor("g/N", FrfQuantity.ACCELERANCE, "ry", "z"), "a unit like rad/s.2/N"),
+        (lambda: frf_factor("dB", FrfQuantity.ACCELERANCE, "z", "z"), "no unit"),
         (lambda: unit_factor("mm", "velocity"), "'mm' is no unit of velocity; expected is m/s or mm/s"),
         (lambda: unit_factor("blub", "force"), "'blub' is no unit that can be read; write it as in N"),
         (lambda: unit_factor("m/", "force"), "no unit that can be read"),
@@ -91,8 +146,18 @@ def test_what_is_no_unit_is_refused(call, says):
 
 
 def test_two_ways_to_write_a_unit_are_one():
-    assert same_unit("m/s^2", "m s**-2") is True
-    assert same_unit("g_0", "standard_gravity") is True
-    assert same_unit("N", "kN") is False
-    assert same_unit("N", "m") is False
-    assert same_unit("N", "whatever") is None
+    assert unit_ratio("m/s^2", "m s**-2") == 1.0
+    assert unit_ratio("g_0", "standard_gravity") == 1.0
+    assert unit_ratio("V", "mV") == pytest.approx(1000.0)
+    assert math.isnan(unit_ratio("N", "m"))
+    assert unit_ratio("N", "whatever") is None
+
+
+@given(st.text(alphabet="mskgNinlbfVradeg0123456789.*/^()-+ ²eE,", max_size=14))
+def test_any_text_is_a_unit_or_an_error_of_ours(text):
+    for quantity in ("force", "acceleration"):
+        try:
+            assert math.isfinite(unit_factor(text, quantity))
+        except QuantityError as error:
+            assert "\n" not in str(error)  # noqa: PT017  both ends are right
+    is_unit(text)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arguments import require_file
-from frf_ipz.dofs import as_dof
+from frf_ipz.dofs import as_direction, as_dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimation.record_table import empty_record_table
+from frf_ipz.ingest.formats.frf_conventions import read_frf_source
 from frf_ipz.ingest.formats.frf_file import FrfSource
-from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.units import frf_factor
 from frf_ipz.quantities import FrfQuantity, as_quantity
@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
 
 SAME_LINE = 0.01  # of the spacing: frequencies that differ by less are one line
-FEWEST_COMMON = 0.5  # of the lines in the band that all files cover: with fewer in common, the files have two grids
+SIX_DIGITS = 1e-5  # relative: universal files state the step with six digits
+FARTHEST = 0.1  # of the spacing: frequencies that differ by more are never one line
+FEWEST_COMMON = (
+    0.5  # of the lines of the coarsest file in the band that all cover: with fewer, the files have two grids
+)
 
 
 def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
@@ -63,7 +67,7 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     frfs: list[MeasuredFrf] = []
     for position, source in enumerate(test.frf_sources):
         progress(position / len(test.frf_sources), f"reading {source.path.name}")
-        frfs += [_to_si(frf) for frf in read_frf_file(source) if frf.label in test.labels]
+        frfs += [_to_si(frf) for frf in read_frf_source(source) if frf.label in test.labels]
     joined, warnings = _join(frfs)
     return FrfEstimate(
         frfs=replace(joined, unknown_scale=test.unknown_scale), records=empty_record_table(), warnings=warnings
@@ -79,6 +83,8 @@ def read_frfs(
     input: Dof | str | None = None,
     columns: Sequence[str] = (),
     skip_rows: int = 0,
+    direction: str = "",
+    conjugated: bool = False,
 ) -> FrfSet:
     """Read the FRFs of one file: CSV, text with named columns, or UFF 58.
 
@@ -96,6 +102,10 @@ def read_frfs(
         What the columns of a text file are, as `columns` of ``[[frf]]`` in ``test.toml``.
     skip_rows : int
         Lines before the numbers of a text file.
+    direction : str
+        Direction of the ends that have none in a universal file, such as ``"z"``.
+    conjugated : bool
+        The file has the time convention exp(-i omega t).
 
     Returns
     -------
@@ -131,8 +141,10 @@ def read_frfs(
         input_dof=None if input is None else as_dof(input),
         columns=tuple(columns),
         skip_rows=skip_rows,
+        direction=as_direction(direction),
+        is_conjugated=conjugated,
     )
-    return _join([_to_si(frf) for frf in read_frf_file(source)])[0]
+    return _join([_to_si(frf) for frf in read_frf_source(source)])[0]
 
 
 def _join(frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:
@@ -186,42 +198,53 @@ def _check_frfs(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None
 
 
 def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, ...]]:
-    """Find the lines that all FRFs have."""
-    lines = frfs[0].frequency_hz
-    for frf in frfs[1:]:
-        lines = lines[_contains(frf.frequency_hz, lines)]
+    """Find the lines that all FRFs have; the coarsest file says how many they should be."""
+    notes = dict.fromkeys(note for frf in frfs for note in frf.notes)
     low = max(frf.frequency_hz[0] for frf in frfs)
     high = min(frf.frequency_hz[-1] for frf in frfs)
-    n_covered = max(_count_between(frf.frequency_hz, low, high) for frf in frfs)
-    if len(lines) < max(2, FEWEST_COMMON * n_covered):
+    coarsest = min(frfs, key=lambda frf: _count_between(frf.frequency_hz, low, high))
+    lines = coarsest.frequency_hz
+    for frf in frfs:
+        lines = lines[_contains(frf.frequency_hz, lines)]
+    if len(lines) < max(2, FEWEST_COMMON * _count_between(coarsest.frequency_hz, low, high)):
         raise _no_common_lines(frfs)
     largest = max(len(frf.frequency_hz) for frf in frfs)
-    if len(lines) == largest:
-        return lines, ()
-    return lines, (f"{len(lines)} of up to {largest} lines are used: those that all files share",)
+    if len(lines) < largest:
+        lost = max(frfs, key=lambda frf: len(frf.frequency_hz))
+        used = f"{len(lines)} of up to {largest} lines are used"
+        notes[f"{used}: those that all FRFs share; {lost.source.path.name} has more"] = None
+    return lines, tuple(notes)
 
 
 def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:
-    return int(np.count_nonzero((frequency_hz >= low * (1 - 1e-9)) & (frequency_hz <= high * (1 + 1e-9))))
+    return int(np.count_nonzero((frequency_hz >= low * (1 - SIX_DIGITS)) & (frequency_hz <= high * (1 + SIX_DIGITS))))
 
 
 def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
-    """Make the error that names the file that shares the fewest lines with the first."""
-    first = frfs[0]
-    outlier = min(frfs, key=lambda frf: int(_contains(frf.frequency_hz, first.frequency_hz).sum()))
-    lines, expected = (
+    """Make the error that names the two FRFs that share the fewest lines."""
+    pairs = [(frf, frfs[place]) for place in range(len(frfs)) for frf in frfs[place + 1 :]]
+    outlier, other = min(pairs, key=lambda pair: _share(*pair))
+    texts = [
         f"{len(frf.frequency_hz)} from {frf.frequency_hz[0]:g} to {frf.frequency_hz[-1]:g} Hz"
-        for frf in (outlier, first)
-    )
-    problem = f"its lines ({lines}) are not those of {first.source.path.name} ({expected}): all FRFs of a test need "
-    return FileFormatError(outlier.source.path, problem + "common lines; export them alike")
+        for frf in (outlier, other)
+    ]
+    problem = f"the lines of {outlier.label} ({texts[0]}) are not those of {other.label} in {other.source.path.name}"
+    way_out = f" ({texts[1]}): all FRFs of a test need common lines; export them alike"
+    return FileFormatError(outlier.source.path, problem + way_out)
+
+
+def _share(frf: MeasuredFrf, other: MeasuredFrf) -> float:
+    """Give the share of the lines of the coarser one that the other has too."""
+    coarse, fine = sorted((frf.frequency_hz, other.frequency_hz), key=len)
+    return float(_contains(fine, coarse).mean())
 
 
 def _contains(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
     """Tell which of some lines an FRF has, to within a small part of its spacing there: lines may be uneven."""
     above = np.clip(np.searchsorted(frequency_hz, lines), 1, len(frequency_hz) - 1)
     spacing = frequency_hz[above] - frequency_hz[above - 1]
-    return np.asarray(np.abs(frequency_hz[_nearest(frequency_hz, lines)] - lines) <= SAME_LINE * spacing)
+    tolerance = np.clip(SIX_DIGITS * lines, SAME_LINE * spacing, FARTHEST * spacing)
+    return np.asarray(np.abs(frequency_hz[_nearest(frequency_hz, lines)] - lines) <= tolerance)
 
 
 def _nearest(frequency_hz: FloatArray, lines: FloatArray) -> IntArray:

@@ -30,6 +30,12 @@ class FrfSource:
         What the columns of a text file are.
     skip_rows : int
         Lines before the numbers of a text file.
+    direction : str
+        Direction, with a sign or without, of the ends of FRFs of a universal file that have none.
+    sets : tuple of int
+        Which data sets of a universal file to read, counted from 1; all FRFs where empty.
+    is_conjugated : bool
+        The file has the time convention exp(-i omega t).
     """
 
     path: Path
@@ -39,6 +45,9 @@ class FrfSource:
     input_dof: Dof | None = None
     columns: tuple[str, ...] = ()
     skip_rows: int = 0
+    direction: str = ""
+    sets: tuple[int, ...] = ()
+    is_conjugated: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,6 +68,8 @@ class MeasuredFrf:
         Unit that the file states; empty where it states none.
     coherence, variance : (n_lines,) array, optional
         Where the file has them; the variance is in the square of the unit.
+    notes : tuple of str
+        What the user has to know of how it was read.
     """
 
     source: FrfSource
@@ -69,6 +80,7 @@ class MeasuredFrf:
     unit: str = ""
     coherence: FloatArray | None = None
     variance: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def label(self) -> FrfLabel:

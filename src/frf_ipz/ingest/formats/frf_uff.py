@@ -1,124 +1,223 @@
-"""FRFs as universal files (UFF), data sets 58 by pyuff: functions of type 4, and coherences of type 6 beside them."""
+"""FRFs as universal files (UFF): functions of type 4 in data sets 58, and coherences of type 6 beside them."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyuff
 
-from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
-from frf_ipz.ingest.units import GRAVITY_SYMBOLS, frf_factor
+from frf_ipz.ingest.formats.universal_file import describe_functions, read_functions
+from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated
+from frf_ipz.input_files import read_bytes
 from frf_ipz.quantities import FrfQuantity
 
-START = b"    -1"
-FRF, COHERENCE = 4, 6  # types of functions
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.ingest.formats.universal_file import UniversalFunction
+
+FRF, COHERENCE, TIME_RESPONSE = 4, 6, 1  # types of functions
+UNKNOWN = {0, 1}  # types of data: unknown, general
 RESPONSES = {8: FrfQuantity.RECEPTANCE, 11: FrfQuantity.MOBILITY, 12: FrfQuantity.ACCELERANCE}
-FORCES = {0, 9, 13}  # unknown, reaction force, excitation force
+FORCES = {9, 13}  # reaction force, excitation force
+SAME_UNITS = 1e-3  # relative: factors of data set 164 are often given with few digits
 
 
 class _UniversalFile:
     rank = 0
 
     def holds(self, source: FrfSource, head: bytes) -> bool:
-        return not source.columns and head.lstrip(b"\r\n").startswith(START)
+        return not source.columns and is_universal(head)
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
-        sets = _read_sets(source)
-        units = next((item for item in sets if item["type"] == 164), None)
-        functions = [item for item in sets if item["type"] == 58]
-        frfs = [item for item in functions if int(item["func_type"]) == FRF]
-        if not frfs:
-            raise FileFormatError(source.path, "holds no data set 58 with a frequency response function (type 4)")
-        if len(frfs) > 1 and (source.output_dof or source.input_dof):
-            raise FileFormatError(source.path, f"holds {len(frfs)} FRFs, so their [[frf]] cannot name one DOF for all")
-        coherences = {_nodes_and_directions(item): item for item in functions if int(item["func_type"]) == COHERENCE}
-        return tuple(_make_frf(source, item, coherences.get(_nodes_and_directions(item)), units) for item in frfs)
+        functions = read_functions(source.path, read_bytes(source.path))
+        frfs, notes = _select(source, functions)
+        coherences = {function.ends: function for function in functions if function.function_type == COHERENCE}
+        measured = [_make_frf(source, function, coherences.get(function.ends)) for function in frfs]
+        return (replace(measured[0], notes=(*measured[0].notes, *notes)), *measured[1:])
 
 
 FORMAT = _UniversalFile()
 
 
-def _read_sets(source: FrfSource) -> list[dict[str, Any]]:
-    try:
-        sets = pyuff.UFF(str(source.path)).read_sets()
-    except Exception as error:  # pyuff raises bare Exception for whatever is wrong with a file
-        raise FileFormatError(source.path, f"is no universal file that pyuff can read: {error}") from None
-    return sets if isinstance(sets, list) else [sets]
+def is_universal(head: bytes) -> bool:
+    """Tell whether a file is a universal file.
+
+    Parameters
+    ----------
+    head : bytes
+        Its first bytes.
+
+    Returns
+    -------
+    bool
+        True if its first line that is not empty is ``-1`` and its second a number of a data set.
+    """
+    lines = head.lstrip(b"\r\n \t").replace(b"\r", b"\n").split(b"\n", 3)
+    lines = [line.strip() for line in lines if line.strip()]
+    return len(lines) > 1 and lines[0] == b"-1" and lines[1][:1].isdigit()
 
 
-def _nodes_and_directions(item: dict[str, Any]) -> tuple[int, int, int, int]:
-    node, direction, reference, reference_direction = (
-        int(item[key]) for key in ("rsp_node", "rsp_dir", "ref_node", "ref_dir")
-    )
-    return node, direction, reference, reference_direction
-
-
-def _make_frf(
-    source: FrfSource, item: dict[str, Any], coherence: dict[str, Any] | None, units: dict[str, Any] | None
-) -> MeasuredFrf:
-    node, direction, reference, reference_direction = _nodes_and_directions(item)
-    output_dof = source.output_dof or _make_dof(source, node, direction, "rsp_dir")
-    input_dof = source.input_dof or _make_dof(source, reference, reference_direction, "ref_dir")
-    _check_quantity(source, item, f"{output_dof} / {input_dof}")
-    n_lines, n_values = len(item["x"]), len(item["data"])
-    if n_lines != n_values:
-        raise FileFormatError(
-            source.path,
-            f"announces {n_lines} lines for the FRF {output_dof} / {input_dof}, but holds {n_values}; is it cut off?",
+def _select(source: FrfSource, functions: Sequence[UniversalFunction]) -> tuple[list[UniversalFunction], list[str]]:
+    """Take the FRFs that are asked for; one that stands there twice is taken once."""
+    frfs = [function for function in functions if function.function_type == FRF]
+    if not frfs:
+        recordings = any(function.function_type == TIME_RESPONSE for function in functions)
+        way_out = "recordings in universal files are not read: export them as CSV" if recordings else "export the FRFs"
+        problem = (
+            f"holds no data set 58 with a frequency response function (type 4), but {describe_functions(functions)}"
         )
+        raise FileFormatError(source.path, f"{problem}; {way_out}")
+    if source.sets:
+        unknown = sorted(set(source.sets) - {function.number for function in frfs})
+        if unknown:
+            known = ", ".join(str(function.number) for function in frfs)
+            raise FileFormatError(source.path, f"'sets' names {unknown[0]}, which is no FRF; FRFs are the sets {known}")
+        frfs = [function for function in frfs if function.number in source.sets]
+    for name, places in (("output_dof", slice(0, 2)), ("input_dof", slice(2, 4))):
+        ends = {function.ends[places] for function in frfs}
+        if getattr(source, name) is not None and len(ends) > 1:
+            problem = f"holds {len(frfs)} FRFs of {len(ends)} such DOFs, so '{name}' cannot name one for all"
+            raise FileFormatError(source.path, f"{problem}; where directions are missing give 'direction' instead")
+    return _without_copies(source, frfs)
+
+
+def _without_copies(source: FrfSource, frfs: Sequence[UniversalFunction]) -> tuple[list[UniversalFunction], list[str]]:
+    first: dict[tuple[int, ...], UniversalFunction] = {}
+    notes: list[str] = []
+    for function in frfs:
+        earlier = first.setdefault(function.ends, function)
+        if earlier is function:
+            continue
+        numbers = f"data sets {earlier.number} and {function.number}"
+        if not np.array_equal(earlier.x, function.x) or not np.array_equal(
+            earlier.values, function.values, equal_nan=True
+        ):
+            problem = f"{numbers} are both the FRF {_describe_ends(function)}, with different values"
+            raise FileFormatError(
+                source.path, f"{problem}; take one out, or name those to read in its [[frf]], as in sets = [1, 2]"
+            )
+        notes.append(f"{source.path.name}: {numbers} are the same; it is used once")
+    return list(first.values()), notes
+
+
+def _describe_ends(function: UniversalFunction) -> str:
+    node, direction, reference, reference_direction = function.ends
+    return f"of node {node} (direction {direction}) over node {reference} (direction {reference_direction})"
+
+
+def _make_frf(source: FrfSource, function: UniversalFunction, coherence: UniversalFunction | None) -> MeasuredFrf:
+    node, direction, reference, reference_direction = function.ends
+    output_dof = source.output_dof or _make_dof(source, function, node, direction, "response")
+    input_dof = source.input_dof or _make_dof(source, function, reference, reference_direction, "reference")
+    _check_quantity(source, function, f"{output_dof} / {input_dof}")
+    unit, notes = _find_unit(source, function, output_dof, input_dof)
+    order = np.argsort(function.x, kind="stable")
+    frequency_hz = function.x[order] * _abscissa_factor(source, function)
+    values = function.values[order]
+    is_finite = np.isfinite(values)
+    left_out = ~is_finite & (frequency_hz == 0.0)
+    if not (is_finite | left_out).all():
+        hertz = frequency_hz[int(np.argmin(is_finite | left_out))]
+        problem = f"the FRF {output_dof} / {input_dof} is not finite at {hertz:g} Hz; correct the file"
+        raise FileFormatError(source.path, problem, where=f"data set {function.number}, line {function.line}")
+    if left_out.any():
+        notes = (*notes, f"{source.path.name}: the line at 0 Hz of {output_dof} / {input_dof} is not finite: left out")
+    known_coherence = None
+    if coherence is not None and len(coherence.x) == len(function.x):
+        known_coherence = coherence.values.real[order][is_finite]
+    elif coherence is not None:
+        notes = (*notes, f"{source.path.name}: the coherence of {output_dof} / {input_dof} has other lines: left out")
     return MeasuredFrf(
         source=source,
         output_dof=output_dof,
         input_dof=input_dof,
-        frequency_hz=np.asarray(item["x"], float),
-        values=np.asarray(item["data"], complex),
-        unit=_find_unit(source, item, units, output_dof, input_dof),
-        coherence=_matching_coherence(coherence, len(item["x"])),
+        frequency_hz=frequency_hz[is_finite],
+        values=values[is_finite],
+        unit=unit,
+        coherence=known_coherence,
+        notes=notes,
     )
 
 
-def _matching_coherence(coherence: dict[str, Any] | None, n_lines: int) -> FloatArray | None:
-    if coherence is None or len(coherence["data"]) != n_lines:
-        return None
-    return np.asarray(np.real(coherence["data"]), float)
-
-
-def _make_dof(source: FrfSource, node: int, direction: int, key: str) -> Dof:
+def _make_dof(source: FrfSource, function: UniversalFunction, node: int, direction: int, end: str) -> Dof:
+    key = "output_dof" if end == "response" else "input_dof"
+    where = f"data set {function.number}, line {function.line}"
+    if node <= 0:
+        problem = f"the {end} is at node {node}, and node 0 is the ground; name output_dof and input_dof in its [[frf]]"
+        raise FileFormatError(source.path, problem, where=where)
+    if direction == 0 and source.direction:
+        sign = -1 if source.direction.startswith("-") else 1
+        return Dof(node, source.direction.lstrip("+-"), sign)
     if not 1 <= abs(direction) <= len(DIRECTIONS):
-        raise FileFormatError(
-            source.path,
-            f"states no direction ({key} {direction} at node {node}); name output_dof and input_dof in its [[frf]]",
-        )
+        problem = f"states no direction of the {end} (direction {direction} at node {node})"
+        way_out = "give its [[frf]] a 'direction' for all FRFs that have none, as in direction = \"z\""
+        raise FileFormatError(source.path, f"{problem}; {way_out}, or name {key}", where=where)
     return Dof(node, DIRECTIONS[abs(direction) - 1], 1 if direction > 0 else -1)
 
 
-def _check_quantity(source: FrfSource, item: dict[str, Any], name: str) -> None:
-    quantity = RESPONSES.get(int(item.get("ordinate_spec_data_type", 0)))
-    if quantity not in {None, source.quantity}:
+def _check_quantity(source: FrfSource, function: UniversalFunction, name: str) -> None:
+    kind, denominator = function.ordinate.data_type, function.denominator.data_type
+    if kind not in UNKNOWN and kind not in RESPONSES:
+        problem = f"the FRF {name} is that of no motion (type {kind}); needed are displacement, velocity, acceleration"
+        raise FileFormatError(source.path, problem, where="ordinate data type")
+    quantity = RESPONSES.get(kind, source.quantity)
+    if quantity is not source.quantity:
         problem = f"the FRF {name} is stated to be {quantity.value}, but the test says {source.quantity.value}"
         raise FileFormatError(source.path, problem, where="ordinate data type")
-    if int(item.get("orddenom_spec_data_type", 0)) not in FORCES:
+    if denominator not in FORCES | UNKNOWN:
         raise FileFormatError(source.path, f"the FRF {name} is not a ratio to a force", where="denominator data type")
 
 
-def _find_unit(
-    source: FrfSource, item: dict[str, Any], units: dict[str, Any] | None, output_dof: Dof, input_dof: Dof
-) -> str:
-    """Return the unit that the file states: in its labels if they can be read, else by its factors from SI."""
-    numerator, denominator = (str(item.get(f"{end}_axis_units_lab", "")).strip() for end in ("ordinate", "orddenom"))
-    numerator = GRAVITY_SYMBOLS.get(numerator, numerator)
-    label = f"({numerator}) / ({denominator})" if denominator.upper() not in {"", "NONE"} else numerator
+def _abscissa_factor(source: FrfSource, function: UniversalFunction) -> float:
     try:
-        frf_factor(label, source.quantity, output_dof.direction, input_dof.direction)
-    except QuantityError:
-        if units is None:
-            return ""
-        lengths = 0 if output_dof.direction.startswith("r") else 1
-        lengths -= 1 if input_dof.direction.startswith("r") else 0
-        factor = float(units["force"]) / float(units["length"]) ** lengths
-        return f"{factor!r} {source.quantity.unit(output_dof.direction, input_dof.direction)}"
-    return label
+        return frequency_factor(function.abscissa.unit)
+    except QuantityError as error:
+        raise FileFormatError(source.path, str(error), where=f"data set {function.number}, abscissa") from None
+
+
+def _find_unit(
+    source: FrfSource, function: UniversalFunction, output_dof: Dof, input_dof: Dof
+) -> tuple[str, tuple[str, ...]]:
+    """Return the unit that the file states: by its labels, else by its factors from SI; never SI against a label."""
+    if source.unit:
+        return "", ()
+    numerator, denominator = function.ordinate.unit, function.denominator.unit
+    directions = output_dof.direction, input_dof.direction
+    by_factors = _unit_of_factors(source, function, output_dof, input_dof)
+    labels = [numerator] if is_stated(numerator) else []
+    if is_stated(denominator):
+        labels.insert(0, f"({numerator if labels else '?'})/({denominator})")
+    if not labels:
+        taken = f"states no unit of {output_dof} / {input_dof}: taken as {source.quantity.unit(*directions)}"
+        return by_factors, () if by_factors else (f"{source.path.name}: {taken}",)
+    for label in labels:
+        try:
+            factor = frf_factor(label, source.quantity, *directions)
+        except QuantityError:
+            continue
+        if by_factors and abs(frf_factor(by_factors, source.quantity, *directions) / factor - 1.0) > SAME_UNITS:
+            problem = f"the label says '{label}' and data set 164 another unit; say which by 'unit' in its [[frf]]"
+            raise QuantityError(f"{source.path}, data set {function.number}: {problem}")
+        return label, ()
+    stated = " over ".join(f"'{label}'" for label in (numerator, denominator) if is_stated(label))
+    expected = (
+        f"{source.quantity.value} of {output_dof} / {input_dof} has a unit like {source.quantity.unit(*directions)}"
+    )
+    where = f"{source.path}, data set {function.number}"
+    way_out = "give the 'unit' in its [[frf]], or correct the direction"
+    raise QuantityError(f"{where}: the unit {stated} cannot be used: the {expected}; {way_out}")
+
+
+def _unit_of_factors(source: FrfSource, function: UniversalFunction, output_dof: Dof, input_dof: Dof) -> str:
+    if function.units is None:
+        return ""
+    length, force = function.units
+    lengths = 0 if output_dof.direction.startswith("r") else 1
+    lengths -= 1 if input_dof.direction.startswith("r") else 0
+    unit = source.quantity.unit(output_dof.direction, input_dof.direction)
+    return f"{force / length**lengths!r} {unit}"

@@ -1,0 +1,158 @@
+"""What FRFs of files are by convention: one-sided, complex, for exp(+i omega t), with a coherence from 0 to 1.
+
+What breaks a convention and can be brought to it without doubt is, with a note; the rest is refused with what to write.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.registry import read_frf_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+    from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+
+PRINTED = 1e-3  # relative: what few printed digits make of two equal numbers
+ROUNDING = 1e-12  # relative: sine of pi in double precision, and of 180 degrees
+LARGEST_PHASES = (180.0, 360.0, np.pi, 2.0 * np.pi)  # in degrees and radians
+NEAR = 0.9  # of the largest phase: an FRF with a mode turns by half a turn
+FEWEST_LINES = 16  # on fewer, noise may turn either way
+CLEARLY = 0.5  # of the turning, weighted by the power: three quarters of it go against causality
+PER_CENT = 10.0  # a coherence above this is one in per cent
+
+
+def read_frf_source(source: FrfSource) -> tuple[MeasuredFrf, ...]:
+    """Read the FRFs of a file and bring them to the conventions of the program.
+
+    Parameters
+    ----------
+    source : FrfSource
+        The file as the test describes it.
+
+    Returns
+    -------
+    tuple of MeasuredFrf
+        At least one; each with notes on what was changed.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read, holds magnitudes only, or is conjugated.
+    """
+    frfs = [_check_coherence(_one_sided(_as_stated(frf))) for frf in read_frf_file(source)]
+    for frf in frfs:
+        _refuse_magnitudes(frf)
+    _refuse_conjugated(frfs)
+    return tuple(frfs)
+
+
+def _as_stated(frf: MeasuredFrf) -> MeasuredFrf:
+    return replace(frf, values=np.conj(frf.values)) if frf.source.is_conjugated else frf
+
+
+def _one_sided(frf: MeasuredFrf) -> MeasuredFrf:
+    """Keep the half of a two-sided spectrum that says everything."""
+    frequency_hz, values, name = frf.frequency_hz, frf.values, f"{frf.source.path.name}, {frf.label}"
+    negative = frequency_hz < 0.0
+    if negative.any():
+        used = ~negative
+        if used.sum() <= 1:
+            problem = f"the FRF {frf.label} has lines at negative frequencies only; export those from 0 Hz"
+            raise FileFormatError(frf.source.path, problem)
+        note = f"{name}: two-sided; the {int(negative.sum())} lines at negative frequencies are left out"
+        return _select(frf, used, note)
+    for first in (0, 1):
+        half = values[first:]
+        n_lines = len(half)
+        if n_lines < FEWEST_LINES or not _is_even(frequency_hz[first:]):
+            continue
+        mirror = np.conj(half[::-1])
+        if np.linalg.norm(half - mirror) <= PRINTED * np.linalg.norm(half):
+            used = np.arange(len(values)) < first + (n_lines + 1) // 2
+            note = f"{name}: two-sided; the upper half from {frequency_hz[used][-1]:g} Hz mirrors the lower: left out"
+            return _select(frf, used, note)
+    return frf
+
+
+def _is_even(frequency_hz: FloatArray) -> bool:
+    steps = np.diff(frequency_hz)
+    return bool(np.ptp(steps) <= PRINTED * np.abs(steps).max())
+
+
+def _select(frf: MeasuredFrf, used: BoolArray, note: str) -> MeasuredFrf:
+    return replace(
+        frf,
+        frequency_hz=frf.frequency_hz[used],
+        values=frf.values[used],
+        coherence=None if frf.coherence is None else frf.coherence[used],
+        variance=None if frf.variance is None else frf.variance[used],
+        notes=(*frf.notes, note),
+    )
+
+
+def _check_coherence(frf: MeasuredFrf) -> MeasuredFrf:
+    """Bring a coherence in per cent to 0 to 1; leave out one that is above 1."""
+    coherence = frf.coherence
+    largest = 0.0 if coherence is None else float(np.nanmax(coherence, initial=0.0))
+    if coherence is None or largest <= 1.0:
+        return frf
+    name = f"{frf.source.path.name}, {frf.label}"
+    if largest <= 1.0 + PRINTED:
+        return replace(frf, coherence=np.minimum(coherence, 1.0))
+    if PER_CENT < largest <= 100.0 * (1.0 + PRINTED):
+        note = f"{name}: the coherence goes up to {largest:g}: taken as per cent"
+        return replace(frf, coherence=np.minimum(coherence / 100.0, 1.0), notes=(*frf.notes, note))
+    note = f"{name}: the coherence goes up to {largest:g}, and none is above 1: left out"
+    return replace(frf, coherence=None, notes=(*frf.notes, note))
+
+
+def _refuse_magnitudes(frf: MeasuredFrf) -> None:
+    real, imag = frf.values.real, frf.values.imag
+    largest = float(np.abs(frf.values).max(initial=0.0))
+    if largest == 0.0:
+        raise FileFormatError(frf.source.path, f"the FRF {frf.label} is zero on all lines; export it again")
+    way_out = "export real and imaginary part, or magnitude and phase"
+    for part, name in ((imag, "imaginary"), (real, "real")):
+        if np.abs(part).max() <= ROUNDING * largest:
+            problem = f"all {name} parts of the FRF {frf.label} are zero: these are magnitudes only, without a phase"
+            raise FileFormatError(frf.source.path, f"{problem}; {way_out}")
+    if len(real) >= FEWEST_LINES and (real >= 0.0).all() and _looks_like_phase(imag):
+        problem = f"the FRF {frf.label} looks like magnitude and phase where real and imaginary part are expected"
+        columns = "columns = ['frequency_hz', 'magnitude', 'phase_deg']"
+        raise FileFormatError(frf.source.path, f"{problem}: no real part is negative; {way_out} with {columns}")
+
+
+def _looks_like_phase(imag: FloatArray) -> bool:
+    """Tell whether numbers reach a half turn, in degrees or radians, and no more."""
+    largest = float(np.abs(imag).max())
+    return any(NEAR * phase <= largest <= phase * (1.0 + PRINTED) for phase in LARGEST_PHASES)
+
+
+def _refuse_conjugated(frfs: Sequence[MeasuredFrf]) -> None:
+    turnings = [_turning(frf.values) for frf in frfs if len(frf.values) >= FEWEST_LINES]
+    if not turnings or float(np.mean(turnings)) <= CLEARLY:
+        return
+    source = frfs[0].source
+    if source.is_conjugated:
+        problem = "with 'conjugated' these FRFs look conjugated: their phase rises through resonances; leave it out"
+    else:
+        problem = "these FRFs look conjugated: their phase rises through resonances, as for exp(-i omega t)"
+        problem += "; give their [[frf]] conjugated = true, or export their complex conjugate"
+    raise FileFormatError(source.path, problem)
+
+
+def _turning(values: ComplexArray) -> float:
+    """Give the sense in which an FRF turns with frequency, weighted by its power: -1 for a causal one, 1 against it.
+
+    The mean of -d(phase)/d(omega), weighted by power, is the mean time of the impulse response, which is positive.
+    """
+    steps = np.imag(values[1:] * np.conj(values[:-1]))
+    total = float(np.abs(steps).sum())
+    return float(steps.sum()) / total if total else 0.0

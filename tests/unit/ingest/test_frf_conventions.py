@@ -1,0 +1,130 @@
+"""FRFs of files that break a convention are recognised: brought to it with a note, or refused with what to write."""
+
+import re
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from frf_ipz.errors import InputError
+from synthetic_campaign import Structure
+
+LINES_HZ = np.arange(0.0, 301.0)
+EXACT = Structure(shapes=((1.0, 0.7, -0.5), (-0.6, 0.8, 0.9))).accelerance(2j * np.pi * LINES_HZ)
+NOISE = 1e-3 * np.abs(EXACT).max() * np.random.default_rng(2).standard_normal((*EXACT.shape, 2)).view(complex)[..., 0]
+VALUES = EXACT + NOISE
+DIGITS = 1e-12  # relative: sixteen digits are written
+
+
+def estimate(folder, values=VALUES, *, lines_hz=LINES_HZ, coherence=None, keys="", quantity="accelerance"):
+    rows = ["frequency_hz,output_dof,input_dof,real,imag" + (",coherence" if coherence is not None else "")]
+    for column in range(values.shape[1]):
+        for place, (hertz, value) in enumerate(zip(lines_hz.tolist(), values[:, column].tolist(), strict=True)):
+            extra = "" if coherence is None else f",{coherence[place]!r}"
+            rows.append(f"{hertz!r},{column + 1}:+z,7:+z,{value.real!r},{value.imag!r}{extra}")
+    (folder / "frf.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    test = f'[test]\nkind = "frf"\n[[frf]]\nfile = "frf.csv"\nquantity = "{quantity}"\n{keys}\n'
+    (folder / "test.toml").write_text(test, encoding="utf-8")
+    return frf_ipz.estimate_frfs(frf_ipz.read_test(folder / "test.toml"))
+
+
+def message(folder, *arguments, **options):
+    with pytest.raises(InputError) as caught:
+        estimate(folder, *arguments, **options)
+    assert "frf.csv" in str(caught.value)
+    return str(caught.value)
+
+
+def expect(result, values=VALUES):
+    np.testing.assert_allclose(result.frfs.frequency_hz, LINES_HZ)
+    assert np.abs(result.frfs.values - values).max() <= DIGITS * np.abs(values).max()
+
+
+@pytest.mark.parametrize("power", [0, 1, 2])
+def test_conjugated_frfs_are_named(tmp_path, power):
+    """In accelerance, mobility and receptance; those that are right pass."""
+    s = np.where(LINES_HZ, 2j * np.pi * LINES_HZ, 1.0)[:, None]
+    values, quantity = EXACT / s**power, ("accelerance", "mobility", "receptance")[power]
+    values = values + NOISE * (np.abs(values).max() / np.abs(EXACT).max())
+    expect(estimate(tmp_path, values, quantity=quantity), values)
+    text = message(tmp_path, np.conj(values), quantity=quantity)
+    assert re.search("these FRFs look conjugated.*conjugated = true", text)
+    expect(estimate(tmp_path, np.conj(values), quantity=quantity, keys="conjugated = true"), values)
+    assert "with 'conjugated' these FRFs look conjugated" in message(
+        tmp_path, values, quantity=quantity, keys="conjugated = true"
+    )
+
+
+@pytest.mark.parametrize("step", [1, 4, 9])
+def test_conjugated_frfs_are_named_on_coarse_lines_and_not_seen_in_noise(tmp_path, step):
+    assert "look conjugated" in message(tmp_path, np.conj(VALUES)[::step], lines_hz=LINES_HZ[::step])
+    for seed in range(5):
+        noise = np.random.default_rng(seed).standard_normal((*VALUES[::step].shape, 2)).view(complex)[..., 0]
+        estimate(tmp_path, noise, lines_hz=LINES_HZ[::step])
+
+
+def test_delayed_frfs_are_not_taken_for_conjugated(tmp_path):
+    for delay_s in (-1e-3, 1e-3, 0.02):
+        estimate(tmp_path, VALUES * np.exp(-2j * np.pi * LINES_HZ * delay_s)[:, None])
+
+
+def test_negative_frequencies_are_left_out_and_said(tmp_path):
+    lines = np.concatenate([-LINES_HZ[:0:-1], LINES_HZ])
+    values = np.concatenate([np.conj(VALUES[:0:-1]), VALUES])
+    for order in (np.arange(601), np.roll(np.arange(601), 301)):
+        result = estimate(tmp_path, values[order], lines_hz=lines[order])
+        expect(result)
+        assert "two-sided; the 300 lines at negative frequencies are left out" in result.warnings[0]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_mirrored_upper_half_is_left_out_and_said(tmp_path, first):
+    """Lines of a whole transform, with 0 Hz or without."""
+    values = VALUES.copy()
+    values[[0, 300]] = values[[0, 300]].real
+    whole = np.concatenate([values, np.conj(values[299:0:-1])])[first:]
+    lines = np.arange(first, first + len(whole), dtype=float)
+    result = estimate(tmp_path, whole, lines_hz=lines)
+    assert result.frfs.frequency_hz[-1] == 300.0
+    np.testing.assert_allclose(result.frfs.values, values[first:], rtol=1e-12, atol=1e-15)
+    assert "two-sided; the upper half from 300 Hz mirrors the lower" in result.warnings[0]
+
+
+def test_magnitudes_alone_are_refused(tmp_path):
+    for values in (np.abs(VALUES) + 0j, VALUES.real + 0j, VALUES.imag * 1j):
+        assert "are zero: these are magnitudes only" in message(tmp_path, values)
+    assert "is zero on all lines" in message(tmp_path, 0 * VALUES)
+
+
+def test_magnitude_and_phase_as_real_and_imaginary_part_are_refused(tmp_path):
+    for phase in (np.angle(VALUES), np.degrees(np.angle(VALUES)), np.degrees(np.angle(VALUES)) % 360.0):
+        assert "looks like magnitude and phase" in message(tmp_path, np.abs(VALUES) + 1j * phase)
+
+
+def test_a_coherence_in_per_cent_or_above_1(tmp_path):
+    coherence = np.linspace(0.6, 0.99, 301)
+    result = estimate(tmp_path, coherence=(100 * coherence).tolist())
+    np.testing.assert_allclose(result.frfs.coherence[:, 0], coherence)
+    assert "goes up to 99: taken as per cent" in result.warnings[0]
+    result = estimate(tmp_path, coherence=(1.5 * coherence).tolist())
+    assert np.isnan(result.frfs.coherence).all()
+    assert "none is above 1: left out" in result.warnings[0]
+    result = estimate(tmp_path, coherence=np.minimum(coherence * 1.0102, 1.0001).tolist())
+    assert result.frfs.coherence.max() == 1.0
+    assert result.warnings == ()
+
+
+def test_files_of_different_resolution_share_the_coarse_lines(tmp_path):
+    fine_hz = np.arange(0.0, 300.1, 0.25)
+    fine = Structure().accelerance(2j * np.pi * fine_hz)
+    for name, lines, values, output in (("a", LINES_HZ, VALUES, "1:+z"), ("b", fine_hz, fine, "2:+z")):
+        pairs = zip(lines.tolist(), values[:, 0].tolist(), strict=True)
+        rows = [f"{hertz!r},{output},7:+z,{value.real!r},{value.imag!r}" for hertz, value in pairs]
+        text = "\n".join(["frequency_hz,output_dof,input_dof,real,imag", *rows])
+        (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
+    entries = "".join(f'[[frf]]\nfile = "{name}.csv"\nquantity = "accelerance"\n' for name in "ba")
+    (tmp_path / "test.toml").write_text(f'[test]\nkind = "frf"\n{entries}', encoding="utf-8")
+    result = frf_ipz.estimate_frfs(frf_ipz.read_test(tmp_path / "test.toml"))
+    np.testing.assert_array_equal(result.frfs.frequency_hz, LINES_HZ)
+    np.testing.assert_array_equal(result.frfs.values[:, 0], fine[::4, 0])
+    assert "301 of up to 1201 lines are used: those that all FRFs share; b.csv has more" in result.warnings
