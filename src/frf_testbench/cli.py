@@ -141,6 +141,21 @@ def study(
         print(f"{title}\n{table.to_string(float_format='{:.4g}'.format)}\n")
 
 
+@app.command()
+def verdicts(
+    folder: Annotated[Path, typer.Argument(help="Where campaigns and results are kept.")],
+    first_seed: Annotated[int, typer.Option("--first-seed", help="Of the first campaign.")] = 800_000,
+    count: Annotated[int, typer.Option("--each", metavar="N", help="Campaigns of each group.")] = 100,
+    jobs: Annotated[int, typer.Option("--jobs", help="Campaigns at the same time.")] = 2,
+) -> None:
+    """Judge the verdicts on campaigns that are sound, have a user's mistake in them, or conceal an effect."""
+    from frf_testbench.proof.verdicts import judge_verdicts, summarise_verdicts
+
+    table = judge_verdicts(folder, first_seed=first_seed, count=count, jobs=jobs)
+    table.to_csv(folder / "verdicts.csv", index=False)
+    print(summarise_verdicts(table).to_string(index=False))
+
+
 @contextmanager
 def _progress_bar() -> Iterator[Progress]:
     """Show how far the work is, where there is a terminal."""
