@@ -59,7 +59,7 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     if file_format not in FORMATS:
         raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
     path = Path(f"{name}.{file_format}") if out is None else out
-    figure = draw_pictures(describe(name, open_results(folder)))
+    figure = draw_pictures(describe(name, open_results(folder).load()))
     try:
         save_figure(figure, path, file_format=file_format)
     except InputError as error:

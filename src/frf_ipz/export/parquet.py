@@ -11,6 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from frf_ipz.output_files import replacing
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -152,7 +154,8 @@ def write_table(table: pa.Table, path: Path) -> None:
     OSError
         If it cannot be written.
     """
-    pq.write_table(table, path, compression="zstd")
+    with replacing(path) as target:
+        pq.write_table(table, target, compression="zstd")
 
 
 def _array(values: Any, column: Column) -> pa.Array:  # noqa: ANN401  what Arrow takes has no common type

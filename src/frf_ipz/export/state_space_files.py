@@ -20,6 +20,7 @@ from frf_ipz.arguments import require_file
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
+from frf_ipz.output_files import replacing, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -91,9 +92,11 @@ def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | 
     with _errors_of_writing(path):
         if _suffix(path) == ".json":
             plain = {name: value.tolist() if name in ARRAYS else value for name, value in values.items()}
-            path.write_text(json.dumps(plain, indent=1), encoding="utf-8")
+            write_text(path, json.dumps(plain, indent=1))
         else:
-            savemat(path, {**values, **_names_for_matlab(arrays), "notes": np.array(arrays.notes, dtype=object)})
+            notes = np.array(arrays.notes, dtype=object)
+            with replacing(path) as target:
+                savemat(target, {**values, **_names_for_matlab(arrays), "notes": notes}, appendmat=False)
 
 
 def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
@@ -192,7 +195,7 @@ def write_reduced_model(model: ReducedModel, path: str | Path) -> None:
         If it cannot be written.
     """
     names = np.array([dof.name for dof in model.dofs])
-    with Path(path).open("wb") as stream:
+    with replacing(Path(path)) as target, target.open("wb") as stream:
         arrays: dict[str, Any] = dict(
             zip(REDUCED_MODEL, (model.mass, model.damping, model.stiffness, names), strict=True)
         )
@@ -223,7 +226,8 @@ def write_ensemble(models: Sequence[StateSpaceModel], path: str | Path) -> None:
             "[export] ensemble = 0"
         )
     values: dict[str, Any] = {name: np.stack([getattr(model, name) for model in models], axis=-1) for name in ARRAYS}
-    savemat(path, {**values, **_names_for_matlab(models[0]), "dt": models[0].dt})
+    with replacing(Path(path)) as target:
+        savemat(target, {**values, **_names_for_matlab(models[0]), "dt": models[0].dt}, appendmat=False)
 
 
 def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
@@ -322,7 +326,7 @@ def write_uncertainty_weights(weights: UncertaintyWeights, path: str | Path) -> 
     """
     values = asdict(weights)
     plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-    Path(path).write_text(json.dumps(plain, indent=1), encoding="utf-8")
+    write_text(Path(path), json.dumps(plain, indent=1))
 
 
 def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:

@@ -139,7 +139,7 @@ class Campaign(Concise):
         inputs = self.inputs()
         if out is None:
             return run_in_memory(inputs, until=until, progress=progress)
-        with open_run(as_path(out)) as folder:
+        with open_run(as_path(out), progress=progress) as folder:
             run_chain(inputs, folder, until=until, diagnosing=None, progress=progress)
         return open_results(out)
 

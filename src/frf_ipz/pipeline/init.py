@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.formats.text_layout import name_and_unit, sniff
+from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -66,10 +67,9 @@ def write_starting_files(folder: Path) -> dict[Path, bool]:
 
 def _write(path: Path, text: str) -> bool:
     try:
-        with path.open("x", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-    except FileExistsError:
-        return False
+        if path.exists() and path.stat().st_size:  # an empty one is what a full disk has left
+            return False
+        write_text(path, text)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     return True

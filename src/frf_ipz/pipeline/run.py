@@ -68,7 +68,7 @@ def run_pipeline(
     """
     _require_stage(until)
     inputs = read_inputs(as_path(path))
-    with open_run(as_path(out)) as folder:
+    with open_run(as_path(out), progress=progress) as folder:
         run_chain(inputs, folder, until=until, diagnosing=diagnosing, progress=progress)
     return open_results(out)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import singledispatch
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -21,6 +22,7 @@ from matplotlib.ticker import (
 
 from frf_ipz.arguments import as_path
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.output_files import replacing
 from frf_ipz.plotting.picture import (
     Areas,
     Axis,
@@ -42,7 +44,6 @@ from frf_ipz.plotting.picture import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -202,12 +203,16 @@ def save_figure(figure: Figure, path: str | Path | BinaryIO, *, file_format: str
     >>> with TemporaryDirectory() as folder:
     ...     frf_ipz.plotting.save_figure(ax.figure, f"{folder}/frfs.svg", file_format="svg")
     """
-    target = path if hasattr(path, "write") else as_path(path)
+    target = as_path(path) if isinstance(path, str | Path) else path
     if file_format not in FORMATS:
         raise InputError(f"'{file_format}' is no format of pictures; {did_you_mean(str(file_format), FORMATS)}")
     with rc_context({"svg.fonttype": "none", "pdf.fonttype": 42, "savefig.dpi": 200}):  # text stays text
         try:
-            figure.savefig(target, format=file_format)
+            if isinstance(target, Path):
+                with replacing(target) as beside:
+                    figure.savefig(beside, format=file_format)
+            else:
+                figure.canvas.print_figure(target, format=file_format)
         except OSError as error:
             raise InputError(f"{target}: cannot be written: {error.strerror}") from None
 

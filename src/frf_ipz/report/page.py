@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from frf_ipz.output_files import write_text
 from frf_ipz.progress import Progress, silent
 from frf_ipz.report.html import REPORT, SCRIPTS, page_environment, read_asset
 from frf_ipz.report.page_data import page_data
@@ -81,7 +82,7 @@ def write_report(run: Results, path: Path, *, progress: Progress = silent) -> No
         progress(number / len(SECTIONS), "drawing")
         section = build(run)
         sections += [section] if section is not None else []
-    path.write_text(render_page(run, sections), encoding="utf-8", newline="\n")
+    write_text(path, render_page(run, sections))
 
 
 def render_page(run: Results, sections: Sequence[Section]) -> str:

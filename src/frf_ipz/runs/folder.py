@@ -1,37 +1,38 @@
-"""A run's folder: results that are re-used where hashes agree, tables that appear whole or not at all.
+"""A run's folder: results that are re-used where keys agree, and a command that changes all of it or nothing.
 
-Everything is first written to a staging folder inside the run's folder, and moved into place when the whole command
-has succeeded. A reader never sees half a file, and a run that fails leaves what was there.
+What a command writes becomes the next generation of the folder when the command has succeeded (`generations`), under a
+lock (`folder_lock`). A stage is taken from the folder where its key agrees, its file is whole and carries that key, and
+each of its tables agrees with its digest; a table that does not is written again from the result, and a result that is
+damaged is computed anew.
 """
 
 from __future__ import annotations
 
-import ctypes
-import errno
 import json
-import os
-import shutil
-import sys
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.output_files import cannot_write, write_text
+from frf_ipz.progress import silent
 from frf_ipz.runs.codec import load_result, save_result
+from frf_ipz.runs.digests import digest_file
+from frf_ipz.runs.folder_lock import HOLDER, LOCK, lock_folder
+from frf_ipz.runs.generations import GENERATIONS, HIDDEN, Generations, current_folder
 from frf_ipz.runs.manifest import MANIFEST, load_manifest
 from frf_ipz.runs.stage_file import SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-STAGES = "stages"
-STAGING = ".partial-"
+    from frf_ipz.progress import Progress
 
-# Names of the Windows interface to processes
-SYNCHRONIZE, WAIT_TIMEOUT, ACCESS_DENIED = 0x00100000, 0x102, 5
+STAGES = "stages"
+
 # Every key of run.json; * stands for a name of the user's or the program's.
 JSON_KEYS = {
     "frf_ipz": "version of frf_ipz",
@@ -57,14 +58,20 @@ JSON_KEYS = {
     "assessment.likely_cause.file": "the file in which it stands",
     "assessment.likely_cause.line_or_key": "the key or line in it",
     "assessment.likely_cause.probability": "that it is this, given what was measured",
+    "notes": "what was damaged in the folder and has been made again; absent where nothing was",
     "stages.*.key": "digest of everything that the result of the stage depends on",
     "stages.*.seconds": "computing time, s",
     "stages.*.files": "files that the stage has written",
+    "stages.*.digests.*": "SHA-256 digest of each file of the stage, by its name",
     "stages.*.stale": "true where an earlier stage has been run anew since",
 }
 
 Result = TypeVar("Result")
 Writers: TypeAlias = "Mapping[str, Callable[[Path], None]]"
+
+
+class SupersededError(InputError):
+    """The results have been made anew since they were opened."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -75,21 +82,21 @@ class RunFolder:
     ----------
     path : Path
         The folder.
-    staging : Path
-        Where files are written until the command has succeeded.
+    current : Path
+        Where its results are whole.
+    staging : Path, optional
+        Where files are written until the command has succeeded; None for who only reads.
     manifest : dict
         What `run.json` says.
     computed : list of str
         Stages that the command has computed.
-    abandoned : set of str
-        Files that these stages had written before.
     """
 
     path: Path
-    staging: Path
+    current: Path
+    staging: Path | None = None
     manifest: dict[str, Any]
     computed: list[str] = field(default_factory=list)
-    abandoned: set[str] = field(default_factory=set)
 
     @property
     def name(self) -> str:
@@ -115,20 +122,23 @@ class RunFolder:
         object
             The result.
         """
-        stored = self.path / STAGES / f"{name}{SUFFIX}"
-        if self._is_current(name, key) and stored.is_file():
-            try:
-                result: Result = load_result(stored)
-            except FileFormatError:
-                pass
-            else:
+        if self._entry(name).get("key") == key:
+            with suppress(FileFormatError):
+                result: Result = load_result(self.current / _stage_file(name), key=key)
+                damaged = self._damaged(name)
+                if damaged:
+                    writers = files(result)
+                    self._write(name, {file: writers[file] for file in damaged if file in writers})
+                    self._say_repaired(damaged)
                 self.manifest["stages"][name].pop("stale", None)
                 return result
+            self._say_repaired([_stage_file(name)])
         started = time.perf_counter()
         result = compute()
         named = files(result)
-        self._write({f"{STAGES}/{name}{SUFFIX}": lambda path: save_result(result, path), **named})
-        self._note(name, key, started, named)
+        self._note(name, key, named)
+        self._write(name, {_stage_file(name): lambda path: save_result(result, path, key=key), **named})
+        self.manifest["stages"][name]["seconds"] = round(time.perf_counter() - started, 3)
         return result
 
     def page(self, name: str, key: str, files: Writers) -> None:
@@ -143,55 +153,15 @@ class RunFolder:
         files : mapping of str to callable
             What writes each file, by name.
         """
-        if self._is_current(name, key) and all((self.path / file).is_file() for file in files):
-            return
+        if self._entry(name).get("key") == key:
+            damaged = self._damaged(name)
+            if not damaged:
+                return
+            self._say_repaired(damaged)
         started = time.perf_counter()
-        self._write(files)
-        self._note(name, key, started, files)
-
-    @contextmanager
-    def writing(self, name: str) -> Iterator[Path]:
-        """Give the path to write a file of the run to.
-
-        Parameters
-        ----------
-        name : str
-            Its name inside the run's folder.
-
-        Yields
-        ------
-        Path
-            Where to write it for now.
-
-        Raises
-        ------
-        InputError
-            If it cannot be written, for want of space or permission.
-        """
-        target = self.staging / name
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            yield target
-        except OSError as error:
-            raise _cannot_write(self.path / name, error) from None
-
-    def write_text(self, name: str, text: str) -> None:
-        """Write a text file of the run.
-
-        Parameters
-        ----------
-        name : str
-            Its name inside the run's folder.
-        text : str
-            What it says.
-
-        Raises
-        ------
-        InputError
-            If it cannot be written.
-        """
-        with self.writing(name) as target:
-            target.write_text(text, encoding="utf-8", newline="\n")
+        self._note(name, key, files)
+        self._write(name, files)
+        self.manifest["stages"][name]["seconds"] = round(time.perf_counter() - started, 3)
 
     def mark_stale(self, names: Iterable[str]) -> None:
         """Note that results were made from something that has been computed anew since.
@@ -238,77 +208,108 @@ class RunFolder:
         FileFormatError
             If the file is damaged.
         """
-        staged, stored = (folder / STAGES / f"{name}{SUFFIX}" for folder in (self.staging, self.path))
-        place = staged if staged.is_file() else stored
-        return load_result(place) if place.is_file() else None
+        file = _stage_file(name)
+        try:
+            return load_result(self._place(file)) if self._place(file).is_file() else self._require_current()
+        except FileFormatError:
+            self._require_current()
+            raise
 
-    def _is_current(self, name: str, key: str) -> bool:
-        stage = self.manifest.get("stages", {}).get(name, {})
-        return bool(stage.get("key") == key and all(self._has(file) for file in stage.get("files", [])))
+    def commit(self, generations: Generations) -> None:
+        """Let what was written become what the folder holds.
 
-    def _has(self, file: str) -> bool:
-        return any((folder / file).is_file() for folder in (self.staging, self.path))
-
-    def _write(self, files: Writers) -> None:
-        for file, write in files.items():
-            with self.writing(file) as target:
-                write(target)
-
-    def _note(self, name: str, key: str, started: float, files: Iterable[str]) -> None:
-        self.computed.append(name)
-        seconds = round(time.perf_counter() - started, 3)
-        stages = self.manifest.setdefault("stages", {})
-        self.abandoned.update(stages.get(name, {}).get("files", []))
-        stages[name] = {"key": key, "seconds": seconds, "files": sorted(files)}
-
-    def commit(self) -> None:
-        """Move everything that was written into place, `run.json` last.
+        Parameters
+        ----------
+        generations : Generations
+            Of the folder.
 
         Raises
         ------
-        InputError
-            If a file cannot be moved.
+        OSError
+            If a file cannot be written or replaced: then the folder is as it was.
         """
-        self.write_text(MANIFEST, json.dumps(self.manifest, indent=1, ensure_ascii=False) + "\n")
-        files = sorted(file for file in self.staging.rglob("*") if file.is_file())
-        files.sort(key=lambda file: file.name == MANIFEST)
-        for file in files:
-            with file.open("r+b") as stream:  # Windows syncs only what is open for writing
-                os.fsync(stream.fileno())
-        self._invalidate_stored_stages()
-        for file in files:
-            with _reporting_write_errors(self.path / file.relative_to(self.staging)) as target:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                file.replace(target)
-        written = {file for stage in self.manifest.get("stages", {}).values() for file in stage.get("files", [])}
-        for name in self.abandoned - written:  # a file that its stage no longer writes would tell of an older result
-            with _reporting_write_errors(self.path / Path(name).name) as target:
-                target.unlink(missing_ok=True)
+        text = json.dumps(self.manifest, indent=1, ensure_ascii=False) + "\n"
+        write_text(generations.staging / MANIFEST, text)
+        generations.adopt([MANIFEST, *_names(read_manifest(self.current))])
+        generations.keep(_names(self.manifest))
+        generations.commit()
 
-    def _invalidate_stored_stages(self) -> None:
-        """Drop the keys of stages whose files are about to change, in the `run.json` that is in place.
+    def _require_current(self) -> None:
+        """Say so where the results that were opened are no longer there."""
+        if self.staging is None and current_folder(self.path) != self.current:
+            raise SupersededError(
+                f"{self.path}: the results have been made anew since they were opened; open them again"
+            )
 
-        Where the files cannot all be moved, because one is open in another program or the process is killed, new
-        results would otherwise stand under old keys.
-        """
-        stored = read_manifest(self.path)
-        outdated = [name for name in self.computed if "key" in stored.get("stages", {}).get(name, {})]
-        for name in outdated:
-            del stored["stages"][name]["key"]
-        if outdated:
-            self.write_text(MANIFEST + ".invalid", json.dumps(stored, indent=1, ensure_ascii=False) + "\n")
-            with _reporting_write_errors(self.path / MANIFEST) as target:
-                (self.staging / (MANIFEST + ".invalid")).replace(target)
+    def _entry(self, name: str) -> dict[str, Any]:
+        entry: dict[str, Any] = self.manifest.get("stages", {}).get(name, {})
+        return entry
+
+    def _place(self, file: str) -> Path:
+        """Where a file is now: written by this command, or left by an earlier one."""
+        staged = self.current if self.staging is None else self.staging
+        return staged / file if (staged / file).is_file() else self.current / file
+
+    def _damaged(self, name: str) -> list[str]:
+        """Files of a stage that are gone, or differ from what this stage or a later one has written."""
+        stages = list(self.manifest["stages"])
+        later = [self._entry(stage) for stage in stages[stages.index(name) :]]
+        damaged = []
+        for file in self._entry(name).get("files", []):
+            written = [entry.get("digests", {}).get(file) for entry in later if file in entry.get("files", [])]
+            try:
+                content = digest_file(self._place(file))
+            except FileFormatError:
+                content = ""
+            damaged += [] if content in written else [file]
+        return damaged
+
+    def _say_repaired(self, files: Iterable[str]) -> None:
+        said = self.manifest.setdefault("notes", [])
+        notes = [f"{file} was damaged or gone, and has been made again" for file in files]
+        said += [note for note in notes if note not in said]
+
+    def _write(self, name: str, files: Writers) -> None:
+        if self.staging is None:
+            raise TypeError("a folder that was opened for reading is not written to")
+        for file, write in files.items():
+            target = self.staging / file
+            with _reporting_write_errors(self.path / file):
+                if file.startswith(STAGES):
+                    target.parent.mkdir(exist_ok=True)
+                write(target)
+                self._entry(name)["digests"][file] = digest_file(target)
+
+    def _note(self, name: str, key: str, files: Iterable[str]) -> None:
+        self.computed.append(name)
+        self.manifest.setdefault("stages", {})[name] = {
+            "key": key,
+            "seconds": 0.0,
+            "files": sorted(files),
+            "digests": {},
+        }
+
+
+def _stage_file(name: str) -> str:
+    return f"{STAGES}/{name}{SUFFIX}"
+
+
+def _names(manifest: Mapping[str, Any]) -> list[str]:
+    """Files that stages have written, as `run.json` names them; those of results have the names of their stages."""
+    stages = manifest.get("stages", {})
+    return [*map(_stage_file, stages), *(file for stage in stages.values() for file in stage.get("files", []))]
 
 
 @contextmanager
-def open_run(path: Path) -> Iterator[RunFolder]:
+def open_run(path: Path, *, progress: Progress = silent) -> Iterator[RunFolder]:
     """Open a run's folder for a command, and commit when the command succeeds.
 
     Parameters
     ----------
     path : Path
         The folder; made where there is none.
+    progress : Progress
+        Told where another command is waited for.
 
     Yields
     ------
@@ -318,24 +319,55 @@ def open_run(path: Path) -> Iterator[RunFolder]:
     Raises
     ------
     InputError
-        If the folder cannot be made or written to.
+        If the folder cannot be made or written to, or another command is at work there.
     """
-    is_new = not path.exists()
-    staging = path / f"{STAGING}{os.getpid()}"
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        _sweep(path)
-        staging.mkdir()
-    except OSError as error:
-        raise _cannot_write(path, error) from None
-    succeeded = False
-    try:
-        folder = RunFolder(path=path, staging=staging, manifest=read_manifest(path))
+    hidden = path / HIDDEN
+    with ExitStack() as stack:
+        with _reporting_write_errors(path):
+            made = [folder for folder in (path, *path.parents) if not folder.exists()]
+            stack.enter_context(_removing_if_empty(made))
+            stack.enter_context(lock_folder(path, hidden, progress=progress))
+            stack.enter_context(_removing_hidden(hidden))
+            generations = Generations(path=path)
+        stack.callback(generations.abandon)
+        manifest = {key: value for key, value in read_manifest(path).items() if key != "notes"}
+        folder = RunFolder(path=path, current=generations.current, staging=generations.staging, manifest=manifest)
         yield folder
-        folder.commit()
-        succeeded = True
+        with _reporting_write_errors(path):
+            folder.commit(generations)
+
+
+@contextmanager
+def _reporting_write_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+@contextmanager
+def _removing_if_empty(folders: Iterable[Path]) -> Iterator[None]:
+    """Remove folders that were made for results, innermost first, where there are none."""
+    try:
+        yield
     finally:
-        shutil.rmtree(path if is_new and not succeeded else staging, ignore_errors=True)
+        for folder in folders:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+@contextmanager
+def _removing_hidden(hidden: Path) -> Iterator[None]:
+    """Remove what the program keeps for itself, where there are no results: while it holds the lock, before others."""
+    try:
+        yield
+    finally:
+        if current_folder(hidden.parent) == hidden.parent:
+            with suppress(OSError):
+                (hidden / GENERATIONS).rmdir()
+                (hidden / HOLDER).unlink(missing_ok=True)
+                (hidden / LOCK).unlink(missing_ok=True)
+                hidden.rmdir()
 
 
 def read_run(path: Path) -> RunFolder:
@@ -356,11 +388,12 @@ def read_run(path: Path) -> RunFolder:
     InputError
         If no run has been made there, `run.json` is damaged, or another version made it, with results of another form.
     """
-    if not (path / MANIFEST).is_file():
+    current = current_folder(path)
+    if not (current / MANIFEST).is_file():
         raise InputError(
             f"{path}: there is no run here (no {MANIFEST}); make one with 'frf-ipz run PIPELINE --out {path}'"
         )
-    manifest = load_manifest(path)
+    manifest = load_manifest(current)
     made_by = str(manifest.get("frf_ipz", __version__))
     if made_by.split(".")[:2] != __version__.split(".")[:2]:
         pipeline = manifest.get("pipeline", "PIPELINE")
@@ -368,7 +401,7 @@ def read_run(path: Path) -> RunFolder:
             f"{path}: these results were made by frf_ipz {made_by}, and this is {__version__}: make them again with "
             f"'frf-ipz run {pipeline} --out {path}'; its tables can still be read as Parquet"
         )
-    return RunFolder(path=path, staging=path / STAGING, manifest=manifest)
+    return RunFolder(path=path, current=current, manifest=manifest)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -385,55 +418,6 @@ def read_manifest(path: Path) -> dict[str, Any]:
         What it says; empty where there is none or it is damaged, so that everything is computed anew.
     """
     try:
-        return load_manifest(path)
+        return load_manifest(current_folder(path))
     except FileFormatError:
         return {}
-
-
-def _sweep(path: Path) -> None:
-    """Remove what commands that were killed have left."""
-    for leftover in path.glob(f"{STAGING}*"):
-        owner = leftover.name.removeprefix(STAGING)
-        if not owner.isdigit() or int(owner) == os.getpid() or not _is_running(int(owner)):
-            shutil.rmtree(leftover, ignore_errors=True)
-
-
-def _is_running(process: int) -> bool:
-    if sys.platform == "win32":  # there, signal 0 is no question but Ctrl-C for all that share the console
-        return _is_running_on_windows(process)
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _is_running_on_windows(process: int) -> bool:
-    kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined,unused-ignore]
-    kernel.OpenProcess.restype = ctypes.c_void_p
-    handle = kernel.OpenProcess(SYNCHRONIZE, 0, process)
-    if not handle:
-        return bool(ctypes.get_last_error() == ACCESS_DENIED)  # type: ignore[attr-defined,unused-ignore]
-    try:
-        return bool(kernel.WaitForSingleObject(ctypes.c_void_p(handle), 0) == WAIT_TIMEOUT)
-    finally:
-        kernel.CloseHandle(ctypes.c_void_p(handle))
-
-
-@contextmanager
-def _reporting_write_errors(path: Path) -> Iterator[Path]:
-    try:
-        yield path
-    except OSError as error:
-        raise _cannot_write(path, error) from None
-
-
-def _cannot_write(path: Path, error: OSError) -> InputError:
-    advice = {
-        errno.EACCES: f"{error.strerror}; close it where another program has it open, or choose another --out",
-        errno.ENOSPC: "the disk is full; free some space or choose another --out",
-        errno.EDQUOT: "the quota is used up; free some space or choose another --out",
-    }.get(error.errno or 0, f"{error.strerror}; choose another --out that can be written to")
-    return InputError(f"{path}: cannot be written: {advice}")

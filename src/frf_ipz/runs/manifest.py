@@ -61,6 +61,10 @@ def _check_stage(path: Path, where: str, stage: dict[str, Any]) -> None:
     _require(path, f"{where}.seconds", 0.0 if type(seconds) is int else seconds, float)
     files = stage.get("files", [])
     _require(path, f"{where}.files", files, list, dict)
+    digests = stage.get("digests", {})
+    _require(path, f"{where}.digests", digests, dict)
+    for name, value in digests.items():
+        _require(path, f"{where}.digests.{name}", value, str)
     for name in files:
         if not isinstance(name, str) or name == MANIFEST or not FILE_NAME.fullmatch(name):
             raise _damaged(path, f"{where}.files", f"{name!r:.60} is no file that a stage writes")

@@ -14,7 +14,7 @@ from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export.frames import FRAMES, as_frame
 from frf_ipz.export.run_tables import pair_table
 from frf_ipz.export.state_space import to_control
-from frf_ipz.runs.folder import read_run
+from frf_ipz.runs.folder import SupersededError, read_run
 from frf_ipz.runs.summary import summarise
 from frf_ipz.structure import StructuralModel
 
@@ -321,10 +321,20 @@ class Results:
         FileFormatError
             If a file is damaged.
         """
-        for name, attribute in vars(type(self)).items():
-            if isinstance(attribute, cached_property) and name != "state_space":
-                getattr(self, name)
-        return self
+        names = [name for name, item in vars(type(self)).items() if isinstance(item, cached_property)]
+        read = [name for name in names if name in vars(self)]
+        while True:
+            try:
+                for name in set(names) - {"state_space"}:
+                    getattr(self, name)
+            except SupersededError:
+                if read or self.path is None:  # the caller may hold some of the old ones
+                    raise
+                for name in names:
+                    vars(self).pop(name, None)
+                self._store = read_run(self.path)
+            else:
+                return self
 
     def _load(self, stage: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
         return self._store.load(stage) if stage in self.stages else None

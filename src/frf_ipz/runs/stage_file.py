@@ -25,6 +25,7 @@ import numpy as np
 from frf_ipz.errors import FileFormatError
 from frf_ipz.input_files import open_input, require_regular_file
 from frf_ipz.json_files import MOST_MEMORY, memory_of_values, parse_json
+from frf_ipz.output_files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +92,7 @@ def write_stage_file(content: StageFile, path: Path) -> None:
     total = hashlib.sha256()
     for part in parts:
         total.update(part)
-    with path.open("wb") as stream:
+    with replacing(path) as target, target.open("wb") as stream:
         for part in (MAGIC, total.digest(), *parts):
             stream.write(part)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING
 
 import tomlkit
@@ -10,6 +9,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.input_files import read_bytes
+from frf_ipz.output_files import write_text as write_file
 from frf_ipz.pipeline.config import PipelineFile
 from frf_ipz.toml_files import parse_toml, to_options
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.show.changes import Change
-
-BESIDE = ".frf-ipz-new"  # ending of the file that becomes the pipeline file once it is whole
 
 
 def changed_text(text: str, change: Change, path: Path) -> str:
@@ -91,16 +89,8 @@ def write_text(path: Path, text: str) -> None:
     FileFormatError
         If it cannot be written.
     """
-    target = path.resolve()
-    beside = target.with_name(target.name + BESIDE)
+    ends = "\r\n" if b"\r\n" in read_bytes(path) else "\n"
     try:
-        ends = "\r\n" if b"\r\n" in read_bytes(target) else "\n"
-        with beside.open("w", encoding="utf-8", newline=ends) as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        beside.chmod(target.stat().st_mode)
-        beside.replace(target)
+        write_file(path, text, newline=ends)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise FileFormatError(path, f"cannot be written: {error.strerror}") from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.input_files import read_text
 from frf_ipz.runs.folder import read_manifest
-from frf_ipz.runs.manifest import MANIFEST
+from frf_ipz.runs.generations import stamp
 from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
@@ -84,10 +84,7 @@ class Workbench:
     @property
     def stamp(self) -> str:
         """Another one whenever the folder holds other results; empty before the first run."""
-        try:
-            return str((self.folder / MANIFEST).stat().st_mtime_ns)
-        except OSError:
-            return ""
+        return stamp(self.folder)
 
     @property
     def manifest(self) -> dict[str, Any]:
@@ -107,9 +104,9 @@ class Workbench:
         InputError
             If there is no run yet, or a file is damaged.
         """
-        stamp = self.stamp
-        if self._read is None or self._read[0] != stamp:
-            self._read = stamp, open_results(self.folder).load()
+        stamped = self.stamp
+        if self._read is None or self._read[0] != stamped:
+            self._read = stamped, open_results(self.folder).load()
         return self._read[1]
 
     def text(self) -> str:

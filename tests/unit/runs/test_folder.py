@@ -1,25 +1,29 @@
 """A run's folder: everything or nothing, and nothing twice."""
 
-import ctypes
 import errno
 import json
 import os
-import subprocess
-import sys
+import stat
 from pathlib import Path
-from types import SimpleNamespace
-from unittest.mock import Mock
 
 import pytest
 
 import frf_ipz
 from frf_ipz.errors import InputError
 from frf_ipz.runs.digests import digest, digest_file
-from frf_ipz.runs.folder import STAGING, open_run, read_manifest, read_run
+from frf_ipz.runs.folder import open_run, read_manifest, read_run
+from frf_ipz.runs.folder_lock import LOCK
+from frf_ipz.runs.generations import POINTER, current_folder
+from frf_ipz.runs.stage_file import SUFFIX
 
 
 def write_text(text):
     return lambda path: path.write_text(text, encoding="utf-8")
+
+
+def contents(folder):
+    """All that is in a folder, but the lock, which has none."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name != LOCK}
 
 
 def stage(folder, key, value):
@@ -73,12 +77,11 @@ def test_a_file_that_its_stage_no_longer_writes_goes_and_one_of_another_stage_st
 def test_a_run_that_fails_leaves_what_was_there(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = contents(tmp_path)
     with pytest.raises(ZeroDivisionError), open_run(tmp_path) as folder:
         stage(folder, "b", 2)
         _ = 1 / 0
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
-    assert not list(tmp_path.glob(f"{STAGING}*"))
+    assert contents(tmp_path) == before
 
 
 def test_a_first_run_that_fails_leaves_no_folder(tmp_path):
@@ -95,96 +98,67 @@ def test_a_reader_never_sees_half_a_file(tmp_path):
     assert (tmp_path / "fit.txt").exists()
 
 
-def test_what_a_killed_run_left_is_swept(tmp_path):
-    dead = subprocess.Popen([sys.executable, "-c", ""])
-    dead.wait()
-    (tmp_path / f"{STAGING}{dead.pid}").mkdir()
-    alive = tmp_path / f"{STAGING}{os.getppid()}"
-    alive.mkdir()
-    with open_run(tmp_path):
-        pass
-    assert not (tmp_path / f"{STAGING}{dead.pid}").exists()
-    assert alive.exists()
-
-
-def test_on_windows_no_signal_is_sent_to_ask_whether_a_process_runs(tmp_path, monkeypatch):
-    """There, signal 0 is Ctrl-C. Process 11 has ended but is still known, 12 runs, 13 is another user's, 14 is none."""
-    handles, closed = {11: 111, 12: 112}, []
-    kernel = SimpleNamespace(
-        OpenProcess=Mock(side_effect=lambda *arguments: handles.get(arguments[2])),
-        WaitForSingleObject=lambda *arguments: 0x102 if arguments[0].value == 112 else 0,
-        CloseHandle=lambda handle: closed.append(handle.value),
-    )
-
-    def last_error():
-        return 5 if kernel.OpenProcess.call_args.args[2] == 13 else 87
-
-    monkeypatch.setattr(sys, "platform", "win32")
-    monkeypatch.setattr(ctypes, "WinDLL", Mock(return_value=kernel), raising=False)
-    monkeypatch.setattr(ctypes, "get_last_error", last_error, raising=False)
-    monkeypatch.delattr(os, "kill")
-    for process in (11, 12, 13, 14):
-        (tmp_path / f"{STAGING}{process}").mkdir()
-    with open_run(tmp_path):
-        pass
-    assert {path.name for path in tmp_path.glob(f"{STAGING}*")} == {f"{STAGING}12", f"{STAGING}13"}
-    assert sorted(closed) == [111, 112]
-
-
-def test_files_are_synced_as_windows_wants_it(tmp_path, monkeypatch):
-    synced = []
+def test_all_is_synced_before_it_counts_and_as_windows_wants_it(tmp_path, monkeypatch):
+    synced, counted = [], []
+    replace = os.replace
 
     def sync(descriptor):
-        os.write(descriptor, b"")  # fails for what is open for reading only, as does Windows' fsync
-        synced.append(descriptor)
+        if not stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            os.write(descriptor, b"")  # fails for what is open for reading only, as does Windows' fsync
+        synced.append(os.fstat(descriptor).st_ino)
+
+    def note_replace(source, target):
+        if Path(target).name == POINTER:
+            counted.append(len(synced))
+        replace(source, target)
 
     monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(os, "replace", note_replace)
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    assert len(synced) == 3
+    generation = current_folder(tmp_path)
+    files = [path for path in generation.rglob("*") if path.suffix != ".json"]
+    assert len(files) == 3  # with the folder of the results
+    assert {path.stat().st_ino for path in (*files, generation, tmp_path, tmp_path / "stages")} <= set(
+        synced[: counted[0]]
+    )
 
 
 @pytest.fixture
 def open_elsewhere(monkeypatch):
     """Files that are open in another program, as Windows sees it: nothing can take their place, nor can they go."""
     held = set()
-    replace, unlink = Path.replace, Path.unlink
+    replace = os.replace
 
-    def replace_if_free(self, target):
-        if target in held:
+    def replace_if_free(source, target):
+        if held & {Path(source), Path(target)}:
             raise PermissionError(errno.EACCES, "Permission denied")
-        return replace(self, target)
+        replace(source, target)
 
-    def unlink_if_free(self, missing_ok=False):
-        if self in held:
-            raise PermissionError(errno.EACCES, "Permission denied")
-        unlink(self, missing_ok=missing_ok)
-
-    monkeypatch.setattr(Path, "replace", replace_if_free)
-    monkeypatch.setattr(Path, "unlink", unlink_if_free)
+    monkeypatch.setattr(os, "replace", replace_if_free)
     return held
 
 
-def test_a_table_that_is_open_elsewhere_is_said_and_no_new_result_stands_under_an_old_key(tmp_path, open_elsewhere):
+@pytest.mark.parametrize("held", ["fit.txt", "abandoned.txt", "run.json", f"stages/fit{SUFFIX}"])
+def test_where_one_file_is_open_elsewhere_all_are_as_they_were(tmp_path, open_elsewhere, held):
+    old = {"fit.txt": write_text("1"), "abandoned.txt": write_text("1"), "same.txt": write_text("1")}
     with open_run(tmp_path) as folder:
-        stage(folder, "a", 1)
-    open_elsewhere.add(tmp_path / "fit.txt")
-    with pytest.raises(InputError, match=r"fit\.txt: cannot be written: .*close it"), open_run(tmp_path) as folder:
-        folder.stage("fit", "b", lambda: 2, lambda _: {"a.txt": write_text("2"), "fit.txt": write_text("2")})
-    assert (tmp_path / "a.txt").read_text() == "2"  # it took its place before
-    assert not list(tmp_path.glob(f"{STAGING}*"))
+        folder.stage("fit", "a", lambda: 1, lambda _: old)
+    (tmp_path / "same.txt").write_text("edited by the user")
+    before = contents(tmp_path)
+    open_elsewhere.add(tmp_path / held)
+    new = {"another.txt": write_text("2"), "fit.txt": write_text("2"), "same.txt": write_text("1")}
+    with pytest.raises(InputError, match=r"cannot be written: .*close it") as refused, open_run(tmp_path) as folder:
+        folder.stage("fit", "b", lambda: 2, lambda _: new)
+    assert str(refused.value).startswith(str(tmp_path / held))
+    assert contents(tmp_path) == before
+    assert read_run(tmp_path).load("fit") == 1
     open_elsewhere.clear()
     with open_run(tmp_path) as folder:
-        assert stage(folder, "a", 3) == 3
-    assert (tmp_path / "fit.txt").read_text() == "3"
-
-
-def test_an_abandoned_table_that_is_open_elsewhere_is_said(tmp_path, open_elsewhere):
-    with open_run(tmp_path) as folder:
-        folder.stage("fit", "a", lambda: 1, lambda _: {"more.txt": write_text("1")})
-    open_elsewhere.add(tmp_path / "more.txt")
-    with pytest.raises(InputError, match=r"more\.txt: cannot be written: .*close it"), open_run(tmp_path) as folder:
-        stage(folder, "b", 2)
+        folder.stage("fit", "b", lambda: 3, lambda _: new)
+    assert (tmp_path / "fit.txt").read_text() == "2"
+    assert not (tmp_path / "abandoned.txt").exists()
+    assert read_run(tmp_path).load("fit") == 3
 
 
 def test_a_full_disk_is_said_in_one_line_and_loses_nothing(tmp_path):
@@ -216,13 +190,13 @@ def test_a_damaged_manifest_means_computing_anew(tmp_path):
     assert read_manifest(tmp_path) == {}
 
 
-def test_files_of_a_page_are_written_again_when_they_are_gone(tmp_path):
-    for expected in (["report"], [], ["report"]):
+def test_files_of_a_page_are_there_again_when_they_are_gone(tmp_path):
+    for key, expected in (("a", ["report"]), ("a", []), ("b", ["report"])):
         with open_run(tmp_path) as folder:
-            folder.page("report", "a", {"report.html": write_text("page")})
+            folder.page("report", key, {"report.html": write_text(f"page {key}")})
             assert folder.computed == expected
-        if not expected:
-            (tmp_path / "report.html").unlink()
+        assert (tmp_path / "report.html").read_text() == f"page {key}"
+        (tmp_path / "report.html").unlink()
 
 
 def test_digests_follow_the_content(tmp_path):

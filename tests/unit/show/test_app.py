@@ -7,6 +7,7 @@ from starlette.testclient import TestClient
 
 from frf_ipz.errors import InputError
 from frf_ipz.pipeline.inputs import read_inputs
+from frf_ipz.runs.generations import current_folder
 from frf_ipz.show.app import build_app
 from frf_ipz.show.campaign import RunPaths
 from frf_ipz.show.workbench import Workbench
@@ -201,8 +202,8 @@ def test_what_the_page_shows_of_the_file_is_escaped(client):
 
 def test_a_damaged_result_is_said(client, bench):
     assert client.get(HOME).status_code == 200
-    (bench.folder / "stages" / "fit.result").write_bytes(b"no result")
-    (bench.folder / "run.json").touch()
+    (current_folder(bench.folder) / "stages" / "fit.result").write_bytes(b"no result")
+    (current_folder(bench.folder) / "run.json").touch()
     answer = client.get(HOME)
     assert answer.status_code == 400
     assert "is damaged" in answer.json()["error"]

@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.frf import FrfSet
+from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -155,4 +156,4 @@ def corrections(diagnosis: Diagnosis | None) -> str:
 
 
 def _write_json(table: dict[str, object], path: Path) -> None:
-    path.write_text(json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -1,0 +1,88 @@
+"""One command at a time for a folder: a lock that the system frees when its process ends, however that is."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+import time
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from filelock import FileLock, Timeout
+
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.json_files import read_json
+from frf_ipz.output_files import write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frf_ipz.progress import Progress
+
+LOCK, HOLDER = "lock", "holder.json"
+WAIT_S = 10.0  # so long the second command waits
+PAUSE_S = 0.1
+
+
+@contextmanager
+def lock_folder(path: Path, hidden: Path, *, progress: Progress) -> Iterator[None]:
+    """Work in a folder alone; threads of one process count as others.
+
+    Parameters
+    ----------
+    path : Path
+        The folder, for messages.
+    hidden : Path
+        Where the lock is; made where there is none.
+    progress : Progress
+        Told for whom it waits.
+
+    Raises
+    ------
+    InputError
+        If another command is still at work there after `WAIT_S`: says who.
+    OSError
+        If the lock cannot be made.
+    """
+    lock = FileLock(hidden / LOCK)
+    _acquire(lock, path, hidden, progress)
+    try:
+        since = datetime.now().astimezone().isoformat(timespec="seconds")
+        command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+        write_text(hidden / HOLDER, json.dumps({"pid": os.getpid(), "command": command, "since": since}))
+        yield
+    finally:
+        with suppress(OSError):
+            (hidden / HOLDER).unlink(missing_ok=True)
+        lock.release()
+
+
+def _acquire(lock: FileLock, path: Path, hidden: Path, progress: Progress) -> None:
+    end = time.monotonic() + WAIT_S
+    while True:
+        hidden.mkdir(parents=True, exist_ok=True)
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            remaining = end - time.monotonic()
+            if remaining <= 0:
+                raise InputError(
+                    f"{path}: {_holder(hidden)} is at work here; wait until it is done, or choose another --out"
+                ) from None
+            progress(1 - remaining / WAIT_S, f"waiting for {_holder(hidden)}")
+            time.sleep(PAUSE_S)
+        else:
+            return
+
+
+def _holder(hidden: Path) -> str:
+    """Say who holds the lock, as it says itself."""
+    try:
+        holder = read_json(hidden / HOLDER)
+    except FileFormatError:
+        return "another command"
+    return f"process {holder.get('pid')} ({holder.get('command')}, since {holder.get('since')})"
