@@ -1,7 +1,7 @@
 """Prediction: FRFs at points that were not measured, with a band for what the measurements do not determine.
 
-Sits after updating. The band is that of the update's ensemble: the covariance of the targets, and the null space of the
-update.
+Sits after updating. The band is that of the update's ensemble (the covariance of the targets, and the null space of the
+update), widened by what the updated model misses of the measured FRFs.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel, Measured, require_measured
+from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.prediction.advice import explain_wide_band, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
+from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_size
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.zeros import predicted_zeros
 from frf_ipz.updating.updated_model import UpdatedModel
@@ -25,6 +27,7 @@ from frf_ipz.updating.updated_model import UpdatedModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.prediction.model_error import ModelError
     from frf_ipz.structure import ReducedModel
 
 BAND = (0.05, 0.95)
@@ -96,7 +99,10 @@ def predict_frfs(
     band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
     lowest = float(np.abs(s[s != 0]).min())
     ensemble = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
-    low, high = _magnitude_bands(updated, ensemble, predicted, s)
+    error = None
+    if isinstance(measured, ModalFit) and len(updated.ensemble):
+        error = estimate_model_error(measured, updated, ensemble, s)
+    low, high = _magnitude_bands(updated, ensemble, predicted, s, error)
     zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
     warnings = tuple(
         explain_wide_band(band, updated.model, ensemble, labels, predicted[band.frf], frequency_hz, zeros)
@@ -121,12 +127,19 @@ def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) 
 
 
 def _magnitude_bands(
-    updated: UpdatedModel, ensemble: ModelEnsemble, labels: Sequence[FrfLabel], s: ComplexArray
+    updated: UpdatedModel,
+    ensemble: ModelEnsemble,
+    labels: Sequence[FrfLabel],
+    s: ComplexArray,
+    error: ModelError | None,
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
+        centre = as_ensemble(updated, ensemble.lowest_rad_s)
         for number, label in enumerate(labels):
             output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)
-            magnitude = np.abs(ensemble.receptance(output, force, s) * s**label.quantity.power)
-            bands[:, :, number] = np.quantile(magnitude, BAND, axis=0)
+            values = ensemble.receptance(output, force, s) * s**label.quantity.power
+            if error is not None:
+                values = values + error.draw(frf_size(updated, label, s, centre), len(values))
+            bands[:, :, number] = np.quantile(np.abs(values), BAND, axis=0)
     return bands[0], bands[1]
