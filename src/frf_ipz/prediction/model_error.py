@@ -1,7 +1,7 @@
 """What an updated model cannot express, estimated where it was measured and carried to where it was not.
 
-At every line, what the updated model misses of the measured FRFs, beyond the spread of its ensemble and the noise of the
-fit, is divided by the size of the FRF: the sum of the moduli of its modes' contributions, which does not vanish at
+At every line, what the updated model misses of the measured FRFs, beyond the spread of its ensemble and the noise of
+the fit, is divided by the size of the FRF: the sum of the moduli of its modes' contributions, which does not vanish at
 zeros. The mean square over the measured FRFs is the relative size of the error there; that of an FRF which was not
 measured is as large in relation to its own size. The mean square of n complex numbers is uncertain by itself, so that
 the error has a Student distribution with 2 n degrees of freedom.
@@ -20,6 +20,8 @@ import numpy as np
 from frf_ipz.prediction.ensemble import ModelEnsemble
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
@@ -96,7 +98,7 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
         excess = np.maximum(np.abs(measured[:, frf] - value) ** 2 - spread - noise, 0.0)
         size = frf_size(updated, label, s, centre)
         power += np.divide(excess, size**2, out=np.zeros(len(s)), where=size > 0.0)
-    return ModelError(ratio=np.sqrt(power / len(fit.labels)), degrees=2 * len(fit.labels))
+    return ModelError(ratio=np.sqrt(power / len(fit.labels)), degrees=2 * _independent(fit.labels))
 
 
 def as_ensemble(updated: UpdatedModel, lowest_rad_s: float) -> ModelEnsemble:
@@ -143,3 +145,8 @@ def frf_size(updated: UpdatedModel, label: FrfLabel, s: ComplexArray, centre: Mo
     products = (updated.model.row(label.output_dof) @ shapes) * (updated.model.row(label.input_dof) @ shapes)
     contributions = np.abs(products) / np.abs(s[:, None] ** 2 + s[:, None] * damping + squares)
     return np.asarray(contributions.sum(axis=1) * np.abs(s) ** label.quantity.power)
+
+
+def _independent(labels: Sequence[FrfLabel]) -> int:
+    """Count the errors that are independent: FRFs of one sensor or one excited DOF share that one's."""
+    return min(len({label.output_dof.name for label in labels}), len({label.input_dof.name for label in labels}))

@@ -1,0 +1,78 @@
+"""Bands widen by what the updated model misses where it was measured, and hold the truth where it was not."""
+
+import numpy as np
+import pytest
+
+import frf_ipz
+
+BEAM = {
+    "length_m": 0.5,
+    "width_m": 0.02,
+    "thickness_m": 0.005,
+    "youngs_modulus_Pa": 70e9,
+    "density_kg_m3": 2700,
+    "elements": 20,
+    "left": "clamped",
+    "modal_ratio": 0.005,
+}
+LINES = np.arange(5.0, 700.0, 0.5)
+OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
+NOISE = 1e-3  # of the root mean square of an FRF
+
+
+def labels(outputs):
+    return [frf_ipz.FrfLabel(output, source, "accelerance") for output in outputs for source in INPUTS]
+
+
+def predict(machine, *, seed=0):
+    """Predict the point from FRFs of a machine, and give the truth."""
+    values = frf_ipz.compute_frfs(machine, labels(OUTPUTS), 2j * np.pi * LINES)
+    rng = np.random.default_rng(seed)
+    std = NOISE * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    noisy = values + std / np.sqrt(2) * (rng.normal(size=values.shape) + 1j * rng.normal(size=values.shape))
+    frfs = frf_ipz.FrfSet.from_arrays(
+        LINES,
+        noisy[:, :, None],
+        outputs=OUTPUTS,
+        inputs=INPUTS,
+        variance=np.broadcast_to(std**2, values.shape)[:, :, None],
+    )
+    fit = frf_ipz.fit_modes(frfs)
+    model = frf_ipz.make_beam(**BEAM)
+    reduced = frf_ipz.reduce_model(fit, model, points=[POINT])
+    updated = frf_ipz.update_model(fit, reduced, fe_model=model)
+    prediction = frf_ipz.predict_frfs(fit, updated, points=[POINT])
+    truth = frf_ipz.compute_frfs(machine, labels([POINT]), 2j * np.pi * prediction.frequency_hz)
+    return prediction, np.abs(truth)
+
+
+def share_inside(prediction, truth):
+    return np.mean((truth >= prediction.magnitude_low) & (truth <= prediction.magnitude_high))
+
+
+def half_width_db(prediction):
+    return np.median(10 * np.log10(prediction.magnitude_high / prediction.magnitude_low))
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return predict(frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71e9}))
+
+
+@pytest.fixture(scope="module")
+def lacking():
+    """The machine carries 8 g that its model lacks."""
+    extra = frf_ipz.BeamPointMass(node=14, mass_kg=0.008)
+    return predict(frf_ipz.make_beam(**BEAM, point_mass=[extra]))
+
+
+def test_a_model_that_can_express_the_measurement_keeps_a_narrow_band(sound):
+    prediction, truth = sound
+    assert share_inside(prediction, truth) > 0.75
+    assert half_width_db(prediction) < 0.05
+
+
+def test_a_model_that_lacks_a_mass_has_a_band_that_holds_the_truth(lacking, sound):
+    prediction, truth = lacking
+    assert share_inside(prediction, truth) > 0.75
+    assert half_width_db(prediction) > 3 * half_width_db(sound[0])
