@@ -43,6 +43,7 @@ def require_regular_file(path: Path) -> int:
     FileFormatError
         If it is missing, is something else, or cannot be reached.
     """
+    require_text_name(path)
     try:
         with _errors_of_system(path):
             status = path.stat()
@@ -55,6 +56,25 @@ def require_regular_file(path: Path) -> int:
     if not stat.S_ISREG(status.st_mode):
         raise FileFormatError(path, "is a device or a pipe; a file is needed: copy what it gives to one")
     return status.st_size
+
+
+def require_text_name(path: Path) -> None:
+    """Refuse a name that is no text: tables, JSON and pages cannot say it.
+
+    Parameters
+    ----------
+    path : Path
+        A file or a folder.
+
+    Raises
+    ------
+    FileFormatError
+        If a part of it is not UTF-8.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise FileFormatError(path, "its name is not in UTF-8; rename the file or the folder") from None
 
 
 @contextmanager

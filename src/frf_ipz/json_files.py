@@ -7,6 +7,7 @@ the room is estimated from the text before it is parsed.
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import FileFormatError
@@ -15,6 +16,7 @@ from frf_ipz.input_files import read_bytes
 if TYPE_CHECKING:
     from pathlib import Path
 
+HALF_A_LETTER = re.compile(rb"\\u[dD][89a-fA-F]")
 MOST_MEMORY = 1 << 28  # bytes of values from one text: half of what looking at any folder may take
 # Bytes of CPython on a 64-bit machine. One letter beyond the Basic Multilingual Plane makes all letters take 4 bytes,
 # in the file's text and in its values, beside the bytes of the file. A text takes 80 more, and a key up to 100 in its
@@ -68,6 +70,8 @@ def parse_json(data: bytes, path: Path) -> dict[str, Any]:
         raise FileFormatError(path, f"holds more values than {MOST_MEMORY >> 20} MB of memory take; is it damaged?")
     try:
         values = json.loads(data.decode("utf-8"))
+        if HALF_A_LETTER.search(data):
+            json.dumps(values, ensure_ascii=False).encode("utf-8")  # fails where a half has no other half
     except (ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is no JSON text ({error}); is it damaged?") from None
     if not isinstance(values, dict):

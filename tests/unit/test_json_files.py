@@ -11,8 +11,8 @@ from frf_ipz.json_files import memory_of_values, read_json
 
 def test_an_object_is_read(tmp_path):
     path = tmp_path / "run.json"
-    path.write_text('{"a": [1, "ä", null]}', encoding="utf-8")
-    assert read_json(path) == {"a": [1, "ä", None]}
+    path.write_text('{"a": [1, "ä", null, "\\ud83d\\udd28"]}', encoding="utf-8")
+    assert read_json(path) == {"a": [1, "ä", None, "\U0001f528"]}
 
 
 @pytest.mark.parametrize(
@@ -25,9 +25,10 @@ def test_an_object_is_read(tmp_path):
         (b"\x00" * 100, "no JSON text"),
         (b'{"a":' + b"[" * 100_000, "no JSON text"),
         (b'{"a":' + b"9" * 5000 + b"}", "no JSON text"),
+        (b'{"a": "\\ud800"}', "no JSON text"),
         (b'{"a": [' + b"[]," * (1 << 21) + b"0]}", "256 MB of memory"),
     ],
-    ids=["empty", "list", "bytes", "cut", "zeros", "deep", "long number", "many"],
+    ids=["empty", "list", "bytes", "cut", "zeros", "deep", "long number", "half a letter", "many"],
 )
 def test_what_is_none_is_refused_in_one_line(tmp_path, data, problem):
     path = tmp_path / "run.json"

@@ -7,7 +7,7 @@ from pathlib import Path
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.plotting.figures import FORMATS, draw_pictures, save_figure
 from frf_ipz.plotting.registry import describe, picture_names
-from frf_ipz.runs.results import open_results
+from frf_ipz.runs.results import errors_of_results, open_results
 
 
 def picture_list(folder: Path) -> str:
@@ -29,7 +29,9 @@ def picture_list(folder: Path) -> str:
         If there is no run in the folder.
     """
     run = open_results(folder)
-    return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *picture_names(run)])
+    with errors_of_results(folder):
+        names = picture_names(run)
+    return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *names])
 
 
 def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) -> str:
@@ -59,7 +61,9 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     if file_format not in FORMATS:
         raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
     path = Path(f"{name}.{file_format}") if out is None else out
-    figure = draw_pictures(describe(name, open_results(folder).load()))
+    run = open_results(folder).load()
+    with errors_of_results(folder):
+        figure = draw_pictures(describe(name, run))
     try:
         save_figure(figure, path, file_format=file_format)
     except InputError as error:

@@ -64,7 +64,7 @@ def save_result(result: object, path: Path, *, key: str = "") -> None:
         If it cannot be written.
     """
     arrays: list[NDArray[Any]] = []
-    name = f"{type(result).__module__}:{type(result).__qualname__}"
+    name = _name_of(type(result))
     kind: Any = type(result) if name in RESULTS.values() else object
     tree = [name if kind is not object else "", _kind(kind).encode(result, arrays)]
     write_stage_file(StageFile(key=key, tree=tree, arrays=arrays), path)
@@ -107,6 +107,24 @@ def load_result(path: Path, *, stage: str = "", key: str | None = None) -> Any:
         raise FileFormatError(path, f"is damaged or from another version ({reason}); {ADVICE}") from None
 
 
+def is_result_of(stage: str, value: object) -> bool:
+    """Tell whether a value is of the type that a stage gives.
+
+    Parameters
+    ----------
+    stage : str
+        The stage.
+    value : object
+        What stands for its result.
+
+    Returns
+    -------
+    bool
+        True if it is.
+    """
+    return _name_of(type(value)) == RESULTS[stage]
+
+
 class _MisfitError(ValueError):
     """A value is not what its annotation says."""
 
@@ -139,6 +157,8 @@ class _Scalar(_Kind):
         del arrays
         if type(node) is not self._kind or (type(node) is int and abs(node) >= LARGEST_INTEGER):
             raise _MisfitError(f"a {self._kind.__name__} was expected")
+        if type(node) is str:
+            node.encode()  # fails for half a letter, which no page and no table can say
         return node
 
 
@@ -378,6 +398,10 @@ def _kind(hint: Any) -> _Kind:
     if origin is Mapping:
         return _Mapping(*map(_kind, arguments))
     return _Choice(hint) if isinstance(hint, type) and issubclass(hint, Enum) else _Fields(hint)
+
+
+def _name_of(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def _type_of(name: str) -> type:

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import cached_property
 from html import escape
 from importlib import import_module
 from pathlib import Path
+from traceback import extract_tb
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from frf_ipz.arguments import as_path
 from frf_ipz.display import PICTURES, REPORT
-from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.errors import FileFormatError, FrfIpzError, InputError, did_you_mean
 from frf_ipz.export.frames import FRAMES, as_frame
 from frf_ipz.export.run_tables import pair_table
 from frf_ipz.export.state_space import to_control
+from frf_ipz.runs.codec import is_result_of
 from frf_ipz.runs.folder import SupersededError, read_run
 from frf_ipz.runs.summary import summarise
 from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     import control
     import pandas as pd
@@ -37,6 +40,9 @@ if TYPE_CHECKING:
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
+
+
+INCONSISTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
 
 
 class Store(Protocol):
@@ -146,7 +152,8 @@ class Results:
         str
             At most a screen of text.
         """
-        return summarise(self)
+        with errors_of_results(self.path):
+            return summarise(self)
 
     def to_frame(self, table: str) -> pd.DataFrame:
         """Give a table of the run.
@@ -194,7 +201,8 @@ class Results:
         InputError
             If there is no such picture, or its stage has not run.
         """
-        figure: Figure = import_module(PICTURES).plot_run(self, picture)
+        with errors_of_results(self.path):
+            figure: Figure = import_module(PICTURES).plot_run(self, picture)
         return figure
 
     def write_report(self, path: str | Path) -> None:
@@ -211,7 +219,8 @@ class Results:
             If it cannot be written.
         """
         try:
-            import_module(REPORT).write_report(self, as_path(path))
+            with errors_of_results(self.path):
+                import_module(REPORT).write_report(self, as_path(path))
         except OSError as error:
             raise InputError(f"{path}: the report cannot be written: {error.strerror}") from None
 
@@ -337,7 +346,49 @@ class Results:
                 return self
 
     def _load(self, stage: str) -> Any:  # noqa: ANN401  every stage has a result of its own type
-        return self._store.load(stage) if stage in self.stages else None
+        if stage not in self.stages:
+            return None
+        result = self._store.load(stage)
+        if self.path is not None and result is not None and not is_result_of(stage, result):
+            raise FileFormatError(self.path, f"what it keeps of the stage '{stage}' is something else; run again")
+        return result
+
+
+@contextmanager
+def errors_of_results(folder: Path | None) -> Iterator[None]:
+    """Say that results of a folder cannot be shown, where they do not fit together.
+
+    What a folder holds may come from anybody. Each value is what it should be once it is read, but nothing makes
+    sure that a table has the rows that another one points at.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        The folder; None for a run in memory, whose errors stay what they are.
+
+    Yields
+    ------
+    None
+        While they are shown.
+
+    Raises
+    ------
+    FileFormatError
+        In the place of an error that is none of this package's.
+    """
+    try:
+        yield
+    except FrfIpzError:
+        raise
+    except INCONSISTENT as error:
+        if folder is None:
+            raise
+        place = extract_tb(error.__traceback__)[-1]
+        raise FileFormatError(
+            folder,
+            f"its results do not fit together ({error!r:.100} in {Path(place.filename).name}, line {place.lineno}): "
+            "they are damaged, or the program has a fault; run again, and report it where that does not help",
+        ) from error
 
 
 def open_results(path: str | Path) -> Results:
@@ -373,6 +424,7 @@ def open_results(path: str | Path) -> Results:
     ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
     ... )
     >>> from pathlib import Path
+    from traceback import extract_tb
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     _ = frf_ipz.Campaign(frfs).run(Path(folder) / "results", until="fit")

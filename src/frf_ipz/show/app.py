@@ -15,6 +15,7 @@ from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.html import PLOTLY, REPORT, read_asset
+from frf_ipz.runs.results import errors_of_results
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import SHOW, render_choices, render_page
@@ -168,14 +169,19 @@ def _answering(
                 return JSONResponse({"error": "changes are sent as application/json"}, 415)
             try:
                 request.state.wish = json.loads(await request.body())
-            except ValueError:
+            except (ValueError, RecursionError):
                 return JSONResponse({"error": "this is no JSON"}, 400)
         try:
-            return await run_in_threadpool(answer, bench, request)
+            return await run_in_threadpool(_answer, bench, request, answer)
         except FrfIpzError as error:
             return JSONResponse({"error": str(error)}, 400)
 
     return endpoint
+
+
+def _answer(bench: Workbench, request: Request, answer: Callable[[Workbench, Request], Response]) -> Response:
+    with errors_of_results(bench.folder):
+        return answer(bench, request)
 
 
 def _fixed(text: str, kind: str) -> Callable[[Request], Awaitable[Response]]:

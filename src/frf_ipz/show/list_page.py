@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from frf_ipz.errors import InputError
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.json_files import read_json
 from frf_ipz.report.findings import SENTENCES
 from frf_ipz.report.html import page_environment
 from frf_ipz.show.page import SHOW
@@ -62,7 +62,7 @@ def _name_in_file(bench: Workbench) -> str:
 def _verdict(folder: Path) -> str:
     """Take the sentence of a diagnosis, where one was made."""
     try:
-        diagnosis = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-        return str(diagnosis.get("statement") or SENTENCES[diagnosis["verdict"]])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        diagnosis = read_json(folder / "diagnosis.json")
+        return str(diagnosis.get("statement") or SENTENCES[str(diagnosis["verdict"])])
+    except (FileFormatError, KeyError):
         return "no diagnosis was run"

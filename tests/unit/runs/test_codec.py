@@ -26,7 +26,19 @@ def round_trip(value, tmp_path):
 
 @pytest.mark.parametrize(
     "value",
-    [None, True, 3, 0.1, float("inf"), "text", "\udcff", 1 + 2j, (1, ("a", None)), {"a": 1, 2: (3,)}, np.float64(2)],
+    [
+        None,
+        True,
+        3,
+        0.1,
+        float("inf"),
+        "text",
+        "\U0001f528",
+        1 + 2j,
+        (1, ("a", None)),
+        {"a": 1, 2: (3,)},
+        np.float64(2),
+    ],
     ids=ascii,
 )
 def test_plain_values_come_back_equal(value, tmp_path):
