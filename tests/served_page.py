@@ -22,8 +22,10 @@ def served(folder):
     """Serve a folder by the command; gives the address of its page."""
     command = [sys.executable, "-m", "frf_ipz.cli.main", "show", str(folder), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        yield server.stdout.readline().strip()
-        server.kill()
+        try:
+            yield server.stdout.readline().strip()
+        finally:
+            server.kill()
 
 
 class Page:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import logging
+import secrets
 from dataclasses import asdict
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
-from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.requests import ClientDisconnect
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
 
 from frf_ipz.errors import FrfIpzError, InputError
@@ -18,9 +19,9 @@ from frf_ipz.report.html import PLOTLY, REPORT, read_asset
 from frf_ipz.runs.results import errors_of_results
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
-from frf_ipz.show.page import SHOW, render_choices, render_page
+from frf_ipz.show.page import SHOW, Addresses, render_choices, render_page
+from frf_ipz.show.result_files import send_file
 from frf_ipz.show.shapes import draw_shape, mode_shape, operating_shape
-from frf_ipz.show.workbench import Workbench
 from frf_ipz.show.zoom import zoomed_traces
 
 if TYPE_CHECKING:
@@ -29,12 +30,24 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp
 
-SCRIPT, STYLE = "text/javascript", "text/css"
-REPORT_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+    from frf_ipz.show.workbench import Workbench
+
+LOG = logging.getLogger(__name__)
+TOKEN_BYTES = 24
+ASSETS = {
+    "plotly.js": (REPORT, PLOTLY, "text/javascript"),
+    "page.js": (REPORT, "page.js", "text/javascript"),
+    "show.js": (SHOW, "show.js", "text/javascript"),
+    "page.css": (REPORT, "page.css", "text/css"),
+    "show.css": (SHOW, "show.css", "text/css"),
+}
 
 
 def build_app(benches: Sequence[Workbench], *, port: int, token: str) -> ASGIApp:
     """Make the web application of a run, or of a campaign: then its first page lists the runs.
+
+    Files of the runs have addresses that begin with a token of their own: a page that lies in a results folder never
+    knows the one by which changes are made.
 
     Parameters
     ----------
@@ -43,59 +56,115 @@ def build_app(benches: Sequence[Workbench], *, port: int, token: str) -> ASGIApp
     port : int
         Where it will listen: requests that name another one are refused.
     token : str
-        First part of every path.
+        First part of every path of the page.
 
     Returns
     -------
     ASGI application
         For uvicorn.
     """
-    if len(benches) == 1:
-        mounts = [Mount(f"/{token}", routes=_routes(benches[0]))]
-    else:
-        mounts = [
-            Mount(f"/{token}/{number}", routes=_routes(bench, home="../"))
-            for number, bench in enumerate(benches, start=1)
+    file_token = secrets.token_urlsafe(TOKEN_BYTES)
+    routes = _Routes(benches, file_token)
+    mounts = [Mount(f"/{token}", routes=routes.of_pages()), Mount(f"/{file_token}", routes=routes.of_files())]
+    return Guard(Starlette(routes=mounts), port=port, tokens=(token, file_token))
+
+
+class _Routes:
+    """Addresses of one run, or of several by their numbers, from 1: each route stands once for all of them."""
+
+    def __init__(self, benches: Sequence[Workbench], file_token: str) -> None:
+        self._benches = {str(number): bench for number, bench in enumerate(benches, start=1)}
+        self._is_campaign = len(benches) > 1
+        self._file_token = file_token
+        self._one_at_a_time = CapacityLimiter(1)  # pages and figures: memory for one of them is enough
+
+    def of_pages(self) -> list[Route | Mount]:
+        run = "/{run}" if self._is_campaign else ""
+        routes: list[Route | Mount] = [
+            Mount("/assets", routes=[_fixed(name, *asset) for name, asset in ASSETS.items()])
         ]
-        mounts.append(Mount(f"/{token}", routes=_routes_of_list(benches)))
-    return Guard(Starlette(routes=mounts), port=port, token=token)
+        if self._is_campaign:
+            routes.append(Route("/", self._list))
+        return [
+            *routes,
+            Route(f"{run}/", self._answering(self._page, self._one_at_a_time)),
+            Route(f"{run}/state", self._answering(_state)),
+            Route(f"{run}/choices", self._answering(_choices)),
+            Route(f"{run}/shape", self._answering(_shape, self._one_at_a_time)),
+            Route(f"{run}/zoom", self._answering(_zoom, self._one_at_a_time)),
+            Route(f"{run}/change", self._answering(_change), methods=["POST"]),
+            Route(f"{run}/allow", self._answering(_allow), methods=["POST"]),
+            Route(f"{run}/run", self._answering(_run), methods=["POST"]),
+        ]
 
+    def of_files(self) -> list[Route]:
+        return [Route("/{run}/{path:path}", self._answering(_file))]
 
-def _routes(bench: Workbench, *, home: str = "") -> list[Route]:
-    return [
-        Route("/", _answering(bench, partial(_page, home=home))),
-        Route("/state", _answering(bench, _state)),
-        Route("/choices", _answering(bench, _choices)),
-        Route("/shape", _answering(bench, _shape)),
-        Route("/zoom", _answering(bench, _zoom)),
-        Route("/change", _answering(bench, _change), methods=["POST"]),
-        Route("/run", _answering(bench, _run), methods=["POST"]),
-        Route("/run/{path:path}", _answering(bench, _file)),
-        Route("/plotly.js", _fixed(read_asset(REPORT, PLOTLY), SCRIPT)),
-        Route("/page.js", _fixed(read_asset(REPORT, "page.js"), SCRIPT)),
-        Route("/show.js", _fixed(read_asset(SHOW, "show.js"), SCRIPT)),
-        *_styles(),
-    ]
+    def _page(self, bench: Workbench, request: Request) -> Response:
+        up = "../" if self._is_campaign else ""
+        report = f"../{up}{self._file_token}/{request.path_params.get('run', '1')}/report.html"
+        return HTMLResponse(render_page(bench, Addresses(home=up, assets=f"{up}assets/", report=report)))
 
-
-def _routes_of_list(benches: Sequence[Workbench]) -> list[Route]:
-    async def page(request: Request) -> Response:
+    async def _list(self, request: Request) -> Response:
         del request
-        return HTMLResponse(await run_in_threadpool(render_list, benches))
+        benches = list(self._benches.values())
+        return HTMLResponse(await to_thread.run_sync(render_list, benches, limiter=self._one_at_a_time))
 
-    return [Route("/", page), *_styles()]
+    def _answering(
+        self, answer: Callable[[Workbench, Request], Response], limiter: CapacityLimiter | None = None
+    ) -> Callable[[Request], Awaitable[Response]]:
+        """Answer in a thread, and turn errors of the user's into a sentence."""
+
+        async def endpoint(request: Request) -> Response:
+            bench = self._benches.get(request.path_params.get("run", "1"))
+            if bench is None:
+                return PlainTextResponse("There is no such run.\n", 404)
+            try:
+                if request.method == "POST":
+                    request.state.wish = await _read_wish(request)
+                return await to_thread.run_sync(_answer, bench, request, answer, limiter=limiter)
+            except _Refusal as refusal:
+                return _refuse(str(refusal), refusal.status)
+            except FrfIpzError as error:
+                return _refuse(str(error), 400)
+            except Exception as error:
+                LOG.exception("a fault of the program")
+                return _refuse(f"a fault of the program: {type(error).__name__}", 500)
+
+        return endpoint
 
 
-def _styles() -> list[Route]:
-    return [
-        Route("/page.css", _fixed(read_asset(REPORT, "page.css"), STYLE)),
-        Route("/show.css", _fixed(read_asset(SHOW, "show.css"), STYLE)),
-    ]
+def _answer(bench: Workbench, request: Request, answer: Callable[[Workbench, Request], Response]) -> Response:
+    with errors_of_results(bench.folder):
+        return answer(bench, request)
 
 
-def _page(bench: Workbench, request: Request, *, home: str) -> Response:
-    del request
-    return HTMLResponse(render_page(bench, home=home))
+class _Refusal(Exception):  # noqa: N818  nothing has gone wrong but the request
+    def __init__(self, text: str, status: int) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+def _refuse(text: str, status: int) -> Response:
+    return JSONResponse({"error": " ".join(text.splitlines())}, status)
+
+
+async def _read_wish(request: Request) -> object:
+    """Read what a page sends: JSON that JSON's standard knows, of characters that UTF-8 knows."""
+    if request.headers.get("content-type", "").split(";")[0] != "application/json":
+        raise _Refusal("changes are sent as application/json", 415)
+    try:
+        wish: object = json.loads(await request.body(), parse_constant=_refuse_constant)
+        json.dumps(wish, ensure_ascii=False).encode()
+    except (ValueError, RecursionError):
+        raise _Refusal("this is no JSON", 400) from None
+    except ClientDisconnect:
+        raise _Refusal("the request ended before it was whole", 400) from None
+    return wish
+
+
+def _refuse_constant(name: str) -> Any:  # noqa: ANN401  never gives anything
+    raise ValueError(name)
 
 
 def _state(bench: Workbench, request: Request) -> Response:
@@ -135,58 +204,24 @@ def _change(bench: Workbench, request: Request) -> Response:
     return _choices(bench, request)
 
 
+def _allow(bench: Workbench, request: Request) -> Response:
+    bench.allow_code(request.state.wish)
+    return _choices(bench, request)
+
+
 def _run(bench: Workbench, request: Request) -> Response:
     bench.run()
     return _choices(bench, request)
 
 
 def _file(bench: Workbench, request: Request) -> Response:
-    """Send a file of the run; whatever lies outside, and what begins with a dot, is not there."""
-    path = _inside(bench.folder, str(request.path_params["path"]))
-    if path is None:
-        return PlainTextResponse("There is no such file in this run.\n", 404)
-    headers = {"content-security-policy": REPORT_POLICY} if path.suffix == ".html" else {}
-    return FileResponse(path, headers=headers)
+    return send_file(bench.folder, str(request.path_params["path"]))
 
 
-def _inside(folder: Path, name: str) -> Path | None:
-    try:
-        path = (folder / name).resolve()
-        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
-    except (OSError, ValueError):  # a link that goes round, a zero byte; not below the folder
-        return None
-    return path if path.is_file() and not hidden else None
-
-
-def _answering(
-    bench: Workbench, answer: Callable[[Workbench, Request], Response]
-) -> Callable[[Request], Awaitable[Response]]:
-    """Answer in a thread, and turn errors of the user's into a sentence."""
-
-    async def endpoint(request: Request) -> Response:
-        if request.method == "POST":
-            if request.headers.get("content-type", "").split(";")[0] != "application/json":
-                return JSONResponse({"error": "changes are sent as application/json"}, 415)
-            try:
-                request.state.wish = json.loads(await request.body())
-            except (ValueError, RecursionError):
-                return JSONResponse({"error": "this is no JSON"}, 400)
-        try:
-            return await run_in_threadpool(_answer, bench, request, answer)
-        except FrfIpzError as error:
-            return JSONResponse({"error": str(error)}, 400)
-
-    return endpoint
-
-
-def _answer(bench: Workbench, request: Request, answer: Callable[[Workbench, Request], Response]) -> Response:
-    with errors_of_results(bench.folder):
-        return answer(bench, request)
-
-
-def _fixed(text: str, kind: str) -> Callable[[Request], Awaitable[Response]]:
+def _fixed(name: str, package: str, file: str, kind: str) -> Route:
+    content = read_asset(package, file).encode()
     async def endpoint(request: Request) -> Response:
         del request
-        return Response(text, media_type=kind, headers={"cache-control": "private, max-age=3600"})
+        return Response(content, media_type=kind, headers={"cache-control": "private, max-age=3600"})
 
-    return endpoint
+    return Route(f"/{name}", endpoint)

@@ -31,6 +31,7 @@ Section: TypeAlias = "Any"  # tomlkit's containers share no type that tells what
 SAME = 1e-5  # relative: frequencies closer than this are one and the same entry
 NEAR = 0.02  # relative: a pin and a rejection closer than this are about the same pole
 DIGITS = 6  # of a frequency that is written
+LONGEST_KIND = 40  # characters of one that is quoted in a message
 
 
 class Change(Protocol):
@@ -374,11 +375,11 @@ def to_change(wish: object, path: Path) -> Change:
     InputError
         If it is no change.
     """
-    if not isinstance(wish, dict) or wish.get("kind") not in KINDS:
-        kind = str(wish.get("kind")) if isinstance(wish, dict) else str(wish)
+    kind = str(wish.get("kind"))[:LONGEST_KIND] if isinstance(wish, dict) else "without a kind"
+    if not isinstance(wish, dict) or kind not in KINDS:
         raise InputError(f"there is no change '{kind}'; {did_you_mean(kind, KINDS)}")
     table = {str(key): value for key, value in wish.items() if key != "kind"}
-    return to_options(table, KINDS[wish["kind"]], path)
+    return to_options(table, KINDS[kind], path)
 
 
 def section_of(document: TOMLDocument, name: str) -> Section:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.runs.results import Results
+    from frf_ipz.show.own_code import OwnCode
 
 USES = {"checks": "as the checks say", "keep": "keep", "drop": "drop"}
 
@@ -40,6 +41,8 @@ class Choices:
         The pipeline file.
     is_first_run : bool
         Nothing has been run yet.
+    code : OwnCode, optional
+        Code that a run would execute and that nobody has allowed yet.
     """
 
     problem: str = ""
@@ -47,6 +50,7 @@ class Choices:
     command: str = ""
     text: str = ""
     is_first_run: bool = False
+    code: OwnCode | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,8 @@ class Guard:
     """Lets through what comes from this machine's own page.
 
     The name in the address must be that of the loopback, so that no other site can point its own name here (DNS
-    rebinding); a request that another site has made names that site as its origin; and every address begins with a
-    token that is drawn at each start.
+    rebinding); a request that another site, or a file shown in a sandbox, has made names another origin; and every
+    address begins with a token that is drawn at each start.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ class Guard:
         What answers.
     port : int
         Where the server listens.
-    token : str
-        First part of every path.
+    tokens : tuple of str
+        First part of every path: one of them.
     """
 
-    def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
+    def __init__(self, app: ASGIApp, *, port: int, tokens: tuple[str, ...]) -> None:
         self._app = app
-        self._token = token
+        self._tokens = [token.encode() for token in tokens]
         self._hosts = {f"{name}:{port}" for name in LOOPBACK} | (set(LOOPBACK) if port == 80 else set())
         self._origins = {f"http://{host}" for host in self._hosts}
 
@@ -79,8 +79,8 @@ class Guard:
             return PlainTextResponse("Another site has asked for this.\n", 403)
         if headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}:
             return PlainTextResponse("Another site has asked for this.\n", 403)
-        first = str(scope["path"]).split("/")[1:2]
-        if not secrets.compare_digest("".join(first).encode(), self._token.encode()):
+        first = "".join(str(scope["path"]).split("/")[1:2]).encode()
+        if not any(secrets.compare_digest(first, token) for token in self._tokens):
             return PlainTextResponse("Use the address that 'frf-ipz show' has printed: it holds a token.\n", 403)
         if not _is_short(headers.get("content-length", "0")) or "transfer-encoding" in headers:
             return PlainTextResponse("This is too long for a change.\n", 413)
@@ -88,4 +88,5 @@ class Guard:
 
 
 def _is_short(length: str) -> bool:
-    return length.isdecimal() and int(length) <= MOST_BYTES
+    is_number = length.isascii() and length.isdecimal() and len(length) <= len(str(MOST_BYTES))
+    return is_number and int(length) <= MOST_BYTES

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
@@ -32,15 +32,34 @@ if TYPE_CHECKING:
 SHOW = "frf_ipz.show"
 
 
-def render_page(bench: Workbench, *, home: str = "") -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Addresses:
+    """Where a page finds what stands beside it.
+
+    Parameters
+    ----------
+    home : str
+        The list of runs; empty where there is one run only.
+    assets : str
+        Folder of scripts and styles.
+    report : str
+        The report to send on.
+    """
+
+    home: str = ""
+    assets: str = "assets/"
+    report: str = "report.html"
+
+
+def render_page(bench: Workbench, addresses: Addresses) -> str:
     """Write the page.
 
     Parameters
     ----------
     bench : Workbench
         The run.
-    home : str
-        Address of the list of runs, where there are several.
+    addresses : Addresses
+        Where it finds the rest.
 
     Returns
     -------
@@ -64,7 +83,7 @@ def render_page(bench: Workbench, *, home: str = "") -> str:
     return template.render(
         **run_values(run, sections),
         stamp=stamp,
-        home=home,
+        addresses=addresses,
         folder=str(bench.folder),
         choices=_choices_of(bench),
     )
@@ -95,6 +114,7 @@ def _choices_of(bench: Workbench) -> Choices:
         command=command_line(bench.pipeline, bench.folder),
         text=bench.text(),
         is_first_run=not bench.stamp,
+        code=bench.code_to_allow(),
     )
 
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import uvicorn
 
 from frf_ipz.errors import InputError
-from frf_ipz.show.app import build_app
+from frf_ipz.show.app import TOKEN_BYTES, build_app
 from frf_ipz.show.campaign import find_runs
+from frf_ipz.show.open_run import OpenRun
+from frf_ipz.show.patience import PatientProtocol
 from frf_ipz.show.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.show.workbench import Run
 
 ADDRESS = "127.0.0.1"
-TOKEN_BYTES = 24
+MOST_CONNECTIONS = 512  # at once; half of the files that a process may have open on most systems
 
 
 def serve(
@@ -47,12 +49,21 @@ def serve(
     InputError
         If there is no run and no pipeline in the folder, or the port is taken.
     """
-    benches = [Workbench(paths, run, read) for paths in find_runs(folder)]
+    opened = OpenRun()
+    benches = [Workbench(paths, run, read, opened) for paths in find_runs(folder)]
     with listen(port) as listener:
         bound_port = int(listener.getsockname()[1])
         token = secrets.token_urlsafe(TOKEN_BYTES)
         app = build_app(benches, port=bound_port, token=token)
-        config = uvicorn.Config(app, log_level="warning", lifespan="off", ws="none", timeout_graceful_shutdown=2)
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            lifespan="off",
+            ws="none",
+            http=PatientProtocol,
+            limit_concurrency=MOST_CONNECTIONS,
+            timeout_graceful_shutdown=2,
+        )
         announce(f"http://{ADDRESS}:{bound_port}/{token}/")
         try:
             uvicorn.Server(config).run(sockets=[listener])

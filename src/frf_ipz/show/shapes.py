@@ -149,7 +149,10 @@ def operating_shape(run: Results, hertz: float, input_dof: str) -> Shape:
     )
     for name, model in models.items():
         dynamic = s**2 * model.mass + s * model.damping + model.stiffness
-        motion = model.expansion @ np.linalg.solve(dynamic, sign * model.row(labels[0].input_dof.unsigned))
+        try:
+            motion = model.expansion @ np.linalg.solve(dynamic, sign * model.row(labels[0].input_dof.unsigned))
+        except np.linalg.LinAlgError:
+            raise InputError(f"the {name} model has no damping and resonates at {hertz:g} Hz; take another") from None
         motions.insert(0, Motion(name=name, title=name, dofs=model.expanded_dofs, values=motion))
     return Shape(title=f"At {frfs.frequency_hz[line]:.5g} Hz for 1 N at {input_dof}", motions=tuple(motions))
 

@@ -9,8 +9,9 @@ from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.input_files import read_text
 from frf_ipz.runs.folder import read_manifest
 from frf_ipz.runs.generations import stamp
-from frf_ipz.runs.results import Results, open_results
 from frf_ipz.show.changes import to_change
+from frf_ipz.show.open_run import OpenRun
+from frf_ipz.show.own_code import OwnCode, find_code
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
 from frf_ipz.show.worker import Worker
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
+    from frf_ipz.runs.results import Results
     from frf_ipz.show.campaign import RunPaths
     from frf_ipz.show.worker import Status
 
@@ -63,9 +65,13 @@ class Workbench:
         Runs a pipeline.
     read : callable
         Reads a pipeline file and all that it names, as `pipeline.inputs.read_inputs` does.
+    opened : OpenRun, optional
+        Where results are kept in memory; shared by all runs of a campaign.
     """
 
-    def __init__(self, paths: RunPaths, run: Run, read: Callable[[Path], PipelineInputs]) -> None:
+    def __init__(
+        self, paths: RunPaths, run: Run, read: Callable[[Path], PipelineInputs], opened: OpenRun | None = None
+    ) -> None:
         self.folder = paths.folder.resolve()
         self.pipeline = paths.pipeline
         self.read = read
@@ -73,7 +79,8 @@ class Workbench:
         self._changing = Lock()
         self._before: str | None = None
         self._written: str | None = None
-        self._read: tuple[str, Results] | None = None
+        self._opened = opened or OpenRun()
+        self._allowed = ""
         self._worker = Worker(self._work)
 
     @property
@@ -92,7 +99,7 @@ class Workbench:
         return read_manifest(self.folder)
 
     def contents(self) -> Results:
-        """Read what the folder holds, once until it holds something else.
+        """Read what the folder holds, once while nobody looks at another run.
 
         Returns
         -------
@@ -104,10 +111,7 @@ class Workbench:
         InputError
             If there is no run yet, or a file is damaged.
         """
-        stamped = self.stamp
-        if self._read is None or self._read[0] != stamped:
-            self._read = stamped, open_results(self.folder).load()
-        return self._read[1]
+        return self._opened.results(self.folder, self.stamp)
 
     def text(self) -> str:
         """Read the pipeline file.
@@ -155,6 +159,7 @@ class Workbench:
             If it makes no sense: then nothing has changed.
         """
         with self._changing:
+            self._require_consent()
             text = self.text()
             changed = changed_text(text, to_change(wish, self.pipeline), self.pipeline)
             if changed != text:
@@ -165,8 +170,59 @@ class Workbench:
             self._worker.start()
 
     def run(self) -> None:
-        """Run the pipeline file as it stands."""
+        """Run the pipeline file as it stands.
+
+        Raises
+        ------
+        InputError
+            If it names code that nobody has allowed.
+        """
+        self._require_consent()
         self._worker.start()
+
+    def code_to_allow(self) -> OwnCode | None:
+        """Find code that a run would execute and that nobody has allowed yet.
+
+        Returns
+        -------
+        OwnCode or None
+            None where there is none.
+
+        Raises
+        ------
+        InputError
+            If the pipeline file, or a file that it names, cannot be read.
+        """
+        code = find_code(self.choices(), self.pipeline.parent)
+        return None if code is None or code.digest == self._allowed else code
+
+    def allow_code(self, wish: object) -> None:
+        """Allow the code that the pipeline file names, until the server ends or the code changes.
+
+        Parameters
+        ----------
+        wish : object
+            A table with the ``digest`` of what was shown.
+
+        Raises
+        ------
+        InputError
+            If the code is no longer what was shown.
+        """
+        code = self.code_to_allow()
+        if code is None:
+            return
+        if not isinstance(wish, dict) or wish.get("digest") != code.digest:
+            raise InputError("this code has changed since the page was loaded: load the page again")
+        self._allowed = code.digest
+
+    def _require_consent(self) -> None:
+        code = self.code_to_allow()
+        if code is not None:
+            raise InputError(
+                f"{self.pipeline}: [diagnose] extra_effects names code ({', '.join(code.names)}), and a run executes "
+                "it: allow it at 'Your choices', or run it from the command line"
+            )
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Wait for the run that is at work.
@@ -185,6 +241,7 @@ class Workbench:
     def _work(self, progress: Progress) -> None:
         with self._changing:
             requested = self._written
+        self._require_consent()
         try:
             self._run(self.pipeline, self.folder, progress=progress)
         except FrfIpzError as error:

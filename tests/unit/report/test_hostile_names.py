@@ -12,7 +12,7 @@ from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import run_values, write_report
 from frf_ipz.runs.results import Results
 from frf_ipz.show.controls import Choices, list_choices
-from frf_ipz.show.page import SHOW, page_sections
+from frf_ipz.show.page import SHOW, Addresses, page_sections
 from hostile_run import HOSTILE, hostile_folder
 
 SCRIPTS_OF_REPORT = 3  # the data, plotly, the page's own
@@ -64,7 +64,7 @@ def workbench():
         .render(
             **run_values(run, page_sections(run, file)),
             stamp=HOSTILE,
-            home=HOSTILE,
+            addresses=Addresses(home=HOSTILE, assets=HOSTILE, report=HOSTILE),
             folder=HOSTILE,
             choices=Choices(entries=list_choices(file), command=HOSTILE, text=HOSTILE),
         )

@@ -1,5 +1,7 @@
 """What the server answers, and whom it refuses."""
 
+import base64
+import hashlib
 import re
 
 import pytest
@@ -147,8 +149,14 @@ def test_changes_come_as_short_json_only(client, bench):
     assert bench.text() == text
 
 
+def files_of(client):
+    """Address of the folder's files, as the page has it."""
+    return HOME + re.search(r'href="([^"]+)report.html"', client.get(HOME).text)[1]
+
+
 def test_files_of_the_run_can_be_had_and_no_others(client, bench, demo):
-    assert client.get(HOME + "run/poles.parquet").content == (demo / "out" / "poles.parquet").read_bytes()
+    files = files_of(client)
+    assert client.get(f"{files}poles.parquet").content == (demo / "out" / "poles.parquet").read_bytes()
     (demo / "secret.txt").write_text("secret", encoding="utf-8")
     (demo / "out2").mkdir()
     (demo / "out2" / "secret.txt").write_text("secret", encoding="utf-8")
@@ -172,12 +180,59 @@ def test_files_of_the_run_can_be_had_and_no_others(client, bench, demo):
         "x%00y",
     ]
     for path in outside:
-        answer = client.get(f"{HOME}run/{path}")
+        answer = client.get(f"{files}{path}")
         assert (answer.status_code, "secret" in answer.text) == (404, False), path
 
 
+def test_what_lies_in_the_folder_has_no_origin_and_runs_the_scripts_of_reports_only(client, bench):
+    files = files_of(client)
+    assert TOKEN not in files.removeprefix(HOME)
+    for name in ("page.html", "picture.svg", "script.js", "page.xhtml", "page.htm", "README", "picture.png", "x.HTML"):
+        (bench.folder / name).write_text("<script>1</script>", encoding="utf-8")
+        headers = client.get(files + name).headers
+        policy = headers["content-security-policy"]
+        assert "sandbox allow-scripts allow-downloads allow-modals;" in policy
+        assert "allow-same-origin" not in policy
+        assert "'unsafe-inline'" not in policy.replace("style-src 'unsafe-inline'", "")
+        is_shown = name.lower().endswith((".html", ".svg", ".png"))
+        assert ("attachment" in headers.get("content-disposition", "")) != is_shown, name
+        assert is_shown or headers["content-type"] == "application/octet-stream"
+    report = (bench.folder / "report.html").read_text(encoding="utf-8")
+    digests = set(re.findall(r"sha256-([\w+/=]+)", policy))
+    scripts = re.findall(r"<script>(.*?)</script>", report, re.DOTALL)
+    assert digests == {base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts}
+
+
+def test_requests_of_a_sandboxed_page_are_refused_even_with_the_token(client, bench):
+    text = bench.text()
+    for headers in ({"origin": "null"}, {"sec-fetch-site": "cross-site"}):
+        assert client.post(HOME + "change", json=PIN, headers=headers).status_code == 403
+    assert client.post(files_of(client) + "change", json=PIN).status_code == 405
+    assert bench.text() == text
+
+
+def test_code_that_a_pipeline_names_is_run_only_after_it_was_allowed(client, bench, runs):
+    (bench.pipeline.parent / "own.py").write_text("raise SystemExit", encoding="utf-8")
+    with bench.pipeline.open("a", encoding="utf-8") as stream:
+        stream.write('\n[diagnose]\nextra_effects = ["own.py:Own"]\n')
+    text = bench.text()
+    for address, wish in (("run", {}), ("change", PIN)):
+        answer = client.post(HOME + address, json=wish)
+        assert answer.status_code == 400
+        assert "extra_effects names code (own.py:Own)" in answer.json()["error"]
+    assert (bench.text(), runs) == (text, [])
+    assert client.post(HOME + "allow", json={"digest": "0"}).status_code == 400
+    digest = re.search(r'data-allow="(\w+)"', client.get(HOME).text)[1]
+    assert "data-allow" not in client.post(HOME + "allow", json={"digest": digest}).json()["choices"]
+    assert client.post(HOME + "run", json={}).status_code == 200
+    bench.wait(SOON_S)
+    assert runs == [bench.pipeline]
+    (bench.pipeline.parent / "own.py").write_text("import os", encoding="utf-8")
+    assert client.post(HOME + "run", json={}).status_code == 400
+
+
 def test_every_answer_forbids_foreign_frames_scripts_and_copies(client):
-    for address in (HOME, HOME + "state", HOME + "run/report.html", "/elsewhere"):
+    for address in (HOME, HOME + "state", files_of(client) + "report.html", "/elsewhere"):
         headers = client.get(address).headers
         assert "default-src 'none'" in headers["content-security-policy"]
         assert headers["x-content-type-options"] == "nosniff"

@@ -336,9 +336,10 @@
   function click(event) {
     const button = event.target.closest("button");
     if (!button) return;
-    const { change: wish, run, drag, fill, mode } = button.dataset;
+    const { change: wish, run, drag, fill, mode, allow } = button.dataset;
     if (wish) change(JSON.parse(wish));
     else if (run) change({}, "run");
+    else if (allow) change({ digest: allow }, "allow");
     else if (drag) setDrag(drag);
     else if (fill) fillPole(fill);
     else if (mode !== undefined) {
