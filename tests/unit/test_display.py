@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from frf_ipz.assessment.assessment import Assessment, Check, Verdict
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import InputError
 from frf_ipz.export.frames import FRAMES
@@ -24,6 +25,7 @@ def run():
 @pytest.fixture(scope="module")
 def shown(run):
     results = [run.estimate, run.frfs, run.fit, run.pairs, run.updated_model, run.prediction, run.diagnosis]
+    results.append(Assessment.of_checks([Check(name="fit", verdict=Verdict.WITH_CARE)]))
     return {type(result): result for result in [*results, synthetic_folder().results["model"]]}
 
 

@@ -220,6 +220,7 @@ def _file(bench: Workbench, request: Request) -> Response:
 
 def _fixed(name: str, package: str, file: str, kind: str) -> Route:
     content = read_asset(package, file).encode()
+
     async def endpoint(request: Request) -> Response:
         del request
         return Response(content, media_type=kind, headers={"cache-control": "private, max-age=3600"})

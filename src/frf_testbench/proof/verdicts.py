@@ -21,10 +21,10 @@ import numpy as np
 import pandas as pd
 
 import frf_ipz
+from frf_testbench.mistakes.campaign_files import CampaignFiles
+from frf_testbench.mistakes.mistakes import MISTAKES, Mistake
 from frf_testbench.simulator.cases.case import make_case
 from frf_testbench.simulator.effects.catalogue import CATALOGUE, OUT_OF_CATALOGUE
-from frf_testbench.simulator.mistakes.campaign_files import CampaignFiles
-from frf_testbench.simulator.mistakes.mistakes import MISTAKES, Mistake
 
 ATTEMPTS = 60  # campaigns that are drawn until a mistake can be made with one
 SEEDS_APART = 10_000  # between the attempts at one campaign

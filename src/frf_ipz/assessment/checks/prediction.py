@@ -33,8 +33,8 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
     if not prediction.labels:
         return
     with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
-        widths = np.nanmedian(10 * np.log10(prediction.magnitude_high / prediction.magnitude_low), axis=0)
-    if not np.isfinite(widths).any():
+        ratios = prediction.magnitude_high / prediction.magnitude_low
+    if not np.isfinite(ratios).any():
         yield Check(
             name="band at the points of interest",
             verdict=Verdict.WITH_CARE,
@@ -42,7 +42,10 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
             advice='use [update] method = "minimal-change"',
         )
         return
-    worst = int(np.nanargmax(widths))
+    is_known = np.isfinite(ratios).any(axis=0)
+    widths = np.zeros(len(prediction.labels))
+    widths[is_known] = 10 * np.log10(np.nanmedian(ratios[:, is_known], axis=0))
+    worst = int(np.argmax(widths))
     width, where = float(widths[worst]), str(prediction.labels[worst])
     yield Check(
         name="band at the points of interest",

@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas as pd
 
-    from frf_testbench.simulator.mistakes.campaign_files import CampaignFiles
+    from frf_testbench.mistakes.campaign_files import CampaignFiles
 
 STANDARD_GRAVITY = 9.80665
 POUND_FORCE = 4.4482216152605

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from frf_testbench.simulator.mistakes.campaign_files import CampaignFiles
-from frf_testbench.simulator.mistakes.mistakes import MISTAKES
+from frf_testbench.mistakes.campaign_files import CampaignFiles
+from frf_testbench.mistakes.mistakes import MISTAKES
 
 TEST = """[test]
 kind = "hammer"
