@@ -14,6 +14,17 @@ from frf_ipz.cli import main as command
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals to another process")
 
 
+@pytest.fixture(autouse=True)
+def _signals_as_at_a_terminal():
+    """Whatever started the tests: jobs in the background ignore some signals, as does what `nohup` starts."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    handlers = {signal.SIGINT: signal.default_int_handler}
+    before = {number: signal.signal(number, handlers.get(number, signal.SIG_DFL)) for number in numbers}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def send(number):
     os.kill(os.getpid(), number)
     time.sleep(0.1)  # interrupted
