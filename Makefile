@@ -8,7 +8,7 @@ PARALLEL := -n auto --dist loadfile
 LOCK := $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	--custom-compile-command "make lock" pyproject.toml
 
-.PHONY: help demo test slow check docs bench proof lock clean
+.PHONY: help demo test slow check docs bench proof lock audit clean
 
 help:
 	@echo "make demo    run the cantilever in pipelines/ and show what came out (results/cantilever)"
@@ -19,6 +19,7 @@ help:
 	@echo "make bench   speed against peers and physical limits"
 	@echo "make proof   blind cases: made, diagnosed, then opened and scored"
 	@echo "make lock    newest versions within the ranges of pyproject.toml into requirements/"
+	@echo "make audit   known vulnerabilities of the locked packages, by pip-audit"
 	@echo "make clean   remove .venv, results and what the documentation is built into"
 
 .venv/run: pyproject.toml requirements/run.txt
@@ -66,6 +67,10 @@ lock: .venv/run
 	$(LOCK) --group build -o requirements/run.txt
 	$(LOCK) --group build --extra test -c requirements/run.txt -o requirements/test.txt
 	$(LOCK) --group build --extra docs -c requirements/test.txt -o requirements/docs.txt
+
+audit: .venv/run
+	$(PIP) "pip-audit>=2.7"
+	$(BIN)/python -m pip_audit --require-hashes --disable-pip -r requirements/docs.txt
 
 clean:
 	rm -rf .venv results docs/_build docs/auto_gallery docs/reference/api docs/reference/generated

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from contextlib import contextmanager
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from frf_ipz.arguments import require_file
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
+from frf_ipz.input_files import read_bytes
 from frf_ipz.output_files import replacing, write_text
 
 if TYPE_CHECKING:
@@ -119,12 +121,12 @@ def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
     """
     path = require_file(path)
     try:
-        values = json.loads(path.read_text(encoding="utf-8")) if _suffix(path) == ".json" else loadmat(path)
+        values = json.loads(read_bytes(path)) if _suffix(path) == ".json" else _read_matlab(path)
         names = _names_in(values)
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
         notes = tuple(str(_text_in(text)) for text in np.ravel(values.get("notes", ())))
-    except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
+    except (*UNREADABLE, KeyError, TypeError, ValueError, RecursionError) as error:
         raise FileFormatError(
             path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -250,7 +252,7 @@ def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
     """
     path = require_file(path)
     try:
-        values = loadmat(path)
+        values = _read_matlab(path)
         fields: dict[str, Any] = {**_names_in(values)}
         arrays = {
             name: np.moveaxis(np.array(values[name], float).reshape(*shape, -1), -1, 0)
@@ -261,7 +263,7 @@ def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
             StateSpaceModel(**fields, **dict(zip(ARRAYS, member, strict=True)))
             for member in zip(*(arrays[name] for name in ARRAYS), strict=True)
         )
-    except (*UNREADABLE, KeyError, TypeError, ValueError) as error:
+    except (*UNREADABLE, KeyError, TypeError, ValueError, RecursionError) as error:
         raise FileFormatError(
             path, f"is no ensemble written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -370,15 +372,21 @@ def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     """
     path = require_file(path)
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(read_bytes(path))
         names = tuple(str(name) for name in values.pop("output_names"))
         return UncertaintyWeights(
             output_names=names, **{name: np.array(value, float) for name, value in values.items()}
         )
-    except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise FileFormatError(
             path, f"holds no uncertainty weights written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
+
+
+def _read_matlab(path: Path) -> dict[str, Any]:
+    stream: Any = BytesIO(read_bytes(path))
+    content: dict[str, Any] = loadmat(stream)
+    return content
 
 
 def _names_for_matlab(model: StateSpaceModel) -> dict[str, np.ndarray]:
