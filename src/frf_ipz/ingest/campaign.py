@@ -21,6 +21,7 @@ from frf_ipz.dofs import Dof, as_dof, as_dofs
 from frf_ipz.errors import InputError, QuantityError, did_you_mean
 from frf_ipz.frf import SCALES, FrfLabel, FrfSet
 from frf_ipz.ingest.formats.frf_file import FrfSource
+from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.units import numerator_of
 from frf_ipz.quantities import RESPONSES, frf_quantity_of
 
@@ -224,6 +225,8 @@ class VibrationTest(Concise):
         Files with FRFs, of kind ``frf``.
     labels : tuple of FrfLabel
         The FRFs that the test gives, each once.
+    table : TableKeys
+        Where the time, the rate and the names stand in the recordings, as far as the test says so.
     signals : mapping of Path to (n_samples, 2 + n_outputs) array
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
@@ -258,6 +261,7 @@ class VibrationTest(Concise):
     setups: tuple[TestSetup, ...]
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
+    table: TableKeys = field(default_factory=TableKeys)
     signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
     frfs: FrfSet | None = field(default=None, repr=False)
 

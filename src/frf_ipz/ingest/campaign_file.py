@@ -13,9 +13,10 @@ from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_m
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
+from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
-from frf_ipz.option_types import Count, CountOrNone, NotNegative, Ratio
+from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Ratio
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
@@ -37,6 +38,13 @@ class TestKeys:
     unknown_scale : str
         Absolute scale that is not known: of no channel, of all together, or of each; such gains are fitted, not
         diagnosed.
+    time_column : str or int
+        Name of the column that is the time, or its number; the first column where it is left out, whatever it is
+        called, where it grows by equal steps. Times of day are read too.
+    sample_rate_hz : float, optional
+        Samples a second, for recordings without a column of time, or with too few digits in it.
+    header_row : int, optional
+        Line of the columns' names in the recordings, counted from 1; found where it is left out.
     """
 
     __pydantic_config__ = STRICT
@@ -45,6 +53,9 @@ class TestKeys:
     name: str = ""
     nominal_damping_ratio: Ratio | None = None
     unknown_scale: Literal["none", "common", "per_channel"] = "none"
+    time_column: str | int = ""
+    sample_rate_hz: Positive | None = None
+    header_row: Count | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +65,7 @@ class ChannelKeys:
     Parameters
     ----------
     column : str
-        Header of its column; in files without a header its number, the time being column 1.
+        Header of its column; or its number, counted from 1, in files without a header or with a name twice.
     role : str
         The input is the force; there is one.
     quantity : str
@@ -228,6 +239,11 @@ def read_test(path: str | Path) -> VibrationTest:
         kind=keys.test.kind,
         nominal_damping_ratio=keys.test.nominal_damping_ratio,
         unknown_scale=keys.test.unknown_scale,
+        table=TableKeys(
+            time_column=str(keys.test.time_column),
+            sample_rate_hz=keys.test.sample_rate_hz,
+            header_row=keys.test.header_row,
+        ),
         channels=channels,
         setups=setups,
         frf_sources=sources,
@@ -261,7 +277,11 @@ def _read_channels(path: Path, keys: CampaignFileKeys) -> tuple[Channel, ...]:
     channels = [_read_channel(path, entry) for entry in keys.channel]
     for column, count in Counter(channel.column for channel in channels).items():
         if count > 1:
-            raise FileFormatError(path, f"{count} channels have the column '{column}'; name each column once")
+            raise FileFormatError(
+                path,
+                f"{count} channels have the column '{column}'; name each column once; where "
+                "the file calls several so, write their numbers, as in column = 2",
+            )
     inputs = [channel for channel in channels if channel.role == "input"]
     if len(inputs) != 1:
         raise FileFormatError(path, f"needed is exactly one [[channel]] with role = 'input'; given are {len(inputs)}")

@@ -16,7 +16,7 @@ from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import FloatArray
@@ -114,14 +114,14 @@ class RecordingFiles:
 
     def _read(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         channels = self.test.channels
-        recording = open_recording(path, [channel.column for channel in channels])
+        recording = open_recording(path, [channel.column for channel in channels], self.test.table)
         dofs = (setup.input_dof, *setup.output_dofs)
         factors = [_time_factor(recording)]
         factors += [
             _channel_factor(path, channel, dof, file_unit)
             for channel, dof, file_unit in zip(channels, dofs, recording.units[1:], strict=True)
         ]
-        time_check = _UniformTimeCheck(path, recording.line_of_row)
+        time_check = _UniformTimeCheck(recording)
         for block in recording.blocks:
             block *= factors  # in place: the block is ours, and copies cost time
             time_check.add(block[:, 0])
@@ -132,9 +132,10 @@ class RecordingFiles:
 class _UniformTimeCheck:
     """Refuses a time that is not uniform, block by block, and a recording that is too short."""
 
-    def __init__(self, path: Path, line_of_row: Callable[[int], int]) -> None:
-        self._path = path
-        self._line_of_row = line_of_row
+    def __init__(self, recording: RawRecording) -> None:
+        self._path = recording.path
+        self._line_of_row = recording.line_of_row
+        self._column = recording.time_column
         self._n_rows = 0
         self._last = np.empty(0)
         self._median = 0.0
@@ -150,8 +151,9 @@ class _UniformTimeCheck:
             raise FileFormatError(
                 self._path,
                 f"the time is not uniform: a step is {steps[position]:.6g} s where the median is {self._median:.6g} s; "
-                "record with a constant rate, write the time with more digits, or resample",
-                where=f"line {self._line_of_row(row)}, column 'time'",
+                "record with a constant rate, write the time with more digits, or resample; where only the digits of "
+                "the time are too few, write sample_rate_hz = ... under [test]",
+                where=f"line {self._line_of_row(row)}, column '{self._column}'",
             )
         self._n_rows += len(time)
         self._last = time[-1:]
@@ -169,7 +171,7 @@ def _time_factor(recording: RawRecording) -> float:
     try:
         return unit_factor(unit, "time")
     except QuantityError as error:
-        raise QuantityError(f"{recording.path}, column 'time': {error}") from None
+        raise QuantityError(f"{recording.path}, column '{recording.time_column}': {error}") from None
 
 
 def _channel_factor(path: Path, channel: Channel, dof: Dof, file_unit: str) -> float:

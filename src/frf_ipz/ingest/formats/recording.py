@@ -10,6 +10,25 @@ from typing import Protocol, runtime_checkable
 from frf_ipz.arrays import FloatArray
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableKeys:
+    """What a test says about the tables of its recordings; what it does not say is found.
+
+    Parameters
+    ----------
+    time_column : str
+        Name of the column that is the time.
+    sample_rate_hz : float, optional
+        Samples a second, for files without a column of time, Hz.
+    header_row : int, optional
+        Line of the names of the columns, from 1.
+    """
+
+    time_column: str = ""
+    sample_rate_hz: float | None = None
+    header_row: int | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RawRecording:
     """A recording that is being read.
@@ -24,12 +43,15 @@ class RawRecording:
         The time and the columns, finite, in the file's units, block after block.
     line_of_row : callable
         Line of the file of a row, for messages.
+    time_column : str
+        Name of the column of the time, for messages.
     """
 
     path: Path
     units: tuple[str, ...]
     blocks: Iterator[FloatArray]
     line_of_row: Callable[[int], int]
+    time_column: str = "time"
 
 
 @runtime_checkable
@@ -60,7 +82,7 @@ class RecordingFormat(Protocol):
             True if it is.
         """
 
-    def open(self, path: Path, columns: Sequence[str]) -> RawRecording:
+    def open(self, path: Path, columns: Sequence[str], keys: TableKeys) -> RawRecording:
         """Open a file for reading.
 
         Parameters
@@ -69,6 +91,8 @@ class RecordingFormat(Protocol):
             The file.
         columns : sequence of str
             Columns besides the time.
+        keys : TableKeys
+            What the test says about the table.
 
         Returns
         -------

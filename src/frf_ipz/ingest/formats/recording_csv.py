@@ -1,11 +1,10 @@
 """Recordings as text: CSV with a header, or numbers alone whose columns are called 1, 2, 3 and so on.
 
-The first column is the time. A unit stands in brackets behind a column's name, or in a row of units under the header.
+A unit stands in brackets behind a column's name, or in a row of units under the header.
 """
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,18 +12,22 @@ import pyarrow as pa
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.recording import RawRecording
-from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
+from frf_ipz.ingest.formats.text_columns import find_columns, no_time, seconds_of_day, unwrap_days
+from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, not_a_number, read_blocks
+from frf_ipz.ingest.units import unit_factor
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.formats.recording import TableKeys
+    from frf_ipz.ingest.formats.text_columns import TextColumns
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 LARGEST = 1e100  # a larger value is no measurement, and its square may overflow
-TIME = re.compile(r"^t(ime)?\b", re.IGNORECASE)
+SAME_RATE = 0.01  # the contract's limit for a step that differs
 
 
 class _CsvRecordings:
@@ -36,79 +39,78 @@ class _CsvRecordings:
         del path, head
         return True
 
-    def open(self, path: Path, columns: Sequence[str]) -> RawRecording:
+    def open(self, path: Path, columns: Sequence[str], keys: TableKeys) -> RawRecording:
         layout = sniff(path)
-        names, units = _read_header(layout)
-        indices = [0, *(column_index(layout, names, column) for column in columns)]
+        found = find_columns(layout, keys, columns=columns)
+        if found.time is None and keys.sample_rate_hz is None:
+            raise no_time(layout, found)
+        indices = [column_index(layout, found.names, column) for column in columns]
+        time_unit = "" if found.time is None or keys.sample_rate_hz is not None else found.units[found.time]
+        blocks = _read_numbers(layout, found, indices)
+        if keys.sample_rate_hz is not None:
+            blocks = _by_rate(layout, found, blocks, keys.sample_rate_hz)
         return RawRecording(
             path=path,
-            units=tuple(units[index] for index in indices),
-            blocks=_read_numbers(layout, names, indices),
+            units=(time_unit, *(found.units[index] for index in indices)),
+            blocks=blocks,
             line_of_row=lambda row: line_of_row(layout, row),
+            time_column="time" if found.time is None else found.names[found.time],
         )
 
 
 FORMAT = _CsvRecordings()
 
 
-def _read_header(layout: TextLayout) -> tuple[list[str], list[str]]:
-    """Give the name and the unit of each column."""
-    if not layout.header:
-        return [str(index + 1) for index in range(layout.n_columns)], [""] * layout.n_columns
-    header_row = next((index for index, fields in enumerate(layout.header) if TIME.match(fields[0])), None)
-    if header_row is None:
-        columns = ", ".join(field for field in layout.header[-1] if field)
-        problem = f"has no column 'time'; the first column must be the time in s, and the header says {columns}"
-        raise FileFormatError(layout.path, problem, where=f"line {layout.n_before}")
-    names = _match_width(layout, layout.header[header_row])
-    units = [name_and_unit(name)[1] for name in names]
-    rows_below = layout.header[header_row + 1 :]
-    if rows_below:
-        units = [row_unit or unit for row_unit, unit in zip(_read_units_row(layout, rows_below), units, strict=True)]
-    return names, units
-
-
-def _read_units_row(layout: TextLayout, rows_below: tuple[tuple[str, ...], ...]) -> list[str]:
-    """Take the line under the header as a row of units, unless it is a line of numbers with a fault."""
-    if len(rows_below) > 1 or any(is_number(field) for field in rows_below[0]):
+def _by_rate(
+    layout: TextLayout, found: TextColumns, blocks: Iterator[FloatArray], sample_rate_hz: float
+) -> Iterator[FloatArray]:
+    """Put the time of the stated rate in the place of the file's, which may not contradict it."""
+    n_rows, first, last = 0, np.nan, np.nan
+    for block in blocks:
+        first = block[0, 0] if n_rows == 0 and len(block) else first
+        last = block[-1, 0] if len(block) else last
+        block[:, 0] = (n_rows + np.arange(len(block))) / sample_rate_hz
+        n_rows += len(block)
+        yield block
+    if found.time is None or n_rows < 2 or last <= first:
+        return
+    unit = found.units[found.time]
+    step_s = (last - first) / (n_rows - 1) * (unit_factor(unit, "time") if unit else 1.0)
+    if abs(step_s * sample_rate_hz - 1.0) > SAME_RATE:
         problem = (
-            f"holds '{rows_below[0][0]}' where a number is expected; under the header only one row of units may stand"
+            f"[test] sample_rate_hz = {sample_rate_hz:g}, but its column '{found.names[found.time]}' has a mean step "
+            f"of {step_s:.6g} s, which is {1.0 / step_s:.6g} Hz; correct sample_rate_hz, or leave it out"
         )
-        raise FileFormatError(
-            layout.path, problem, where=f"line {layout.n_before - len(rows_below) + 1}, column 'time'"
-        )
-    return [field.strip("[]() ") for field in _match_width(layout, rows_below[0])]
+        raise FileFormatError(layout.path, problem)
 
 
-def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str]:
-    """Make a line of the header as wide as the numbers where a delimiter at the end is all that differs."""
-    row = list(fields)
-    while len(row) > layout.n_columns and not row[-1]:
-        row.pop()
-    if len(row) == layout.n_columns - 1:
-        row.append("")
-    if len(row) != layout.n_columns:
-        problem = f"has {layout.n_columns} values where the header has {len(fields)} columns"
-        hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
-        raise FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")
-    return row
-
-
-def _read_numbers(layout: TextLayout, names: list[str], indices: list[int]) -> Iterator[FloatArray]:
+def _read_numbers(layout: TextLayout, found: TextColumns, columns: list[int]) -> Iterator[FloatArray]:
     """Give blocks of rows; rows that are empty to the last field may only stand at the end."""
-    types = dict.fromkeys(dict.fromkeys(indices), pa.float64())
+    indices = columns if found.time is None else [found.time, *columns]
+    types = {index: pa.string() if found.holds_stamps and index == found.time else pa.float64() for index in indices}
     order = [list(types).index(index) for index in indices]
-    n_rows, first_empty = 0, -1
-    for batch in read_blocks(layout, names, types):
-        block = np.column_stack([batch.column(position).to_numpy(zero_copy_only=False) for position in order])
-        is_finite = np.abs(block) < LARGEST
-        is_empty = ~is_finite.any(axis=1) & np.isnan(block).all(axis=1)
+    n_rows, first_empty, last_s = 0, -1, np.nan
+    for batch in read_blocks(layout, found.names, types):
+        arrays = [_to_numbers(batch.column(position)) for position in order]
+        block = np.column_stack([np.zeros(len(batch)), *arrays] if found.time is None else arrays)
+        is_finite = np.asarray(np.abs(block) < LARGEST)
+        is_empty = np.isnan(block[:, -len(indices) :]).all(axis=1)
         if first_empty < 0 and is_empty.any():
             first_empty = n_rows + int(np.argmax(is_empty))
         is_bad = ~is_finite.all(axis=1) & ~is_empty
         if is_bad.any():
-            raise not_a_number(layout, names, indices, n_rows + int(np.argmax(is_bad)))
+            raise not_a_number(layout, found.names, indices, n_rows + int(np.argmax(is_bad)))
         if first_empty >= 0 and not is_empty[max(first_empty - n_rows, 0) :].all():
-            raise not_a_number(layout, names, indices, first_empty)
+            raise not_a_number(layout, found.names, indices, first_empty)
         n_rows += len(block)
-        yield block[~is_empty]
+        block = block[~is_empty]
+        if found.holds_stamps and len(block):
+            block[:, 0] = unwrap_days(block[:, 0], last_s)
+            last_s = block[-1, 0]
+        yield block
+
+
+def _to_numbers(column: pa.Array) -> FloatArray:
+    if pa.types.is_string(column.type):
+        return seconds_of_day(column.to_pylist())
+    return np.asarray(column.to_numpy(zero_copy_only=False))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.frf_file import FrfFormat
-from frf_ipz.ingest.formats.recording import RecordingFormat
+from frf_ipz.ingest.formats.recording import RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.recording import RawRecording
 
 
-def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
+def open_recording(path: Path, columns: Sequence[str], keys: TableKeys | None = None) -> RawRecording:
     """Open a recording of any format.
 
     Parameters
@@ -30,6 +30,8 @@ def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
         The file.
     columns : sequence of str
         Columns besides the time.
+    keys : TableKeys, optional
+        What the test says about the table.
 
     Returns
     -------
@@ -44,7 +46,7 @@ def open_recording(path: Path, columns: Sequence[str]) -> RawRecording:
     head = read_head(path)
     for candidate in _formats(RecordingFormat):
         if candidate.fits(path, head):
-            recording: RawRecording = candidate.open(path, columns)
+            recording: RawRecording = candidate.open(path, columns, keys or TableKeys())
             return recording
     raise FileFormatError(path, "is of no known format for recordings; export it as CSV")
 

@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
+import io
 import re
+from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, BinaryIO
 
+from frf_ipz import text_numbers
 from frf_ipz.errors import FileFormatError
-from frf_ipz.input_files import open_input
+from frf_ipz.input_files import open_input, read_bytes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 HEAD = 1 << 16  # bytes from which the layout is found
+LONGEST_HEAD = 1 << 22  # bytes that may stand before the numbers
 BOM = b"\xef\xbb\xbf"
 EMPTY = "is empty; measure or export it again"
 DELIMITERS = (";", "\t", ",", " ")  # in the order they are tried; the blank stands for any run of blanks
-NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
-NEWLINE = re.compile(r"\r\n|\n|\r")  # str.splitlines breaks at more
+NEWLINE = re.compile(rb"\r\n|\n|\r")
 TWO_NUMBERS = re.compile(r"\d\s+[+-]?[\d.]")
-DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eE][+-]?\d+)?$")
+DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eEdD][+-]?\d+)?$")
 NAME_AND_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]$")
-MAX_HEADER = 200  # lines
-SAMPLE = MAX_HEADER + 50  # lines from which the delimiter is found
+CLOCK = r"(?:(?P<hours>\d{1,2}):)?(?P<minutes>\d{1,2}):(?P<seconds>\d{1,2})(?:[.,:](?P<fraction>\d+))?"
+DATE = r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}"
+STAMP = re.compile(rf"(?:{DATE}[T ,]\s*)?{CLOCK}\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?:Z|UTC|[+-]\d\d:?\d\d)?")
+ONLY_DATE = re.compile(DATE)
+COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
+SAMPLE = 250  # lines from which the delimiter is found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,11 +52,15 @@ class TextLayout:
     n_before : int
         Lines before the first line of numbers.
     header : tuple of tuples of str
-        Fields of the lines of text before the numbers.
+        Fields of the lines of text before the numbers, without signs of comments; empty lines are left out.
+    header_lines : tuple of int
+        The lines of the file that they stand in, from 1.
+    rows : tuple of tuples of str
+        Fields of the first lines of numbers.
     n_columns : int
         Fields of the first line of numbers.
-    starts_with_bom : bool
-        UTF-8 byte order mark.
+    start, stop : int
+        Bytes at which the numbers begin and end; text behind them is no part of the table.
     """
 
     path: Path
@@ -53,8 +68,11 @@ class TextLayout:
     decimal: str
     n_before: int
     header: tuple[tuple[str, ...], ...]
+    header_lines: tuple[int, ...]
+    rows: tuple[tuple[str, ...], ...]
     n_columns: int
-    starts_with_bom: bool
+    start: int
+    stop: int
 
     def split(self, line: str) -> list[str]:
         """Split a line into its fields.
@@ -92,29 +110,73 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
     FileFormatError
         If the file is missing, empty, no text, or holds no line of numbers.
     """
-    head = read_head(path)
-    _check_text(path, head)
-    whole_lines = head[: head.rfind(b"\n") + 1] if len(head) == HEAD else head
-    lines = NEWLINE.split(decode(whole_lines.removeprefix(BOM)))
-    rows = [(index, line) for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
-    delimiter = _find_delimiter([line for _, line in rows[:SAMPLE]])
-    first = next((index for index, line in rows if is_number(split_line(line, delimiter)[0])), None)
-    if first is None or first > MAX_HEADER + skip_rows:
-        raise FileFormatError(path, "holds no line that begins with a number; expected is a table of numbers")
-    header = tuple(tuple(split_line(line, delimiter)) for index, line in rows if index < first)
-    fields = split_line(lines[first], delimiter)
-    has_commas = delimiter != "," and any(
-        DECIMAL_COMMA.match(field) for _, line in rows[:50] for field in split_line(line, delimiter)
-    )
+    with open_text(path) as stream:
+        for size in (HEAD, LONGEST_HEAD):
+            stream.seek(0)
+            head = stream.read(size)
+            _check_text(path, head)
+            if len(head) == size:
+                head = head[: max(head.rfind(b"\n"), head.rfind(b"\r")) + 1]
+            offsets, lines = _split_lines(head)
+            kept = [index for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
+            delimiter = _find_delimiter([lines[index] for index in kept[:SAMPLE] + kept[SAMPLE:][-SAMPLE:]])
+            split = {index: split_line(lines[index], delimiter) for index in kept}
+            first = _first_row(kept, split)
+            if first is not None:
+                break
+        else:
+            raise FileFormatError(path, "holds no line that begins with a number; expected is a table of numbers")
+        stop = _find_stop(stream, offsets[first], delimiter, len(split[first]))
+    header = [index for index in kept if index < first]
+    rows = [split[index] for index in kept if index >= first and offsets[index] < stop]
+    has_commas = delimiter != "," and any(DECIMAL_COMMA.match(field) for fields in rows for field in fields)
     return TextLayout(
         path=path,
         delimiter=delimiter,
         decimal="," if has_commas else ".",
         n_before=first,
-        header=header,
-        n_columns=len(fields),
-        starts_with_bom=head.startswith(BOM),
+        header=tuple(tuple(split_line(COMMENT.sub("", lines[index]), delimiter)) for index in header),
+        header_lines=tuple(index + 1 for index in header),
+        rows=tuple(map(tuple, rows[:SAMPLE])),
+        n_columns=len(split[first]),
+        start=offsets[first],
+        stop=stop,
     )
+
+
+@contextmanager
+def open_text(path: Path) -> Iterator[BinaryIO]:
+    """Open a text file as bytes in UTF-8 or Latin-1: from its first letter, and UTF-16 brought to UTF-8.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Yields
+    ------
+    BinaryIO
+        Can be moved in.
+    """
+    with open_input(path) as stream:
+        mark = stream.read(4)
+        encoding = _wide_encoding(mark)
+        if not encoding:
+            stream.seek(0)
+            yield stream
+            return
+    try:
+        text = read_bytes(path).decode(encoding).removeprefix("\ufeff")
+    except UnicodeDecodeError:
+        raise FileFormatError(path, "begins as text in UTF-16 but is none; export it as CSV") from None
+    yield io.BytesIO(text.encode())
+
+
+def _wide_encoding(mark: bytes) -> str:
+    if mark.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16-le" if mark.startswith(codecs.BOM_UTF16_LE) else "utf-16-be"
+    zeros = "".join("0" if byte == 0 else "x" for byte in mark)  # of letters of ASCII
+    return {"x0x0": "utf-16-le", "0x0x": "utf-16-be"}.get(zeros, "")
 
 
 def read_head(path: Path) -> bytes:
@@ -161,6 +223,22 @@ def decode(data: bytes) -> str:
         return data.decode("latin-1")
 
 
+def is_stamp(field: str) -> bool:
+    """Tell whether a field is a time of day, with a date or without.
+
+    Parameters
+    ----------
+    field : str
+        Text without blanks around it.
+
+    Returns
+    -------
+    bool
+        True for ``27/03/2025 10:51:13,497``, ``2025-03-27T10:51:13.497Z``, ``10:51:13`` and the like.
+    """
+    return STAMP.fullmatch(field) is not None
+
+
 def is_number(field: str) -> bool:
     """Tell whether a field is a number, with a decimal point or comma.
 
@@ -174,7 +252,7 @@ def is_number(field: str) -> bool:
     bool
         True for a number.
     """
-    return NUMBER.match(field) is not None
+    return text_numbers.is_number(field) or text_numbers.is_number(field, decimal=",")
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -224,15 +302,78 @@ def _check_text(path: Path, head: bytes) -> None:
     if not head.strip(b" \t\r\n" + BOM):
         raise FileFormatError(path, EMPTY)
     if b"\0" in head:
-        raise FileFormatError(path, "is no text in UTF-8 or Latin-1 (it holds zero bytes); export it as CSV")
+        raise FileFormatError(path, "is no text in UTF-8, UTF-16 or Latin-1 (it holds zero bytes); export it as CSV")
 
 
-def _find_delimiter(lines: list[str]) -> str:
+def _split_lines(data: bytes) -> tuple[list[int], list[str]]:
+    """Give the byte that each line begins at, and its text."""
+    begins = len(BOM) if data.startswith(BOM) else 0
+    offsets, lines = [], []
+    for match in NEWLINE.finditer(data, begins):
+        offsets.append(begins)
+        lines.append(decode(data[begins : match.start()]))
+        begins = match.end()
+    if begins < len(data):
+        offsets.append(begins)
+        lines.append(decode(data[begins:]))
+    return offsets, lines
+
+
+def _begins_row(field: str) -> bool:
+    return is_number(field) or is_stamp(field) or ONLY_DATE.fullmatch(field) is not None
+
+
+def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
+    """Find the first line of numbers: the next one begins with a number and has as many fields."""
+    begins = [index for index in kept if _begins_row(split[index][0])]
+    widths = Counter(len(split[index]) for index in begins)
+    usual = max(widths, key=lambda width: widths[width], default=0)
+    following = dict(pairwise(kept))
+    for index in begins:
+        below = split.get(following.get(index, -1))
+        if len(split[index]) == usual and (below is None or any(map(_begins_row, below))):
+            return index
+    return next((index for index in begins if len(split[index]) == usual), None)
+
+
+def _find_stop(stream: BinaryIO, start: int, delimiter: str, n_columns: int) -> int:
+    """Find where the numbers end: behind the last line that is none of text alone."""
+    size = stream.seek(0, io.SEEK_END)
+    length = HEAD
+    while True:
+        offset = max(start, size - length)
+        stream.seek(offset)
+        tail = stream.read()
+        offsets, lines = _split_lines(tail)
+        whole = range(0 if offset == start else 1, len(lines))
+        for index in reversed(whole):
+            if lines[index].strip() and not _is_footer(split_line(lines[index], delimiter), n_columns):
+                return size if index == len(lines) - 1 else offset + offsets[index + 1]
+        if offset == start:
+            return size
+        length *= 4
+
+
+def _is_footer(fields: Sequence[str], n_columns: int) -> bool:
+    """Tell a line of text below the table from a line of numbers that has a fault."""
+    first = fields[0]
+    if _begins_row(first) or text_numbers.is_not_finite(first):
+        return False
+    if len(fields) == n_columns and any(map(is_number, fields[1:])):
+        return not any(letter.isdigit() for letter in first)
+    return True
+
+
+def _find_delimiter(lines: Sequence[str]) -> str:
     """Take the first delimiter that splits most lines of numbers sensibly."""
     for delimiter in DELIMITERS:
         split = [split_line(line, delimiter) for line in lines]
-        numeric = [fields for fields in split if is_number(fields[0])]
-        sensible = [fields for fields in numeric if len(fields) > 1 and not any(map(TWO_NUMBERS.search, fields))]
+        numeric = [fields for fields in split if _begins_row(fields[0])]
+        sensible = [fields for fields in numeric if len(fields) > 1 and not any(map(_is_crowded, fields))]
         if len(sensible) > len(lines) // 2 or (sensible and len(sensible) == len(numeric)):
             return delimiter
     return ","
+
+
+def _is_crowded(field: str) -> bool:
+    return TWO_NUMBERS.search(field) is not None and not is_stamp(field)

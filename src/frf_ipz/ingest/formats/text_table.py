@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, BinaryIO
 
 import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.ingest.formats.text_layout import BOM, decode, is_number, name_and_unit
-from frf_ipz.input_files import open_input
+from frf_ipz.ingest.formats.text_layout import NEWLINE, decode, is_number, name_and_unit, open_text
+from frf_ipz.text_numbers import NumberError, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 BLOCK_BYTES = 1 << 22
+LINES_AT_ONCE = 10_000
 
 
 def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
@@ -45,12 +47,18 @@ def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
     bare_names = [name_and_unit(name)[0] for name in names]
     indices = [index for index, name in enumerate(names) if name == column]
     indices = indices or [index for index, name in enumerate(bare_names) if name == column]
+    if not indices and column.isascii() and column.isdigit() and 1 <= int(column[:9]) <= len(names):
+        indices = [int(column) - 1]
     if not indices:
         known = [name for name in names if name]
         where = f"line {max(layout.n_before, 1)}"
         raise FileFormatError(layout.path, f"has no column '{column}'; {did_you_mean(column, known)}", where=where)
     if len(indices) > 1:
-        raise FileFormatError(layout.path, f"has {len(indices)} columns '{column}'; give each its own name")
+        raise FileFormatError(
+            layout.path,
+            f"has {len(indices)} columns '{column}'; give each its own name, or write the column's number, as in "
+            f"column = {indices[0] + 1}",
+        )
     return indices[0]
 
 
@@ -77,13 +85,12 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
         If a line has too many or too few fields, or text where a number is expected.
     """
     keys = [f"{index}" for index in range(len(names))]
+    n_rows = 0
     try:
-        with open_input(layout.path) as stream:
+        with open_text(layout.path) as stream:
             reader = arrow_csv.open_csv(
-                _prepare_stream(stream, layout),
-                read_options=arrow_csv.ReadOptions(
-                    column_names=keys, skip_rows=layout.n_before, block_size=BLOCK_BYTES, use_threads=False
-                ),
+                _rows_only(stream, layout),
+                read_options=arrow_csv.ReadOptions(column_names=keys, block_size=BLOCK_BYTES, use_threads=False),
                 parse_options=arrow_csv.ParseOptions(delimiter=_arrow_delimiter(layout)),
                 convert_options=arrow_csv.ConvertOptions(
                     column_types={keys[index]: kind for index, kind in types.items()},
@@ -92,10 +99,34 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
                     strings_can_be_null=False,
                 ),
             )
-            yield from reader
-    except pa.ArrowInvalid as error:
-        numeric = [index for index, kind in types.items() if pa.types.is_floating(kind)]
-        raise _explain_error(layout, names, numeric, str(error)) from None
+            for batch in reader:
+                yield batch
+                n_rows += len(batch)
+    except pa.ArrowInvalid:
+        yield from _read_line_by_line(layout, names, types, n_rows)
+
+
+def _read_line_by_line(
+    layout: TextLayout, names: Sequence[str], types: dict[int, pa.DataType], skip: int
+) -> Iterator[pa.RecordBatch]:
+    """Read numbers that pyarrow does not know, as those with D exponents, or say which line is wrong."""
+    lines = list(_numbered_rows(layout))
+    columns: dict[int, list[float | str]] = {index: [] for index in types}
+    for number, line in lines[skip:]:
+        fields = layout.split(line)
+        if len(fields) != len(names):
+            raise _bad_length(layout, number, len(fields), len(names), is_last=number == lines[-1][0])
+        for index, kind in types.items():
+            text = fields[index]
+            if not pa.types.is_floating(kind):
+                columns[index].append(text)
+                continue
+            try:
+                columns[index].append(parse_number(text, decimal=layout.decimal, finite=False))
+            except NumberError as error:
+                raise _bad_field(layout.path, number, names[index], str(error)) from None
+    arrays = [pa.array(columns[index], type=kind, from_pandas=True) for index, kind in types.items()]
+    yield pa.RecordBatch.from_arrays(arrays, names=[f"{index}" for index in types])
 
 
 def line_of_row(layout: TextLayout, row: int) -> int:
@@ -143,23 +174,12 @@ def not_a_number(layout: TextLayout, names: Sequence[str], numeric: Sequence[int
     for index in numeric:
         field = fields[index] if index < len(fields) else ""
         if not is_number(field):
-            return _bad_field(layout.path, line, names[index], field)
+            content = f"'{field}'" if field else "nothing"
+            problem = f"holds {content} where a number is expected; correct the file"
+            return _bad_field(layout.path, line, names[index], problem)
     return FileFormatError(
         layout.path, "holds a value that is infinite or absurdly large; correct the file", where=f"line {line}"
     )
-
-
-def _explain_error(layout: TextLayout, names: Sequence[str], numeric: Sequence[int], reason: str) -> FileFormatError:
-    """Find the first line that cannot be read, and say what is wrong with it."""
-    lines = list(_numbered_rows(layout))
-    for number, line in lines:
-        fields = layout.split(line)
-        if len(fields) != len(names):
-            return _bad_length(layout, number, len(fields), len(names), is_last=number == lines[-1][0])
-        for index in numeric:
-            if fields[index] and not is_number(fields[index]) and not _is_special(fields[index]):
-                return _bad_field(layout.path, number, names[index], fields[index])
-    return FileFormatError(layout.path, f"cannot be read as a table of numbers: {reason.splitlines()[0]}")
 
 
 def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, is_last: bool) -> FileFormatError:
@@ -176,49 +196,75 @@ def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, 
     )
 
 
-def _bad_field(path: Path, line: int, name: str, field: str) -> FileFormatError:
-    content = f"'{field}'" if field else "nothing"
-    problem = f"holds {content} where a number is expected; correct the file, or leave it out by [ingest] drop"
-    return FileFormatError(path, problem, where=f"line {line}, column '{name}'")
-
-
-def _is_special(field: str) -> bool:
-    return field.lower().lstrip("+-") in {"nan", "inf", "infinity", "null", "n/a", "#n/a"}
+def _bad_field(path: Path, line: int, name: str, problem: str) -> FileFormatError:
+    return FileFormatError(
+        path, f"{problem}, or leave the file out by [ingest] drop", where=f"line {line}, column '{name}'"
+    )
 
 
 def _numbered_rows(layout: TextLayout) -> Iterator[tuple[int, str]]:
     """Give the lines of numbers with their line numbers."""
-    number = 0
-    with open_input(layout.path) as stream:
-        for lines in stream:
-            for line in lines.rstrip(b"\r\n").split(b"\r"):
-                number += 1
-                if number > layout.n_before and line.strip():
-                    yield number, decode(line)
+    number = layout.n_before
+    with open_text(layout.path) as stream:
+        for data in _Part(stream, layout).lines():
+            number += 1
+            if data.strip():
+                yield number, decode(data)
 
 
 def _arrow_delimiter(layout: TextLayout) -> str:
     return "\t" if layout.delimiter == " " else layout.delimiter
 
 
-def _prepare_stream(stream: BinaryIO, layout: TextLayout) -> BinaryIO | _BlankSeparated:
-    if layout.starts_with_bom:
-        stream.seek(len(BOM))
-    return _BlankSeparated(stream) if layout.delimiter == " " else stream
+def _rows_only(stream: BinaryIO, layout: TextLayout) -> _Part | _BlankSeparated:
+    part = _Part(stream, layout)
+    return _BlankSeparated(part) if layout.delimiter == " " else part
 
 
-class _BlankSeparated:
-    """A file whose runs of blanks are single tabs, for a reader that knows only single delimiters."""
+class _Part:
+    """The part of a file that holds the numbers."""
 
     closed = False
 
-    def __init__(self, stream: BinaryIO) -> None:
+    def __init__(self, stream: BinaryIO, layout: TextLayout) -> None:
         self._stream = stream
+        self._left = layout.stop - layout.start
+        stream.seek(layout.start)
+
+    def read(self, size: int = -1) -> bytes:
+        data = self._stream.read(self._left if size < 0 else min(size, self._left))
+        self._left -= len(data)
+        return data
+
+    def lines(self) -> Iterator[bytes]:
+        rest = b""
+        while data := self.read(BLOCK_BYTES):
+            if data.endswith(b"\r"):  # its LF may follow
+                data += self.read(1)
+            *lines, rest = NEWLINE.split(rest + data)
+            yield from lines
+        if rest:
+            yield rest
+
+    def readable(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class _BlankSeparated:
+    """Rows whose runs of blanks are single tabs, for a reader that knows only single delimiters."""
+
+    closed = False
+
+    def __init__(self, part: _Part) -> None:
+        self._lines = part.lines()
         self._buffer = b""
 
     def read(self, size: int = -1) -> bytes:
         while size < 0 or len(self._buffer) < size:
-            lines = self._stream.readlines(BLOCK_BYTES)
+            lines = list(islice(self._lines, LINES_AT_ONCE))
             if not lines:
                 break
             self._buffer += b"".join(b"\t".join(line.split()) + b"\n" for line in lines)

@@ -1,0 +1,303 @@
+"""What the columns of a recording in a text file are: their names and units, and which one is the time.
+
+The one answer to this for `init`, `check` and `run`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.text_layout import STAMP, is_number, is_stamp, name_and_unit
+from frf_ipz.ingest.formats.text_table import column_index
+from frf_ipz.ingest.units import is_unit
+from frf_ipz.text_numbers import NumberError, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.ingest.formats.recording import TableKeys
+    from frf_ipz.ingest.formats.text_layout import TextLayout
+
+EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
+FEWEST_ROWS = 3  # two steps can be compared
+DAY_S = 86400.0
+TIME = re.compile(
+    r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
+    r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?)(?![a-z])",
+    re.IGNORECASE,
+)
+TIME_UNIT = re.compile(
+    r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|milliseconds?|us|µs|microseconds?|ns|min)$", re.IGNORECASE
+)
+FREQUENCY = re.compile(r"freq|frequenz|\bhz\b", re.IGNORECASE)
+REMARK = re.compile(r"comments?|kommentare?|remarks?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextColumns:
+    """The columns of a recording.
+
+    Parameters
+    ----------
+    names, units : tuple of str
+        Of each column; a unit is empty where the file states none.
+    time : int, optional
+        Which one is the time; None where there is none, and the rate has to be stated.
+    counts_samples : bool
+        The first column counts the samples.
+    holds_stamps : bool
+        The time is a time of day.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    time: int | None
+    counts_samples: bool
+    holds_stamps: bool
+
+
+def find_columns(layout: TextLayout, keys: TableKeys, *, columns: Sequence[str] = ()) -> TextColumns:
+    """Find out what the columns of a recording are.
+
+    Parameters
+    ----------
+    layout : TextLayout
+        How the file is laid out.
+    keys : TableKeys
+        What the test says about it.
+    columns : sequence of str
+        Names that are looked for; they tell the header from other lines of text.
+
+    Returns
+    -------
+    TextColumns
+        Their names, units, and the time.
+
+    Raises
+    ------
+    FileFormatError
+        If the header does not fit the numbers, or the column of the time is not there.
+    """
+    names, units = _read_header(layout, keys.header_row, columns)
+    taken = {index for index, name in enumerate(names) if name in columns or name_and_unit(name)[0] in columns}
+    counts_samples = _counts_samples(layout, names, units, 0) and 0 not in taken
+    if keys.time_column:
+        time: int | None = column_index(layout, names, keys.time_column)
+    else:
+        time = _find_time(layout, names, units, taken, counts_samples=counts_samples)
+    holds_stamps = time is not None and is_stamp(layout.rows[0][time])
+    if time is not None:
+        units[time] = "s" if holds_stamps else units[time] or _unit_of_time(names[time])
+    return TextColumns(
+        names=tuple(names), units=tuple(units), time=time, counts_samples=counts_samples, holds_stamps=holds_stamps
+    )
+
+
+def no_time(layout: TextLayout, found: TextColumns) -> FileFormatError:
+    """Make the error for a file without a column of time.
+
+    Parameters
+    ----------
+    layout : TextLayout
+        How the file is laid out.
+    found : TextColumns
+        Its columns.
+
+    Returns
+    -------
+    FileFormatError
+        Says what to write.
+    """
+    names = ", ".join(f"'{name}'" for name in found.names if name)
+    first = f"the first column '{found.names[0]}'" if found.names[0] else "the first column"
+    behaves = "counts the samples" if found.counts_samples else "does not grow by equal steps"
+    problem = (
+        f"has no column 'time', and {first} {behaves}; write sample_rate_hz = ... under [test], or time_column = ... "
+        f"where another one is the time: {names}"
+    )
+    return FileFormatError(layout.path, problem, where=f"line {max(layout.n_before, 1)}")
+
+
+def seconds_of_day(stamps: Sequence[str]) -> FloatArray:
+    """Read times of day.
+
+    Parameters
+    ----------
+    stamps : sequence of str
+        Such as ``27/03/2025 10:51:13,497``; the date is not looked at.
+
+    Returns
+    -------
+    (n_stamps,) array
+        Seconds since midnight; NaN where a text is no time.
+
+    Examples
+    --------
+    >>> seconds_of_day(["27/03/2025 10:51:13,500", "00:00:01", "yesterday"]).tolist()
+    [39073.5, 1.0, nan]
+    """
+    values = np.full(len(stamps), np.nan)
+    for position, stamp in enumerate(stamps):
+        match = STAMP.fullmatch(stamp.strip())
+        if match is None:
+            continue
+        hours = int(match["hours"] or 0)
+        if match["half"]:
+            hours = hours % 12 + 12 * (match["half"][0] in "pP")
+        seconds = float(f"{match['seconds']}.{match['fraction'] or 0}")
+        values[position] = 3600 * hours + 60 * int(match["minutes"]) + seconds
+    return values
+
+
+def unwrap_days(seconds: FloatArray, last: float) -> FloatArray:
+    """Let times of day grow on over midnight.
+
+    Parameters
+    ----------
+    seconds : (n,) array
+        Since midnight.
+    last : float
+        The time before the first of them, s; NaN where there is none.
+
+    Returns
+    -------
+    (n,) array
+        Since the first midnight.
+    """
+    steps = np.diff(seconds, prepend=seconds[0] if np.isnan(last) else last)
+    first = seconds[0] if np.isnan(last) else last
+    return np.asarray(first + np.cumsum(steps - DAY_S * np.rint(steps / DAY_S)))
+
+
+def _read_header(layout: TextLayout, header_row: int | None, columns: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Give the name and the unit of each column."""
+    rows = [_match_width(layout, fields) for fields in layout.header]
+    position = _header_position(layout, rows, header_row, columns)
+    if position is None:
+        return [str(index + 1) for index in range(layout.n_columns)], [""] * layout.n_columns
+    names = rows[position] or []
+    below = layout.header[position + 1 :]
+    units = [name_and_unit(name)[1] for name in names]
+    faulty = next((index for index, fields in enumerate(below) if any(map(_is_value, fields))), None)
+    if faulty is not None:
+        line = layout.header_lines[position + 1 + faulty]
+        problem = f"holds '{below[faulty][0]}' where a number is expected; correct the line, or take it out"
+        raise FileFormatError(layout.path, problem, where=f"line {line}, column '{names[0]}'")
+    wide = [row for row in rows[position + 1 :] if row is not None]
+    unit_rows = wide if len(below) == 1 else [row for row in wide if _is_row_of_units(row)]
+    for row in unit_rows[:1]:
+        units = [field.strip("[]() ") or unit for field, unit in zip(row, units, strict=True)]
+    return names, units
+
+
+def _header_position(
+    layout: TextLayout, rows: Sequence[list[str] | None], header_row: int | None, columns: Sequence[str]
+) -> int | None:
+    """Find the line of names among the lines of text; None where there is none."""
+    if header_row is not None:
+        if header_row not in layout.header_lines:
+            problem = f"[test] header_row = {header_row}, where no text stands before the numbers"
+            raise FileFormatError(layout.path, f"{problem}; the numbers begin in line {layout.n_before + 1}")
+        position = layout.header_lines.index(header_row)
+        if rows[position] is None:
+            raise _wrong_width(layout, layout.header[position])
+        return position
+    wide = [position for position, row in enumerate(rows) if row is not None]
+    bare = {position: {name_and_unit(name)[0] for name in rows[position] or ()} for position in wide}
+    holding = [position for position in wide if set(columns) <= bare[position] | set(rows[position] or ())]
+    if columns and holding:
+        return holding[-1]
+    if not wide:
+        if not layout.header or (columns and all(column.isdigit() for column in columns)):
+            return None
+        raise _wrong_width(layout, layout.header[-1])
+    timed = [position for position in wide if any(TIME.match(name) for name in (rows[position] or ())[:2])]
+    above = [position for position in wide if not _is_row_of_units(rows[position] or [])]
+    both = [position for position in timed if position in above]
+    return (both or timed or above or wide)[-1]
+
+
+def _is_row_of_units(row: Sequence[str]) -> bool:
+    stated = [field.strip("[]() ") for field in row if field.strip("[]() ")]
+    return bool(stated) and all(map(is_unit, stated))
+
+
+def _is_value(field: str) -> bool:
+    return is_number(field) and not field.isdigit()
+
+
+def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str] | None:
+    """Make a line of text as wide as the numbers where a delimiter at the end is all that differs."""
+    row = list(fields)
+    while len(row) > layout.n_columns and (not row[-1] or REMARK.fullmatch(row[-1])):
+        row.pop()
+    if len(row) == layout.n_columns - 1 and not any(fields[-1] for fields in layout.rows if fields):
+        row.append("")
+    return row if len(row) == layout.n_columns else None
+
+
+def _wrong_width(layout: TextLayout, fields: Sequence[str]) -> FileFormatError:
+    problem = f"has {layout.n_columns} values where the header has {len(fields)} columns"
+    hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
+    hint += "; where another line names the columns, write header_row = ... under [test]"
+    return FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")
+
+
+def _find_time(
+    layout: TextLayout, names: Sequence[str], units: Sequence[str], taken: set[int], *, counts_samples: bool
+) -> int | None:
+    free = [index for index in range(len(names)) if index not in taken]
+    for index in free:
+        if TIME.match(names[index]) and _is_time_unit(units[index]) and (index or not counts_samples):
+            return index
+    place = 1 if counts_samples else 0
+    if place not in free or FREQUENCY.search(names[place]) or not _is_time_unit(units[place]):
+        return None
+    return place if _grows(layout, place) and not _counts_samples(layout, names, units, place) else None
+
+
+def _counts_samples(layout: TextLayout, names: Sequence[str], units: Sequence[str], index: int) -> bool:
+    """Tell a column of 0, 1, 2, ... whose name does not say that these are seconds."""
+    if TIME.match(names[index]) or units[index]:
+        return False
+    values = _column(layout, index)
+    return len(values) > 1 and bool((np.diff(values) == 1.0).all()) and bool((values == np.rint(values)).all())
+
+
+def _grows(layout: TextLayout, index: int) -> bool:
+    """Tell whether a column grows from row to row, by steps that are equal but for a few."""
+    if all(is_stamp(fields[index]) for fields in layout.rows if index < len(fields)):
+        return True
+    steps = np.diff(_column(layout, index))
+    if len(steps) < FEWEST_ROWS - 1 or not (steps > 0.0).all():
+        return False
+    median = float(np.median(steps))
+    digits = max((len(fields[index].replace(",", ".").partition(".")[2]) for fields in layout.rows), default=0)
+    equal = np.abs(steps - median) <= EVEN * median + 2.0 * 10.0**-digits
+    return 2 * int(equal.sum()) > len(equal)
+
+
+def _column(layout: TextLayout, index: int) -> FloatArray:
+    values = np.full(len(layout.rows), np.nan)
+    for row, fields in enumerate(layout.rows):
+        try:
+            values[row] = parse_number(fields[index], decimal=layout.decimal)
+        except (NumberError, IndexError):
+            continue
+    return np.asarray(values[np.isfinite(values)])
+
+
+def _is_time_unit(unit: str) -> bool:
+    """Tell a unit that may be of time from one that is of something else."""
+    return not (is_unit(unit) and not TIME_UNIT.search(unit.strip()))
+
+
+def _unit_of_time(name: str) -> str:
+    match = TIME_UNIT.search(name)
+    return match[1] if match else ""

@@ -1,0 +1,241 @@
+"""The time is found however programs write their first columns; what is no table is left out, or said."""
+
+import re
+
+import numpy as np
+import pytest
+
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.recording_files import RecordingFiles
+from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
+
+RATE_HZ = 2048.0
+N_SAMPLES = 256
+SIGNALS = impact(Structure(), n_samples=N_SAMPLES)
+DIGITS = 1e-14  # relative: the numbers are written with all of their digits
+PRINTED_S = 1e-6  # resolution of the stamps
+
+
+def write(folder, change):
+    path = write_csv(folder / "hits" / "1.csv", SIGNALS, 1 / RATE_HZ)
+    content = change(path.read_text(encoding="utf-8"))
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def read(path, head=""):
+    test = read_test(write_test(path.parent.parent, HIT, head=head))
+    return np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path)))
+
+
+def expect(table):
+    np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / RATE_HZ, rtol=DIGITS)
+    np.testing.assert_allclose(table[:, 1:].T, SIGNALS, rtol=DIGITS)
+
+
+def message(path, head=""):
+    with pytest.raises(InputError) as caught:
+        read(path, head)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def lines_with(make):
+    """Change each line of numbers: `make` gets its number and its fields."""
+
+    def change(text):
+        head, *rows = text.splitlines()
+        return "\n".join([head, *(make(number, row.split(",")) for number, row in enumerate(rows) if row)]) + "\n"
+
+    return change
+
+
+def named(name):
+    return lambda text: text.replace("time", name, 1)
+
+
+def stamped(form):
+    def make(number, fields):
+        seconds = 59.95 + number / RATE_HZ
+        return ";".join([form(int(seconds // 60), seconds % 60), *fields[1:]])
+
+    return lambda text: lines_with(make)(text).replace("time,force,acc_1,acc_2", "time;force;acc_1;acc_2")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "# time",
+        "% t",
+        "Zeit [s]",
+        "X_Value",
+        "Timestamp",
+        "Elapsed Time (s)",
+        "x-axis",
+        "time_s",
+        "second",
+        "seconds",
+        "Time",
+        "T(s)",
+        "abscissa",
+        "",
+        "Temps (s)",
+        "Time [sec]",
+    ],
+)
+def test_a_first_column_that_grows_evenly_is_the_time(tmp_path, name):
+    expect(read(write(tmp_path, named(name))))
+
+
+@pytest.mark.parametrize("name", ["Time (ms)", "time_ms", "Zeit/ms", "t [ms]", "Time ms", "milliseconds"])
+def test_a_time_in_ms_is_brought_to_seconds(tmp_path, name):
+    change = lines_with(lambda _, fields: ",".join([repr(1e3 * float(fields[0])), *fields[1:]]))
+    expect(read(write(tmp_path, lambda text: named(name)(change(text)))))
+
+
+@pytest.mark.parametrize("names", ["x-axis,1,2,3\nsecond,N,m/s^2,m/s^2", "time,1,2,3", "x-axis,1,2,3\n(s),(N),,"])
+def test_columns_called_by_numbers(tmp_path, names):
+    path = write(tmp_path, lambda text: text.replace("time,force,acc_1,acc_2", names))
+    test_path = write_test(tmp_path, HIT)
+    text = test_path.read_text(encoding="utf-8")
+    for number, name in enumerate(("force", "acc_1", "acc_2"), start=1):
+        text = text.replace(f'column = "{name}"', f"column = {number}")
+    test_path.write_text(text, encoding="utf-8")
+    test = read_test(test_path)
+    expect(np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path))))
+
+
+def test_columns_of_one_name_are_read_by_their_numbers(tmp_path):
+    path = write(tmp_path, lambda text: text.replace("time,force,acc_1,acc_2", "second,Volt,Volt,Volt"))
+    test_path = write_test(tmp_path, HIT)
+    text = test_path.read_text(encoding="utf-8")
+    for number, name in enumerate(("force", "acc_1", "acc_2"), start=2):
+        text = text.replace(f'column = "{name}"', f"column = {number}")
+    test_path.write_text(text, encoding="utf-8")
+    test = read_test(test_path)
+    expect(np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path))))
+
+
+def test_the_index_of_pandas_is_not_the_time(tmp_path):
+    number = lines_with(lambda number, fields: ",".join([str(number), *fields]))
+    expect(read(write(tmp_path, lambda text: "," + number(text))))
+    expect(read(write(tmp_path, lambda text: "sample," + named("abscissa")(number(text)))))
+
+
+def test_the_time_is_the_column_that_the_test_names(tmp_path):
+    swapped = lines_with(lambda _, fields: ",".join([*fields[1:], fields[0]]))
+    path = write(tmp_path, lambda text: swapped(text).replace("time,force,acc_1,acc_2", "force,acc_1,acc_2,clock"))
+    expect(read(path, 'time_column = "clock"'))
+    assert "time_column = ... where another one is the time: 'force', 'acc_1', 'acc_2', 'clock'" in message(path)
+    assert "has no column 'clok'; did you mean 'clock'" in message(path, 'time_column = "clok"')
+
+
+def test_a_file_without_time_needs_a_rate(tmp_path):
+    without = lines_with(lambda _, fields: ",".join(fields[1:]))
+    path = write(tmp_path, lambda text: without(text).replace("time,", ""))
+    expect(read(path, "sample_rate_hz = 2048.0"))
+    assert re.search("'force' does not grow by equal steps; write sample_rate_hz = ... under .test", message(path))
+
+
+@pytest.mark.parametrize("name", ["sample", "index", "", "n", "#"])
+def test_a_count_of_samples_needs_a_rate(tmp_path, name):
+    count = lines_with(lambda number, fields: ",".join([str(number), *fields[1:]]))
+    path = write(tmp_path, lambda text: named(name)(count(text)))
+    expect(read(path, "sample_rate_hz = 2048.0"))
+    assert "counts the samples; write sample_rate_hz" in message(path)
+
+
+def test_a_rate_that_contradicts_the_time_is_refused(tmp_path):
+    path = write(tmp_path, str)
+    expect(read(path, "sample_rate_hz = 2048.0"))
+    text = message(path, "sample_rate_hz = 1024.0")
+    assert re.search(r"sample_rate_hz = 1024, but its column 'time' has a mean step.*2048 Hz", text)
+
+
+def test_a_frequency_is_no_time(tmp_path):
+    assert "has no column 'time'" in message(write(tmp_path, named("Frequency")))
+    assert "has no column 'time'" in message(write(tmp_path, named("x [mm]")))
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        lambda minutes, seconds: f"27/03/2025 {'00:00' if minutes else '23:59'}:{seconds:09.6f}",
+        lambda minutes, seconds: f"2024-05-01T10:{51 + minutes}:{seconds:09.6f}Z",
+        lambda minutes, seconds: f"2024-05-01 10:{51 + minutes}:{seconds:09.6f}+02:00",
+        lambda minutes, seconds: f"27.03.2025 10:{51 + minutes}:{seconds:09.6f}".replace(
+            f"{seconds:09.6f}", f"{seconds:09.6f}".replace(".", ",")
+        ),
+        lambda minutes, seconds: (
+            f"3/27/2025 {12 if minutes else 11}:{'00' if minutes else '59'}:{seconds:09.6f} {'PM' if minutes else 'AM'}"
+        ),
+        lambda minutes, seconds: f"10:{51 + minutes}:{seconds:09.6f}",
+    ],
+    ids=["over midnight", "ISO", "with a zone", "decimal comma", "AM and PM", "time of day"],
+)
+def test_time_stamps_are_read(tmp_path, form):
+    table = read(write(tmp_path, stamped(form)))
+    np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / RATE_HZ, atol=1.1 * PRINTED_S, rtol=0)
+    np.testing.assert_allclose(table[:, 1:].T, SIGNALS, rtol=DIGITS)
+
+
+def test_stamps_of_too_few_digits_need_a_rate(tmp_path):
+    coarse = stamped(lambda minutes, seconds: f"10:{51 + minutes}:{int(1e3 * seconds) / 1e3:06.3f}")
+    path = write(tmp_path, coarse)
+    assert "write sample_rate_hz = ... under [test]" in message(path)
+    expect(read(path, "sample_rate_hz = 2048.0"))
+
+
+@pytest.mark.parametrize(
+    "footer", ["End of data\n", "\n\nEnd of data", "Max,12.3,4.5,6\n", "Samples: 256\nDone\n" * 9000]
+)
+def test_text_below_the_numbers_is_left_out(tmp_path, footer):
+    expect(read(write(tmp_path, lambda text: text + footer)))
+
+
+def test_text_among_the_numbers_is_refused(tmp_path):
+    path = write(tmp_path, lambda text: text + "pause\n" + text.partition("\n")[2])
+    assert re.search(r"line 25[89]: has 1 values where the table has 4 columns", message(path))
+
+
+@pytest.mark.parametrize(
+    "preamble",
+    [
+        "Test,Beam A\nSampling rate,2048\nTime of test,12:30:05\n\n",
+        "Data file written by DAQ v3\nSampling rate: 2048 Hz\nChannels: 2\n\n",
+        "# made by hand\n# on Monday\n",
+        "free text, with commas\n" * 5000,
+        "2048\n3\n",
+        "Date,27/03/2025,x,y\n",
+    ],
+    ids=["pairs", "sentences", "comments", "long", "numbers", "as wide as the table"],
+)
+def test_text_above_the_names_is_left_out(tmp_path, preamble):
+    expect(read(write(tmp_path, lambda text: preamble + text)))
+
+
+def test_the_line_of_names_can_be_stated(tmp_path):
+    path = write(tmp_path, lambda text: "a,force,acc_1,acc_2\n" + text)
+    expect(read(path, "header_row = 2"))
+    assert "header_row = 9, where no text stands before the numbers" in message(path, "header_row = 9")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: "sep=;\n" + text.replace(",", ";"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.encode("utf-16"),
+        lambda text: text.encode("utf-16-le"),
+        lambda text: ("\ufeff" + text).encode("utf-16-be"),
+        lambda text: re.sub(r"e([+-]?\d+)", r"D\1", text.replace("force", "FORCE")).replace("FORCE", "force"),
+        lambda text: lines_with(
+            lambda _, fields: ",".join(f"{float(field):+.16E}".replace("E", "D") for field in fields)
+        )(text),
+        lambda text: "time,force,acc_1,acc_2,Comment\n" + text.partition("\n")[2],
+    ],
+    ids=["sep", "CR", "UTF-16", "UTF-16-LE", "UTF-16-BE", "some D", "D", "comment"],
+)
+def test_ways_to_write_a_table(tmp_path, change):
+    expect(read(write(tmp_path, change)))
