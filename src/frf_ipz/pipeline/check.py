@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.formats.frf_conventions import read_frf_source
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.visible_text import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import Dof
+    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.structure import Geometry
 
 WIDTH = 72
 HEIGHT = 18
 MARKS = {"node": "-", "support": "#", "sensor": "S", "input": "F", "both": "X", "point": "*"}
+WHOLE_BYTES = 1 << 28  # of recordings, read within seconds; of more only the first block of each
 FLAT = 1e-6  # of the largest extent: a structure thinner than this is a line
 
 
@@ -34,6 +40,11 @@ def describe_setup(inputs: PipelineInputs) -> str:
     -------
     str
         A drawing of the structure with sensors, inputs and points of interest, and what was read.
+
+    Raises
+    ------
+    InputError
+        If a recording or a file of FRFs cannot be read as the test says.
     """
     test = inputs.test
     lines = [inputs.name, ""]
@@ -45,6 +56,7 @@ def describe_setup(inputs: PipelineInputs) -> str:
         lines += [f"  note      {note}" for note in inputs.fe_model.notes]
     lines += [
         f"test        {test.name} ({test.kind}), {len(test.files)} files",
+        *_describe_files(test),
         f"sensors  S  {_names(test.output_dofs)}",
         f"inputs   F  {_names(test.input_dofs)}",
         f"points   *  {_names(inputs.points)}",
@@ -52,6 +64,36 @@ def describe_setup(inputs: PipelineInputs) -> str:
         "Everything fits together. Nothing was run.",
     ]
     return "\n".join(map(one_line, lines))
+
+
+def _describe_files(test: VibrationTest) -> list[str]:
+    """Read what the run would read; large recordings to the first block."""
+    for source in test.frf_sources:
+        read_frf_source(source)
+    recordings = [(setup, path) for setup in test.setups for path in setup.files if path not in test.signals]
+    is_large = sum(path.stat().st_size for _, path in recordings) > WHOLE_BYTES
+    files = RecordingFiles(test=test)
+    lengths: Counter[str] = Counter()
+    faults = []
+    for setup, path in recordings:
+        try:
+            lengths[_describe_recording(files.blocks(setup, path), is_large=is_large)] += 1
+        except InputError as error:
+            faults.append(error)
+    if len(faults) > 1:
+        raise InputError(f"{faults[0]} (so or otherwise, {len(faults)} of {len(recordings)} recordings cannot be read)")
+    if faults:
+        raise faults[0]
+    return [f"  read      {count} x {what}" for what, count in lengths.items()]
+
+
+def _describe_recording(blocks: Iterator[FloatArray], *, is_large: bool) -> str:
+    first = next(blocks)
+    last, n_rows = first, len(first)
+    for block in () if is_large else blocks:
+        last, n_rows = block, n_rows + len(block)
+    rate_hz = (n_rows - 1) / (last[-1, 0] - first[0, 0])
+    return f"{'more than ' if is_large else ''}{n_rows} samples at {rate_hz:.6g} Hz"
 
 
 def draw(geometry: Geometry, sensors: Iterable[Dof], inputs: Iterable[Dof], points: Iterable[Dof]) -> list[str]:

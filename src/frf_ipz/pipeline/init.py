@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
-from frf_ipz.ingest.formats.text_layout import name_and_unit, sniff
+from frf_ipz.ingest.formats.recording import TableKeys
+from frf_ipz.ingest.formats.text_columns import TIME, find_columns
+from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
+
+    from frf_ipz.ingest.formats.text_columns import TextColumns
 
 # Quantity, unit where the file states none, and what a column of it is called.
 QUANTITIES = (
@@ -56,9 +60,8 @@ def write_starting_files(folder: Path) -> dict[Path, bool]:
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".csv" and not _is_hidden(path, folder))
     if not files:
         raise InputError(f"{folder}: holds no .csv; put the recordings there, one file an impact, then run init again")
-    header = _header(files[0])
-    is_frf = set(FRF_COLUMNS) <= set(header)
-    test = _frf_test(folder, files) if is_frf else _hammer_test(folder, files, _columns(files, header))
+    is_frf = set(FRF_COLUMNS) <= {name for fields in sniff(files[0]).header for name in fields}
+    test = _frf_test(folder, files) if is_frf else _hammer_test(folder, files)
     pipeline = _pipeline(folder)
     return {
         path: _write(path, text) for path, text in ((folder / "test.toml", test), (folder / "pipeline.toml", pipeline))
@@ -79,32 +82,40 @@ def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 
-def _header(path: Path) -> tuple[str, ...]:
-    layout = sniff(path)
-    if layout.header:
-        return layout.header[0]
-    return tuple(str(index + 1) for index in range(layout.n_columns))
-
-
-def _columns(files: Sequence[Path], header: tuple[str, ...]) -> list[_Column]:
+def _find_columns(files: Sequence[Path]) -> TextColumns:
+    first = find_columns(sniff(files[0]), TableKeys())
     for path in files[1:]:
-        if _header(path) != header:
+        other = find_columns(sniff(path), TableKeys())
+        if other.names != first.names:
             raise InputError(
-                f"{path}: has the columns {', '.join(_header(path))}, and {files[0]} has {', '.join(header)}; "
+                f"{path}: has the columns {', '.join(other.names)}, and {files[0]} has {', '.join(first.names)}; "
                 "put files with different columns into folders of their own and run init on each"
             )
-    below = sniff(files[0]).header[1:2]
-    units = below[0] if below and len(below[0]) == len(header) else ("",) * len(header)
+    return first
+
+
+def _signals(path: Path, found: TextColumns) -> list[_Column]:
+    """Give the columns of signals: those that hold numbers, and are neither a time nor a count."""
+    rows = sniff(path).rows
     columns = []
-    for name, unit in list(zip(header, units, strict=True))[1:]:
+    for index, (name, unit) in enumerate(zip(found.names, found.units, strict=True)):
+        is_time = index == found.time or TIME.match(name) or (index == 0 and found.counts_samples)
+        if is_time or not any(is_number(fields[index]) for fields in rows if index < len(fields)):
+            continue
         quantity, default, _ = next(row for row in QUANTITIES if row[2].search(name_and_unit(name)[0]))
-        columns.append(_Column(name, "" if unit or name_and_unit(name)[1] else default, quantity))
+        written = name if name and found.names.count(name) == 1 else str(index + 1)
+        columns.append(_Column(written, "" if unit else default, quantity))
+    if len(columns) < 2:
+        names = ", ".join(found.names)
+        raise InputError(f"{path}: a force and a response are needed besides the time; its columns are {names}")
     if not any(column.quantity == "force" for column in columns):
         columns[0] = _Column(columns[0].name, "N" if columns[0].unit else "", "force")
     return columns
 
 
-def _hammer_test(folder: Path, files: Sequence[Path], columns: Sequence[_Column]) -> str:
+def _hammer_test(folder: Path, files: Sequence[Path]) -> str:
+    found = _find_columns(files)
+    columns = _signals(files[0], found)
     force = next(column for column in columns if column.quantity == "force")
     lines = [
         "# Written by 'frf-ipz init'. Look at every line that says CHECK.",
@@ -113,23 +124,26 @@ def _hammer_test(folder: Path, files: Sequence[Path], columns: Sequence[_Column]
         _checked('kind = "hammer"', "hammer | random (shaker, long records)"),
         "# nominal_damping_ratio = 0.001 # where the model states none",
     ]
-    for column in (force, *(column for column in columns if column is not force)):
-        lines += _channel(column, is_input=column is force)
+    if found.time is None:
+        lines.append(_checked("# sample_rate_hz = 2048.0", "needed: the files have no column of time"))
+    lines += _channel(force, node=None)
+    for node, column in enumerate((column for column in columns if column is not force), start=1):
+        lines += _channel(column, node=node)
     for name, pattern in _groups(folder, files).items():
         numbers = NODE.findall(name)
-        node = numbers[-1] if numbers else "1"
-        lines += ["", "[[hit]]", _checked(f'dof = "{int(node)}:+z"', "where these impacts hit")]
+        struck = numbers[-1] if numbers else "1"
+        lines += ["", "[[hit]]", _checked(f'dof = "{int(struck)}:+z"', "where these impacts hit")]
         lines.append(f"files = [{_quoted(pattern)}]")
     return "\n".join(lines) + "\n"
 
 
-def _channel(column: _Column, *, is_input: bool) -> list[str]:
-    lines = ["", "[[channel]]", f"column = {_quoted(column.name)}", f'role = "{"input" if is_input else "output"}"']
+def _channel(column: _Column, *, node: int | None) -> list[str]:
+    lines = ["", "[[channel]]", f"column = {_quoted(column.name)}", f'role = "{"output" if node else "input"}"']
     lines.append(_checked(f'quantity = "{column.quantity}"', "force | acceleration | velocity | displacement"))
     if column.unit:
         lines.append(_checked(f'unit = "{column.unit}"', 'or sensitivity = "10.2 mV/g_0"'))
-    if not is_input:
-        lines.append(_checked('dof = "1:+z"', "NODE:SIGN DIRECTION of the sensor, e.g. 18:+z"))
+    if node is not None:
+        lines.append(_checked(f'dof = "{node}:+z"', "NODE:SIGN DIRECTION of the sensor, e.g. 18:+z"))
         lines.append("# mass_kg = 0.004               # the sensor's own mass, where it is known")
     return lines
 

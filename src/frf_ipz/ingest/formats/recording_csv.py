@@ -94,7 +94,7 @@ def _read_numbers(layout: TextLayout, found: TextColumns, columns: list[int]) ->
         arrays = [_to_numbers(batch.column(position)) for position in order]
         block = np.column_stack([np.zeros(len(batch)), *arrays] if found.time is None else arrays)
         is_finite = np.asarray(np.abs(block) < LARGEST)
-        is_empty = np.isnan(block[:, -len(indices) :]).all(axis=1)
+        is_empty = np.asarray(np.isnan(block[:, -len(indices) :]).all(axis=1))
         if first_empty < 0 and is_empty.any():
             first_empty = n_rows + int(np.argmax(is_empty))
         is_bad = ~is_finite.all(axis=1) & ~is_empty
