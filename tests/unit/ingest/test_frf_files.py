@@ -358,3 +358,34 @@ def test_every_line_of_uneven_lines_is_taken_from_where_it_is(tmp_path):
     frfs = frf_ipz.estimate_frfs(frf_ipz.read_test(tmp_path / "test.toml")).frfs
     np.testing.assert_array_equal(frfs.frequency_hz, hertz)
     np.testing.assert_array_equal(frfs.values.real, np.column_stack([hertz, hertz]))
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", ""])
+def test_a_line_at_0_hz_that_is_not_finite_is_left_out_of_a_csv(tmp_path, value):
+    long_csv(tmp_path)
+    file = tmp_path / "frf.csv"
+    rows = [",".join([*row.split(",")[:3], value, "0"]) if row.startswith("0.0,") else row for row in lines_of(file)]
+    file.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    result = read(tmp_path, entry())
+    np.testing.assert_allclose(result.frfs.frequency_hz, LINES_HZ[1:], rtol=DIGITS)
+    assert any("the line at 0 Hz of 1:+z / 7:+z is not finite: left out" in warning for warning in result.warnings)
+
+
+def lines_of(file):
+    return file.read_text(encoding="utf-8").splitlines()
+
+
+def test_a_line_at_0_hz_that_is_not_finite_is_left_out_of_a_text_file(tmp_path):
+    magnitude_db = np.concatenate([[-np.inf], 20 * np.log10(np.abs(VALUES[1:, 0]))])
+    text_file(tmp_path, [LINES_HZ, magnitude_db, np.degrees(np.angle(VALUES[:, 0]))])
+    result = read(tmp_path, text_entry(["frequency_hz", "magnitude_db", "phase_deg"]))
+    np.testing.assert_allclose(result.frfs.frequency_hz, LINES_HZ[1:], rtol=DIGITS)
+    assert any("the line at 0 Hz of 1:+z / 7:+z is not finite: left out" in warning for warning in result.warnings)
+
+
+def test_a_line_above_0_hz_that_is_not_finite_is_refused(tmp_path):
+    long_csv(tmp_path)
+    file = tmp_path / "frf.csv"
+    rows = [",".join([*row.split(",")[:3], "nan", "0"]) if row.startswith("0.5,") else row for row in lines_of(file)]
+    file.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    assert re.search("line 3, column 'real': holds 'nan'", message(tmp_path, entry()))

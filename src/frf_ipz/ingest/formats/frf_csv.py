@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
 from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks
 
@@ -56,7 +56,7 @@ def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
     table = pa.Table.from_batches(batches).rename_columns(list(columns.values()))
     required = [index for index, name in columns.items() if name in NUMBERS]
     numbers = np.column_stack([table[name].to_numpy() for name in NUMBERS])
-    is_bad = ~np.isfinite(numbers).all(axis=1)
+    is_bad = ~np.isfinite(numbers).all(axis=1) & (numbers[:, 0] != 0.0)
     if is_bad.any():
         raise not_a_number(layout, names, required, int(np.argmax(is_bad)))
     return table
@@ -70,6 +70,8 @@ def _parse_dof(layout: TextLayout, text: str) -> Dof:
 
 
 def _make_frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[str, FloatArray]) -> MeasuredFrf:
+    left_out = undefined_at_rest({name: columns[name] for name in NUMBERS})
+    columns = {name: values[~left_out] for name, values in columns.items()}
     order = np.argsort(columns["frequency_hz"], kind="stable")
     return MeasuredFrf(
         source=source,
@@ -79,4 +81,5 @@ def _make_frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[
         values=columns["real"][order] + 1j * columns["imag"][order],
         coherence=columns["coherence"][order] if "coherence" in columns else None,
         variance=columns["variance"][order] if "variance" in columns else None,
+        notes=note_at_rest(source, output_dof, input_dof, left_out),
     )

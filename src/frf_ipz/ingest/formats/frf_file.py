@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
@@ -152,3 +154,41 @@ class FrfFormat(Protocol):
         FileFormatError
             If it is none, or does not say what its FRFs connect.
         """
+
+
+def undefined_at_rest(columns: dict[str, FloatArray]) -> BoolArray:
+    """Find lines at 0 Hz that are not finite, as those of an integrated motion: they are to be left out.
+
+    Parameters
+    ----------
+    columns : dict of str to (n_lines,) array
+        ``frequency_hz`` and the numbers of each line.
+
+    Returns
+    -------
+    (n_lines,) bool array
+        True for such a line.
+    """
+    is_finite = np.isfinite(np.column_stack(list(columns.values()))).all(axis=1)
+    return np.asarray(~is_finite & (columns["frequency_hz"] == 0.0))
+
+
+def note_at_rest(source: FrfSource, output_dof: Dof, input_dof: Dof, left_out: BoolArray) -> tuple[str, ...]:
+    """Say that the line at 0 Hz is left out.
+
+    Parameters
+    ----------
+    source : FrfSource
+        The file.
+    output_dof, input_dof : Dof
+        What the FRF connects.
+    left_out : (n_lines,) bool array
+        Lines that are.
+
+    Returns
+    -------
+    tuple of str
+        Empty where none is.
+    """
+    note = f"{source.path.name}: the line at 0 Hz of {output_dof} / {input_dof} is not finite: left out"
+    return (note,) if left_out.any() else ()

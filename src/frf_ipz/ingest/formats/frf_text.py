@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks
 
@@ -38,6 +38,8 @@ class _TextColumns:
         columns = _read_columns(source)
         if source.output_dof is None or source.input_dof is None:
             raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
+        left_out = undefined_at_rest(columns)
+        columns = {name: values[~left_out] for name, values in columns.items()}
         order = np.argsort(columns["frequency_hz"], kind="stable")
         columns = {name: values[order] for name, values in columns.items()}
         return (
@@ -49,6 +51,7 @@ class _TextColumns:
                 values=_complex_values(columns),
                 coherence=columns.get("coherence"),
                 variance=columns.get("variance"),
+                notes=note_at_rest(source, source.output_dof, source.input_dof, left_out),
             ),
         )
 
@@ -81,7 +84,8 @@ def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
     indices = [index for index, name in enumerate(names) if name != SKIP]
     table = pa.Table.from_batches(read_blocks(layout, names, dict.fromkeys(indices, pa.float64())))
     numbers = np.column_stack([table.column(position).to_numpy() for position in range(len(indices))])
-    is_bad = ~np.isfinite(numbers).all(axis=1)
+    frequency_hz = numbers[:, [names[index] for index in indices].index("frequency_hz")]
+    is_bad = ~np.isfinite(numbers).all(axis=1) & (frequency_hz != 0.0)
     if is_bad.any():
         raise not_a_number(layout, names, indices, int(np.argmax(is_bad)))
     return {names[index]: numbers[:, position] for position, index in enumerate(indices)}

@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError, QuantityError
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest
 from frf_ipz.ingest.formats.universal_file import describe_functions, read_functions
 from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated
 from frf_ipz.input_files import read_bytes
@@ -125,8 +125,7 @@ def _make_frf(source: FrfSource, function: UniversalFunction, coherence: Univers
         hertz = frequency_hz[int(np.argmin(is_finite | left_out))]
         problem = f"the FRF {output_dof} / {input_dof} is not finite at {hertz:g} Hz; correct the file"
         raise FileFormatError(source.path, problem, where=f"data set {function.number}, line {function.line}")
-    if left_out.any():
-        notes = (*notes, f"{source.path.name}: the line at 0 Hz of {output_dof} / {input_dof} is not finite: left out")
+    notes = (*notes, *note_at_rest(source, output_dof, input_dof, left_out))
     known_coherence = None
     if coherence is not None and len(coherence.x) == len(function.x):
         known_coherence = coherence.values.real[order][is_finite]
