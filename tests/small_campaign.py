@@ -56,6 +56,8 @@ test = "test.toml"
 model = "model.toml"
 [fit]
 band_hz = [10.0, 600.0]
+[diagnose]
+run = "never"
 [predict]
 points = ["11:+z"]
 """

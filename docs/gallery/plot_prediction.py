@@ -22,6 +22,7 @@ results = frf_ipz.Campaign(
     points=["49:+z"],
     fit=frf_ipz.FitOptions(band_hz=(10.0, 700.0)),
     update=frf_ipz.UpdateOptions(mass=True),
+    diagnose=frf_ipz.DiagnoseOptions(run="never"),
 ).run(until="predict")
 prediction = results.prediction
 print(prediction)

@@ -21,6 +21,7 @@ results = frf_ipz.Campaign(
     points=["49:+z"],
     fit=frf_ipz.FitOptions(band_hz=(10.0, 700.0)),
     update=frf_ipz.UpdateOptions(mass=True),
+    diagnose=frf_ipz.DiagnoseOptions(run="never"),
 ).run(until="export")
 system = results.state_space
 print(system.nstates, "states; inputs", system.input_labels, "outputs", system.output_labels)

@@ -96,8 +96,8 @@ def test_a_delay_that_was_fitted_is_in_the_state_space_when_asked_for(tmp_path, 
 
 def test_an_update_changes_what_the_diagnosis_has_found_and_nothing_else(tmp_path, monkeypatch):
     pipeline = write_campaign(tmp_path)
-    options = '[diagnose]\napply = true\neffects = ["global_stiffness"]\n[update]\nparameters = "diagnosis"\n'
-    pipeline.write_text(pipeline.read_text() + options)
+    chosen = '[diagnose]\napply = true\neffects = ["global_stiffness"]\n[update]\nparameters = "diagnosis"\n'
+    pipeline.write_text(pipeline.read_text().replace('[diagnose]\nrun = "never"\n', chosen))
     stage(monkeypatch, "update", pipeline, tmp_path / "out")
     updated = open_results(tmp_path / "out").updated_model
     before, change = updated.nominal.stiffness, updated.model.stiffness - updated.nominal.stiffness
@@ -108,7 +108,8 @@ def test_an_update_changes_what_the_diagnosis_has_found_and_nothing_else(tmp_pat
 
 def test_a_diagnosis_alone_has_a_page_that_shows_it_on_the_structure(tmp_path, monkeypatch):
     pipeline = write_campaign(tmp_path)
-    pipeline.write_text(pipeline.read_text() + '[diagnose]\neffects = ["global_stiffness"]\n')
+    chosen = '[diagnose]\neffects = ["global_stiffness"]\n'
+    pipeline.write_text(pipeline.read_text().replace('[diagnose]\nrun = "never"\n', chosen))
     stage(monkeypatch, "diagnose", pipeline, tmp_path / "out")
     assert set(keys(tmp_path / "out")) == {"ingest", "fit", "model", "diagnose", "levels", "report"}
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ Detection and naming rest on the evidence of each hypothesis; the verdict on wha
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from frf_ipz.arguments import as_path, require_each, require_type
 from frf_ipz.diagnosis.catalogue.effect import Effect
+from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline, DeadlineError
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.measured.data_split import split_data
@@ -29,6 +30,7 @@ from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.observations import Observations, observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Ambiguity, Diagnosis
+from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 from frf_ipz.diagnosis.verdict.decision import (
     CONSISTENT,
@@ -49,6 +51,7 @@ from frf_ipz.diagnosis.verdict.out_of_catalogue import (
     describe_implausibility,
     drop_damping_effects,
     free_damping,
+    is_damping_dominant,
     is_damping_only,
 )
 from frf_ipz.diagnosis.verdict.proof import prove
@@ -78,6 +81,11 @@ CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explana
 MIN_RECORDS = 2  # at one excited point, to compare levels
 AMBIGUOUS = 5.0  # log Bayes factor: effects nearer to the best than that are not distinguished
 MAX_ALTERNATIVES = 6
+# What was not looked at, where the time was over before that step was done
+NO_TIME_FOR_LAWS = "all force laws at all locations"
+NO_TIME_BESIDE_LAW = "a linear effect beside a force law"
+NOT_WITH_STATED_DAMPING = "effects that would explain the damping"
+NOT_UNNAMED = "forces that are not in the catalogue"
 SEED_WARNING = "[diagnose] seed has no effect: nothing in a diagnosis is drawn at random; leave it out"
 
 
@@ -157,8 +165,46 @@ def diagnose(
     require_each("effects", effects, Effect, Law)
     observations = _as_observations(data, frfs, ingest, fit)
     catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=as_path(folder), own=tuple(effects))
+    return find_causes(
+        fe_model, observations, catalogue, deadline=Deadline(seconds=catalogue.options.seconds), progress=progress
+    )
+
+
+def find_causes(
+    fe_model: StructuralModel,
+    observations: Observations,
+    catalogue: EffectCatalogue,
+    *,
+    deadline: Deadline = NO_LIMIT,
+    only_where_they_differ: bool = False,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Find what is missing from a nominal model, within a time.
+
+    Parameters
+    ----------
+    fe_model : StructuralModel
+        The nominal model, with damping.
+    observations : Observations
+        What was measured.
+    catalogue : EffectCatalogue
+        Tolerances and effects.
+    deadline : Deadline
+        When no further hypothesis is tried.
+    only_where_they_differ : bool
+        Search only where model and measurement differ by more than noise and tolerances.
+    progress : Progress
+        Receives the progress.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, findings and proof.
+    """
     with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
-        diagnosis = _diagnose(fe_model, observations, catalogue, progress)
+        diagnosis = _diagnose(
+            fe_model, observations, catalogue, deadline, progress, only_where_they_differ=only_where_they_differ
+        )
     if catalogue.options.seed is None:
         return diagnosis
     return replace(diagnosis, warnings=(*diagnosis.warnings, SEED_WARNING))
@@ -178,7 +224,13 @@ def _as_observations(
 
 
 def _diagnose(
-    model: StructuralModel, observations: Observations, catalogue: EffectCatalogue, progress: Progress
+    model: StructuralModel,
+    observations: Observations,
+    catalogue: EffectCatalogue,
+    deadline: Deadline,
+    progress: Progress,
+    *,
+    only_where_they_differ: bool,
 ) -> Diagnosis:
     options = catalogue.options
     progress(0.0, "comparing weak and strong records")
@@ -193,59 +245,120 @@ def _diagnose(
     laws = catalogue.laws()
     excess = linearity.score / linearity.limit if linearity and laws else 0.0
     is_clearly_nonlinear = excess > CLEARLY_NONLINEAR
-    problem, decision, shortfall = _decide(
-        problem, pose_with, options, progress, is_clearly_nonlinear=is_clearly_nonlinear
-    )
+    progress(0.2, "fitting the nominal model")
+    nothing = decide_without_search(problem)
+    is_searched = bool(problem.effects) and not is_clearly_nonlinear
+    is_searched &= not (only_where_they_differ and nothing.verdict == CONSISTENT)
+    found = _Found(problem=problem, decision=nothing, shortfall=_shortfall(nothing))
+    if is_searched:
+        found = _search(problem, nothing, pose_with, options, deadline, progress)
+    problem, decision = found.problem, found.decision
     progress(0.9, "proving on what was not fitted")
     held_out = make_data(source.held_out, options, free_gains=scale)
     decision, proof = _prove_and_prune(problem, held_out, decision)
     linear = _make_linear_diagnosis(problem, decision, proof, data_checks, held_out_kind=source.held_out_kind)
-    statement = _write_statement(decision, linear.findings, shortfall)
+    damping = describe_damping(decision.final, options) if decision.final.explains_nearly_all else ""
     linear = replace(
-        linear, statement=statement, unexplained_part=shortfall, warnings=list_warnings(source, data_checks)
+        linear,
+        statements=(damping,) if damping else (),
+        unexplained_part=found.shortfall,
+        not_searched=decision.not_searched,
+        warnings=list_warnings(source, data_checks),
     )
+    linear = replace(linear, statement=_write_statement(linear, decision, is_searched=is_searched))
     if excess <= 1:
         return linear
-    laws_of = partial(search_laws, options=options, laws=laws, progress=_late_progress(progress))
-    law_search = laws_of(model, observations, linearity=linearity)
+    laws_of = partial(search_laws, options=options, laws=laws, progress=_late_progress(progress), deadline=deadline)
+    try:
+        law_search = laws_of(model, observations, linearity=linearity)
+    except DeadlineError:
+        return replace(
+            linear,
+            verdict=UNEXPLAINED,
+            not_searched=NO_TIME_FOR_LAWS,
+            statement=f"Weak and strong records disagree. Stopped before all was tried: {NO_TIME_FOR_LAWS}.",
+            unexplained_part="weak and strong records disagree",
+        )
     if is_clearly_nonlinear or not effects or decision.verdict == UNEXPLAINED:
         pose_with_observations = partial(_pose_with_observations, model, options, effects, scale)
-        return _diagnose_nonlinear(
-            linear, problem, pose_with_observations, decision, model, observations, law_search, laws_of
-        )
+        limited = replace(problem, deadline=deadline)
+        try:
+            return _diagnose_nonlinear(
+                linear, limited, pose_with_observations, decision, model, observations, law_search, laws_of
+            )
+        except DeadlineError:
+            return replace(_add_law(linear, law_search), not_searched=NO_TIME_BESIDE_LAW)
     return _prefer_proven_law(linear, law_search)
 
 
-def _decide(
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Found:
+    """What a search has found, with the problem that it was found with, and what nothing explains."""
+
+    problem: InferenceProblem
+    decision: Decision
+    shortfall: str
+
+
+def _search(
     problem: InferenceProblem,
+    nothing: Decision,
     pose_with: Callable[[DiagnoseOptions], InferenceProblem],
     options: DiagnoseOptions,
+    deadline: Deadline,
     progress: Progress,
-    *,
-    is_clearly_nonlinear: bool,
-) -> tuple[InferenceProblem, Decision, str]:
-    """Decide what is missing, unless clearly a law; where damping alone has no explanation, again with free damping."""
-    is_searched = bool(problem.effects) and not is_clearly_nonlinear
-    decision = decide(problem, progress) if is_searched else decide_without_search(problem)
-    if is_searched and is_damping_only(problem, decision):
-        free_problem = drop_damping_effects(pose_with(free_damping(options)))
-        free_decision = decide(free_problem, progress)
-        if free_decision.goodness.is_good:
-            return (
-                free_problem,
-                replace(free_decision, verdict=UNEXPLAINED),
-                describe_damping(free_decision.final, options),
-            )
-    unnamed_force = find_unnamed_force(problem, decision) if decision.final.explains_nearly_all else None
+) -> _Found:
+    """Decide what is missing; where damping alone has no explanation, with free damping.
+
+    In a limited time what frees the damping comes first where damping is most of the mismatch: it is found sooner.
+    """
+    limited = replace(problem, deadline=deadline)
+    is_first = deadline.seconds is not None and is_damping_dominant(problem, nothing.null)
+    freed = _search_with_free_damping(pose_with, options, deadline, progress) if is_first else None
+    if freed is not None and deadline.is_over:
+        return freed
+    decision = decide(limited, progress, null=nothing.null)
+    if is_damping_only(problem, decision):
+        freed = freed or (None if is_first else _search_with_free_damping(pose_with, options, deadline, progress))
+        if freed is not None:
+            complete = decision.not_searched or freed.decision.not_searched
+            return replace(freed, decision=replace(freed.decision, not_searched=complete))
+    return _refuse_implausible(limited, decision)
+
+
+def _search_with_free_damping(
+    pose_with: Callable[[DiagnoseOptions], InferenceProblem],
+    options: DiagnoseOptions,
+    deadline: Deadline,
+    progress: Progress,
+) -> _Found | None:
+    """Search with damping ratios as measured; None where that does not explain all."""
+    problem = drop_damping_effects(pose_with(free_damping(options)))
+    decision = decide(replace(problem, deadline=deadline), progress, null=fit_null_model(problem))
+    if not decision.goodness.is_good:
+        return None
+    rest = decision.not_searched or (NOT_WITH_STATED_DAMPING if deadline.is_over else "")
+    return _Found(problem=problem, decision=replace(decision, verdict=UNEXPLAINED, not_searched=rest), shortfall="")
+
+
+def _refuse_implausible(limited: InferenceProblem, decision: Decision) -> _Found:
+    """Refuse an explanation where one outside the catalogue explains more, or its numbers are hardly possible."""
+    problem, unnamed_force = replace(limited, deadline=NO_LIMIT), None
+    if decision.final.explains_nearly_all:
+        try:
+            unnamed_force = find_unnamed_force(limited, decision)
+        except DeadlineError:
+            decision = replace(decision, not_searched=decision.not_searched or NOT_UNNAMED)
     if unnamed_force is not None:
-        return (
-            problem,
-            replace(decision, verdict=UNEXPLAINED, unnamed_force=unnamed_force),
-            describe_unnamed_force(unnamed_force),
-        )
+        decision = replace(decision, verdict=UNEXPLAINED, unnamed_force=unnamed_force)
+        return _Found(problem=problem, decision=decision, shortfall=describe_unnamed_force(unnamed_force))
     if decision.verdict == EXPLAINED and (reason := describe_implausibility(decision.final)):
-        return problem, replace(decision, verdict=UNEXPLAINED), reason
-    return problem, decision, decision.goodness.shortfall if decision.verdict == UNEXPLAINED else ""
+        return _Found(problem=problem, decision=replace(decision, verdict=UNEXPLAINED), shortfall=reason)
+    return _Found(problem=problem, decision=decision, shortfall=_shortfall(decision))
+
+
+def _shortfall(decision: Decision) -> str:
+    return decision.goodness.shortfall if decision.verdict == UNEXPLAINED else ""
 
 
 def _prove_and_prune(problem: InferenceProblem, held_out: Data, decision: Decision) -> tuple[Decision, Proof]:
@@ -461,14 +574,36 @@ def _find_ambiguity(
     )
 
 
-def _write_statement(decision: Decision, findings: tuple[Finding, ...], shortfall: str) -> str:
-    statements = " ".join(finding.statement for finding in findings)
-    if decision.verdict == CONSISTENT:
-        return "The nominal model explains the measurement within noise and its tolerances: nothing is missing."
-    if decision.verdict == EXPLAINED:
-        return f"{statements} With that, the model explains the measurement."
-    partly = f" A part of it is explained: {statements}" if statements else ""
-    return f"Something is missing that nothing in the catalogue explains: {shortfall}.{partly}"
+def _write_statement(diagnosis: Diagnosis, decision: Decision, *, is_searched: bool) -> str:
+    """Write the causes first, then what was measured, and what was not looked at."""
+    found = " ".join(finding.statement for finding in diagnosis.findings)
+    rest = f"The time was over before all was looked at: {diagnosis.not_searched} (no limit: frf-ipz diagnose)."
+    sentences = [
+        _judge(diagnosis, decision, found, is_searched=is_searched),
+        *diagnosis.statements,
+        "" if diagnosis.is_complete else rest,
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched: bool) -> str:
+    """Say what the verdict means: a part that is found where something remains unexplained is no fact."""
+    if diagnosis.verdict == CONSISTENT:
+        reason = (
+            "the nominal model explains the measurement within noise and its tolerances (it leaves "
+            f"{np.sqrt(decision.null_goodness.misfit):.2g} times the expected misfit)"
+        )
+        if is_searched:
+            return f"Nothing is missing: {reason}."
+        return f"Nothing missing was seen: {reason}; so no cause was searched for."
+    if diagnosis.verdict == EXPLAINED:
+        return f"{found} With that, the model explains the measurement."
+    if not diagnosis.unexplained_part:  # all but damping, which is as measured
+        if found:
+            return f"{found} With that and the measured damping, the model explains the measurement."
+        return "With the measured damping, the model explains the measurement."
+    partly = f" A part of it looks like this: {found}" if found else ""
+    return f"Something is missing that nothing in the catalogue explains: {diagnosis.unexplained_part}.{partly}"
 
 
 def _collect_numbers(decision: Decision) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from frf_ipz.option_types import NotNegative, Seed
 from frf_ipz.toml_files import STRICT, check_values
@@ -17,6 +18,11 @@ class DiagnoseOptions:
 
     Parameters
     ----------
+    run : str
+        When a run looks for a cause: ``auto``, where model and measurement differ by more than noise and tolerances;
+        ``always``; ``never``.
+    seconds : float, optional
+        Wall time of the search, s; where nothing is stated, 60 in a run, and no limit where a diagnosis is asked for.
     apply : bool
         The finding flows on into updating and prediction.
     effects : tuple of str
@@ -45,6 +51,8 @@ class DiagnoseOptions:
 
     __pydantic_config__ = STRICT
 
+    run: Literal["auto", "always", "never"] = "auto"
+    seconds: NotNegative | None = None
     apply: bool = False
     effects: tuple[str, ...] = ()
     extra_effects: tuple[str, ...] = ()

@@ -446,6 +446,10 @@ class Diagnosis(Tabulated, Drawn):
         The force law among the findings, for linear models.
     law_in_time : LawInTime, optional
         The same in time, to be drawn.
+    statements : tuple of str
+        What was measured and is nothing missing: damping of single modes.
+    not_searched : str
+        What was not looked at because the time was over, in words; empty for a complete search.
 
     Examples
     --------
@@ -493,6 +497,13 @@ class Diagnosis(Tabulated, Drawn):
     warnings: tuple[str, ...] = ()
     linearised_law: LinearisedLaw | None = None
     law_in_time: LawInTime | None = None
+    statements: tuple[str, ...] = ()
+    not_searched: str = ""
+
+    @property
+    def is_complete(self) -> bool:
+        """False where the time did not suffice for the whole search."""
+        return not self.not_searched
 
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"
@@ -509,6 +520,9 @@ class Diagnosis(Tabulated, Drawn):
         return {
             "verdict": self.verdict,
             "statement": self.statement,
+            "statements": list(self.statements),
+            "complete": self.is_complete,
+            "not_searched": self.not_searched,
             "findings": [_finding_to_json(finding) for finding in self.findings],
             "alternatives": [_finding_to_json(finding) for finding in self.alternatives],
             "mismatch": {
@@ -570,6 +584,9 @@ _MISFIT_KEYS = {
 JSON_KEYS = {
     "verdict": "`consistent`, `explained` or `unexplained`",
     "statement": "the verdict in a few sentences",
+    "statements": "what was measured and is nothing missing: damping of single modes",
+    "complete": "false where the time did not suffice for the whole search",
+    "not_searched": "what was not looked at because the time was over; empty for a complete search",
     **{f"findings[].{name}": text for name, text in _FINDING_KEYS.items()},
     "alternatives[]": "other explanations, the most probable first, each with the keys of a finding",
     "mismatch.frequency_hz": "frequencies at which the nominal model disagrees with the measurement, Hz",

@@ -67,8 +67,8 @@ class Campaign(Concise):
     reference : FrfSet, optional
         FRFs at points of interest that were kept aside: the prediction is judged by them and does not use them.
     ingest, fit, diagnose, reduce, update, export : options, optional
-        What is chosen for each stage; the program chooses where nothing is given. Without `diagnose` nothing is
-        diagnosed.
+        What is chosen for each stage; the program chooses where nothing is given: a cause is then looked for where
+        model and measurement differ, for a minute at most.
 
     Raises
     ------

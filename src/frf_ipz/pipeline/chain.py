@@ -22,7 +22,7 @@ STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "r
 
 
 def chain(
-    inputs: PipelineInputs, store: RunStore, *, until: str, diagnosing: bool, progress: Progress
+    inputs: PipelineInputs, store: RunStore, *, until: str, diagnosing: bool | None, progress: Progress
 ) -> Iterator[str]:
     """Run the stages one after another.
 
@@ -34,8 +34,8 @@ def chain(
         Where results are kept.
     until : str
         The last stage that is wanted. A diagnosis is looked at: one that is the last has its page.
-    diagnosing : bool
-        Look for what the model left out.
+    diagnosing : bool, optional
+        Look for what the model left out, in any time; by default as ``[diagnose]`` says.
     progress : Progress
         Called with the fraction done and what is being done.
 
@@ -50,16 +50,18 @@ def chain(
     frfs, model = recordings.frfs, inputs.fe_model
     options = inputs.options.diagnose
     diagnosis = found = None
-    if model is not None and diagnosing and options is not None and options.apply:
-        diagnosis = mismatch.diagnose(runner, model, frfs)
+    is_asked = diagnosing is True
+    is_diagnosing = options.run != "never" if diagnosing is None else diagnosing
+    if model is not None and is_diagnosing and options.apply:
+        diagnosis = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
     fit = measurement.fit(runner, frfs, corrected_by=diagnosis)
     yield "fit"
     if model is not None:
         modelling.outline(runner, model, corrected_by=diagnosis)
-        if diagnosing:
+        if is_diagnosing:
             if diagnosis is None:
-                found = mismatch.diagnose(runner, model, frfs)
+                found = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
             mismatch.levels(runner, fit, recordings.frfs)
             if until == "diagnose":
                 outputs.report(runner)

@@ -42,17 +42,15 @@ class StageOptions:
 
     Parameters
     ----------
-    ingest, fit, reduce, update, predict, export : options
+    ingest, fit, diagnose, reduce, update, predict, export : options
         One a stage.
-    diagnose : DiagnoseOptions, optional
-        None where nothing is stated: then a run does not diagnose.
     """
 
     __pydantic_config__ = STRICT
 
     ingest: IngestOptions = field(default_factory=IngestOptions)
     fit: FitOptions = field(default_factory=FitOptions)
-    diagnose: DiagnoseOptions | None = None
+    diagnose: DiagnoseOptions = field(default_factory=DiagnoseOptions)
     reduce: ReduceOptions = field(default_factory=ReduceOptions)
     update: UpdateOptions = field(default_factory=UpdateOptions)
     predict: PredictOptions = field(default_factory=PredictOptions)
@@ -67,10 +65,8 @@ class PipelineFile(StageOptions):
     ----------
     pipeline : PipelineSection
         Test and model.
-    ingest, fit, reduce, update, predict, export : options
+    ingest, fit, diagnose, reduce, update, predict, export : options
         What the user chose for each stage.
-    diagnose : DiagnoseOptions, optional
-        None where the section is absent: then a run does not diagnose.
     """
 
     __pydantic_config__ = STRICT

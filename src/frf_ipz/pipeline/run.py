@@ -45,7 +45,8 @@ def run_pipeline(
         The last stage to run: ``ingest``, ``fit``, ``diagnose``, ``pair``, ``update``, ``predict``, ``export`` or
         ``report``.
     diagnosing : bool, optional
-        Look for what the model left out; where it is left out, if the file has a section ``[diagnose]``.
+        Look for what the model left out, without a limit of time unless one is stated; where it is left out,
+        ``[diagnose] run`` says whether, and the time is limited.
     progress : Progress
         Called with the fraction done and what is being done.
 
@@ -120,11 +121,10 @@ def run_chain(
     InputError
         If a stage needs an FE model and there is none.
     """
-    is_diagnosing = inputs.options.diagnose is not None if diagnosing is None else diagnosing
     if inputs.fe_model is None and until not in {"ingest", "fit", "report"}:
         raise InputError(f"{inputs.source}: the stage '{until}' needs an FE model; name it as [pipeline] model")
     store.manifest.update(_provenance(inputs))
-    for stage in chain(inputs, store, until=until, diagnosing=is_diagnosing, progress=progress):
+    for stage in chain(inputs, store, until=until, diagnosing=diagnosing, progress=progress):
         if stage == until:
             break
 

@@ -34,8 +34,11 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     statements = [typeset(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
+    if diagnosis.verdict == "unexplained" and diagnosis.statements and not diagnosis.unexplained_part:
+        sentence, *rest = statements or ["With the measured damping, the model explains the measurement."]
+        return sentence, " ".join([*rest, *map(typeset, diagnosis.statements)])
     additions = [f"What is not explained: {typeset(diagnosis.unexplained_part)}."] if diagnosis.unexplained_part else []
-    additions += [f"A part of it is explained: {' '.join(statements)}"] if statements else []
+    additions += [f"A part of it looks like this: {' '.join(statements)}"] if statements else []
     return SENTENCES.get(diagnosis.verdict, ""), " ".join([*additions, *mismatch_sentence(diagnosis)])
 
 
@@ -95,7 +98,7 @@ def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
     effects = [finding.effect.replace("_", " ") for finding in diagnosis.findings]
     counts = {effect: effects.count(effect) for effect in effects}
     names = " and ".join(effect if count == 1 else f"{effect} ({count})" for effect, count in counts.items())
-    if diagnosis.verdict == "unexplained":
+    if diagnosis.verdict == "unexplained" and (diagnosis.unexplained_part or not diagnosis.statements):
         return "unknown", f"nothing in the catalogue explains it; best in part: {names}"
     probability = min(finding.probability for finding in diagnosis.findings)
     return names, f"probability {probability:.3g}" if probability < 0.999 else "probability above 0.999"

@@ -12,6 +12,7 @@ import frf_ipz
 
 DATA = Path(__file__).parents[3] / "data" / "raw" / "cantilever"
 BAND = frf_ipz.FitOptions(band_hz=(10.0, 700.0))
+CHOSEN = {"fit": BAND, "diagnose": frf_ipz.DiagnoseOptions(run="never")}
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def fe_model():
 
 @pytest.fixture(scope="module")
 def from_files(test, fe_model):
-    return frf_ipz.Campaign(test, fe_model, points=["49:+z"], name="demo", fit=BAND).run()
+    return frf_ipz.Campaign(test, fe_model, points=["49:+z"], name="demo", **CHOSEN).run()
 
 
 def test_a_campaign_gives_all_results(from_files):
@@ -41,7 +42,7 @@ def test_a_campaign_gives_all_results(from_files):
 
 
 def test_frfs_in_memory_give_the_same_fit_and_prediction(from_files, fe_model):
-    again = frf_ipz.Campaign(from_files.frfs, fe_model, points=["49:+z"], fit=BAND).run()
+    again = frf_ipz.Campaign(from_files.frfs, fe_model, points=["49:+z"], **CHOSEN).run()
     assert_allclose(again.fit.model.poles, from_files.fit.model.poles, rtol=1e-12)
     assert_allclose(again.prediction.values, from_files.prediction.values, rtol=1e-6)
 
@@ -65,7 +66,7 @@ def test_recordings_in_memory_give_the_same_frfs(from_files, test):
 
 
 def test_results_in_a_folder_are_those_in_memory(from_files, test, fe_model, tmp_path):
-    kept = frf_ipz.Campaign(test, fe_model, points=["49:+z"], name="demo", fit=BAND).run(tmp_path / "out")
+    kept = frf_ipz.Campaign(test, fe_model, points=["49:+z"], name="demo", **CHOSEN).run(tmp_path / "out")
     opened = frf_ipz.open_results(str(tmp_path / "out"))
     assert (tmp_path / "out" / "report.html").is_file()
     for results in (kept, opened):
@@ -74,14 +75,14 @@ def test_results_in_a_folder_are_those_in_memory(from_files, test, fe_model, tmp
 
 
 def test_other_arrays_are_not_taken_for_the_same(from_files, fe_model, tmp_path):
-    n_lines = frf_ipz.Campaign(from_files.frfs, fe_model, fit=BAND).run(tmp_path, until="fit").frfs.n_lines
+    n_lines = frf_ipz.Campaign(from_files.frfs, fe_model, **CHOSEN).run(tmp_path, until="fit").frfs.n_lines
     lines = from_files.frfs.in_band((0.0, 1000.0))
-    other = frf_ipz.Campaign(from_files.frfs.select_lines(lines), fe_model, fit=BAND).run(tmp_path, until="fit")
+    other = frf_ipz.Campaign(from_files.frfs.select_lines(lines), fe_model, **CHOSEN).run(tmp_path, until="fit")
     assert other.frfs.n_lines < n_lines
 
 
 def test_without_a_model_the_chain_ends_with_the_fit(test):
-    results = frf_ipz.Campaign(test, fit=BAND).run()
+    results = frf_ipz.Campaign(test, **CHOSEN).run()
     assert results.fit.n_modes == 4
     assert results.updated_model is results.state_space is None
 

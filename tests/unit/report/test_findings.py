@@ -48,9 +48,9 @@ def test_nothing_missing_is_said(run):
 def test_what_nothing_explains_is_unknown(run):
     diagnosis = replace(run.diagnosis, verdict="unexplained")
     assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
-    assert verdict_of(diagnosis)[1].startswith("A part of it is explained: A mass")
+    assert verdict_of(diagnosis)[1].startswith("A part of it looks like this: A mass")
     addition = verdict_of(replace(diagnosis, unexplained_part="damping is 2 % (+- 1 %)"))[1]
-    assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it is explained: A mass")
+    assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it looks like this: A mass")
     assert card_texts(diagnosis)[0] == "unknown"
     assert card_texts(replace(diagnosis, findings=()))[0] == "unknown"
 

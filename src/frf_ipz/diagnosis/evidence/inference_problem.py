@@ -11,6 +11,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.evidence.fit import Data, Fit
 from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis, make_hypothesis
 from frf_ipz.diagnosis.evidence.map_fit import adopt_modes, fit_map
@@ -59,6 +60,8 @@ class InferenceProblem:
         Fewer points near the axis, for score tests of small effects.
     kind : str
         What was measured: impacts of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
+    deadline : Deadline
+        When no further hypothesis is made.
     """
 
     context: ModelContext
@@ -70,9 +73,11 @@ class InferenceProblem:
     rough_data: Data
     sparse_data: Data
     kind: str
+    deadline: Deadline = NO_LIMIT
 
     def make_hypothesis(self, components: tuple[Component, ...], *, exact: bool = True) -> Hypothesis:
-        """Make a hypothesis."""
+        """Make a hypothesis; raises DeadlineError where there is no time for it."""
+        self.deadline.check()
         return make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
 
     def fit(self, components: tuple[Component, ...], values: FloatArray, *, cost_limit: float = np.inf) -> Fit:

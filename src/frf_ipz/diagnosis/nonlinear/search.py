@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import excess_delay_s
 from frf_ipz.diagnosis.nonlinear.channel_noise import read_noise
 from frf_ipz.diagnosis.nonlinear.findings import is_determined, log_evidence_gain, make_findings
@@ -154,6 +155,7 @@ def search_laws(
     laws: Sequence[Law] | None = None,
     progress: Progress = silent,
     linearity: Linearity | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> LawSearch:
     """Find the nonlinear law that explains records of different levels, and its location.
 
@@ -171,6 +173,8 @@ def search_laws(
         Called with the part that is done.
     linearity : Linearity, optional
         Result of `assess_linearity` for the records, where it is known already.
+    deadline : Deadline
+        When no further law is tried.
 
     Returns
     -------
@@ -181,6 +185,8 @@ def search_laws(
     ------
     InputError
         If the model lacks a DOF that was measured, records differ in their sampling rate, or a law is not known.
+    DeadlineError
+        If the time was over before all was tried.
     """
     progress(0.0, "comparing weak and strong records")
     linearity = assess_linearity(observations) if linearity is None else linearity
@@ -194,7 +200,9 @@ def search_laws(
     progress(0.1, "searching for a nonlinear law")
     training, held_out = _hold_out(observations)
     modal_model, noise = make_modal_model(model, observations), read_noise(observations)
-    data = LawFitData(training=training, held_out=held_out, modal_model=modal_model, noise=noise, options=options)
+    data = LawFitData(
+        training=training, held_out=held_out, modal_model=modal_model, noise=noise, options=options, deadline=deadline
+    )
     state = _search_catalogue(data, linearity, laws)
     if state.result.fit is not None and (state.result.verdict == UNEXPLAINED or not is_explained(state.result.fit)):
         progress(0.4, "checking for a dispersion of the converters")

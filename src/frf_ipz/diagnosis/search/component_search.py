@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from frf_ipz.diagnosis.deadline import DeadlineError
 from frf_ipz.diagnosis.evidence.fit import Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 from frf_ipz.diagnosis.search.global_scan import scan_beside_nuisance, scan_globally
@@ -53,12 +54,15 @@ class Ranking:
         Number of hypotheses that were scanned.
     refined : tuple of Start
         Refined starts of a global scan, by rising cost; empty where none was made.
+    is_complete : bool
+        False where the time was over before all was tried.
     """
 
     base: Fit
     fits: tuple[Fit, ...]
     n_tried: int
     refined: tuple[Start, ...] = ()
+    is_complete: bool = True
 
     @property
     def best(self) -> Fit:
@@ -110,22 +114,38 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
     Returns
     -------
     Ranking
-        All fits.
+        All fits; those that there was time for.
+
+    Raises
+    ------
+    DeadlineError
+        If there was time for none.
     """
-    n_tried, refined = 0, list[Start]()
+    n_tried, refined, is_complete = 0, list[Start](), True
     fits: Fits = {}
-    if not base.explains_nearly_all:
-        starts = scan_globally(problem, base)
-        n_tried += len(starts)
-        refined = refine_starts(problem, base, starts)
-        fits = _fit_starts(problem, base, refined)
-        if all(fit.is_far_off for fit in fits.values()):
-            _add_beside_nuisance(problem, base, fits)
-    if not base.is_far_off:
-        n_tried += _add_by_score_test(problem, base, fits)
-    if fits and (n_effects := _count_searched_effects(base, fits)):
-        search_neighbourhoods(problem, base, fits, n_effects)
-    return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=n_tried, refined=tuple(refined))
+    try:
+        if not base.explains_nearly_all:
+            starts = scan_globally(problem, base)
+            n_tried += len(starts)
+            refined = refine_starts(problem, base, starts)
+            _fit_starts(problem, base, refined, fits)
+            if all(fit.is_far_off for fit in fits.values()):
+                _add_beside_nuisance(problem, base, fits)
+        if not base.is_far_off:
+            n_tried += _add_by_score_test(problem, base, fits)
+        if fits and (n_effects := _count_searched_effects(base, fits)):
+            search_neighbourhoods(problem, base, fits, n_effects)
+    except DeadlineError:
+        if not fits:
+            raise
+        is_complete = False
+    return Ranking(
+        base=base,
+        fits=rank_fits(problem, fits.values()),
+        n_tried=n_tried,
+        refined=tuple(refined),
+        is_complete=is_complete,
+    )
 
 
 def rank_fits(problem: InferenceProblem, fits: Iterable[Fit]) -> tuple[Fit, ...]:
@@ -227,7 +247,7 @@ def keep_better(fits: Fits, fit: Fit) -> None:
         fits[key] = fit
 
 
-def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start]) -> Fits:
+def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], fits: Fits) -> None:
     """Fit with inflated errors first, and then exactly what is not far behind."""
     known = base.hypothesis.components
     halfway = refine_halfway(problem, [(known, start) for start in refined[:N_ROUGH]])
@@ -237,13 +257,11 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start]) 
             around = refine_surroundings(problem, (*known, start.component), start.values)[:N_ROUGH_AROUND]
             rough_fits += [problem.fit_roughly(*moved) for moved in around]
     rough_fits.sort(key=lambda fit: fit.cost)
-    fits: Fits = {}
     for fit in rough_fits[: count_exact_fits(rough_fits, N_EXACT)]:
         if fit.cost < COST_RATIO * rough_fits[0].cost + COST_SLACK:
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
     if not rough_fits[0].is_far_off:
         _fit_imitators(problem, rough_fits, fits)
-    return fits
 
 
 def _add_beside_nuisance(problem: InferenceProblem, base: Fit, fits: Fits) -> None:

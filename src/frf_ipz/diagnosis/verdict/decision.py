@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.deadline import DeadlineError
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.ambiguity_set import fit_distant_locations, rescore_ambiguity_set
 from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model, search_component, search_small_component
@@ -22,12 +23,19 @@ from frf_ipz.diagnosis.verdict.goodness import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
 
 PAIR_SCORE = 0.75  # of a component that explains: above, pairs are tried too; 3 of 89 single ones had more
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
+# What was not looked at, where the time was over before that step was done
+WHOLE = "any effect"
+FIRST = "all effects at all their locations, and any second effect"
+SECOND = "a second effect beside the first, and how surely the first is located"
+THIRD = "a third effect beside the two"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,6 +56,8 @@ class Decision:
         Of what was found, and of the nominal model.
     unnamed_force : Fit, optional
         Of a force outside the catalogue that explains more than what was found.
+    not_searched : str
+        What the time did not suffice for, in words; empty for a complete search.
     """
 
     verdict: str
@@ -58,67 +68,90 @@ class Decision:
     goodness: Goodness
     null_goodness: Goodness
     unnamed_force: Fit | None = None
+    not_searched: str = ""
 
 
-def decide(problem: InferenceProblem, progress: Progress) -> Decision:
+def decide(problem: InferenceProblem, progress: Progress, *, null: Fit | None = None) -> Decision:
     """Search, and decide what is missing.
 
     Parameters
     ----------
     problem : InferenceProblem
-        Data, model and effects.
+        Data, model and effects; its deadline says when the search ends.
     progress : Progress
         Receives the progress.
+    null : Fit, optional
+        Of the nominal model, where it is known.
 
     Returns
     -------
     Decision
-        The verdict and the fits that it rests on.
+        The verdict and the fits that it rests on; where the time was over, those found until then.
     """
-    progress(0.2, "fitting the nominal model")
-    null = fit_null_model(problem)
-    null_goodness = assess_goodness(problem, null)
+    decision = nothing = decide_without_search(problem, null)
+    try:
+        for step in _decide_in_steps(problem, nothing, progress):
+            decision = step
+    except DeadlineError:
+        return decision
+    return replace(decision, not_searched="")
+
+
+def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Progress) -> Iterator[Decision]:
+    """Give a decision after each step of the search, with what has not been searched at that point."""
+    yield replace(nothing, not_searched=WHOLE)
     progress(0.3, "searching for one effect")
+    null, null_goodness = nothing.null, nothing.null_goodness
     ranking = search_component(problem, null)
     required = _required_log_bayes_factor(problem, null_goodness, ranking.best)
+    first = _judge_first(problem, nothing, ranking, required)
+    yield replace(first, not_searched=SECOND if ranking.is_complete else FIRST)
+    if not ranking.is_complete:
+        raise DeadlineError
     if not null_goodness.is_good or log_bayes_factor(ranking.best, null) >= required:
         ranking = rescore_ambiguity_set(problem, ranking)
     if ranking.best.explains_nearly_all and not assess_goodness(problem, ranking.best).is_good:
         ranking = rescore_ambiguity_set(problem, fit_distant_locations(problem, ranking))
-    best = ranking.best
-    goodness = assess_goodness(problem, best)
-    first = Decision(
-        verdict=EXPLAINED,
-        null=null,
-        final=best,
-        ranking=ranking,
-        further_rankings=(),
-        goodness=goodness,
-        null_goodness=null_goodness,
-    )
-    if null_goodness.is_good and (log_bayes_factor(best, null) < required or not is_significant(best, -1)):
-        return replace(first, verdict=CONSISTENT, final=null, goodness=null_goodness)
+    first = _judge_first(problem, nothing, ranking, required)
+    yield replace(first, not_searched=SECOND)
+    if first.verdict == CONSISTENT:
+        return
     progress(0.6, "searching for a second effect")
-    if goodness.is_good:
-        return _accept_first(problem, first)
+    if first.goodness.is_good:
+        yield _accept_first(problem, first)
+        return
     second = _search_pair(problem, ranking)
-    pair_decision = _accept_further(problem, first, second)
+    whole = replace(first, verdict=EXPLAINED, final=ranking.best, goodness=assess_goodness(problem, ranking.best))
+    pair_decision = _accept_further(problem, whole, second)
     if pair_decision is None:
-        return replace(first, verdict=UNEXPLAINED, final=best if log_bayes_factor(best, null) > required else null)
-    single = _drop_needless(problem, first, pair_decision.final)
-    if single is not None:
-        return single
+        return
+    single = _drop_needless(problem, whole, pair_decision.final)
+    yield replace(single or pair_decision, not_searched=THIRD)
     if (
-        pair_decision.verdict == EXPLAINED
+        single is not None
+        or pair_decision.verdict == EXPLAINED
         or not pair_decision.final.is_nearly_right
         or log_bayes_factor(second.best, second.base) < STRONG_LOG_BAYES_FACTOR
     ):
-        return pair_decision
+        return
     progress(0.8, "searching for a third effect")
     third = _accept_further(
         problem, pair_decision, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR)
     )
-    return third if third is not None and third.verdict == EXPLAINED else pair_decision
+    if third is not None and third.verdict == EXPLAINED:
+        yield third
+
+
+def _judge_first(problem: InferenceProblem, nothing: Decision, ranking: Ranking, required: float) -> Decision:
+    """Judge the best single component; the nominal model, where that explains as much."""
+    null, best, goodness = nothing.null, ranking.best, assess_goodness(problem, ranking.best)
+    first = replace(nothing, verdict=EXPLAINED, final=best, ranking=ranking, goodness=goodness)
+    gain = log_bayes_factor(best, null)
+    if nothing.null_goodness.is_good and (gain < required or not is_significant(best, -1)):
+        return replace(first, verdict=CONSISTENT, final=null, goodness=nothing.goodness)
+    if goodness.is_good:
+        return first
+    return replace(first, verdict=UNEXPLAINED, final=best if gain > required else null)
 
 
 def _required_log_bayes_factor(problem: InferenceProblem, null_goodness: Goodness, best: Fit) -> float:
@@ -181,28 +214,28 @@ def _accept_further(problem: InferenceProblem, decision: Decision, ranking: Rank
     )
 
 
-def decide_without_search(problem: InferenceProblem) -> Decision:
+def decide_without_search(problem: InferenceProblem, null: Fit | None = None) -> Decision:
     """Decide by a fit of the nominal model alone.
 
     Parameters
     ----------
     problem : InferenceProblem
         Data and model.
+    null : Fit, optional
+        Of the nominal model, where it is known.
 
     Returns
     -------
     Decision
         Without a component: consistent, or unexplained.
     """
-    null = fit_null_model(problem)
+    null = fit_null_model(problem) if null is None else null
     goodness = assess_goodness(problem, null)
-    nothing = Ranking(base=null, fits=(), n_tried=0)
-    verdict = CONSISTENT if goodness.is_good else UNEXPLAINED
     return Decision(
-        verdict=verdict,
+        verdict=CONSISTENT if goodness.is_good else UNEXPLAINED,
         null=null,
         final=null,
-        ranking=nothing,
+        ranking=Ranking(base=null, fits=(), n_tried=0),
         further_rankings=(),
         goodness=goodness,
         null_goodness=goodness,

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.diagnosis.verdict.decision import Decision
 
+STATED_FROM = 0.3  # relative deviation of a damping ratio that is stated, however wide the tolerance: its default
 DAMPING_EFFECTS = ("damping_level", "structural_damping")
 FREE_TOLERANCE = 20.0  # relative tolerance of damping ratios: more than a factor of ten
 MAIN_PART = 0.5  # of the whole nuisance chi2
@@ -57,10 +58,24 @@ def is_damping_only(problem: InferenceProblem, decision: Decision) -> bool:
     if decision.verdict != UNEXPLAINED:
         return False
     fits = (decision.final,) if decision.final.explains_nearly_all else (decision.final, decision.null)
-    return any(_is_damping_dominant(problem, fit) for fit in fits)
+    return any(is_damping_dominant(problem, fit) for fit in fits)
 
 
-def _is_damping_dominant(problem: InferenceProblem, fit: Fit) -> bool:
+def is_damping_dominant(problem: InferenceProblem, fit: Fit) -> bool:
+    """Tell whether damping ratios are most of what a fit needs beyond the tolerances.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        Data and model.
+    fit : Fit
+        Any fit.
+
+    Returns
+    -------
+    bool
+        True where they exceed the tolerances by themselves.
+    """
     whitened_nuisance, _ = problem.nuisance_prior.whiten(fit.nuisance)
     damping_chi2 = float(np.sum(whitened_nuisance[problem.nuisance_prior.damping_indices] ** 2))
     return damping_chi2 > max(assess_goodness(problem, fit).nuisance_chi2_limit, MAIN_PART * fit.nuisance_chi2)
@@ -105,25 +120,28 @@ def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
     Parameters
     ----------
     fit : Fit
-        With free damping ratios.
+        With damping ratios as measured.
     options : DiagnoseOptions
         The stated tolerances.
 
     Returns
     -------
     str
-        In words that follow "Something is missing that nothing in the catalogue explains: ".
+        A sentence; empty where all are within the usual tolerance, or the stated one where that is smaller.
     """
     nuisance_prior, modes = fit.hypothesis.nuisance_prior, fit.hypothesis.modes(fit.values, fit.nuisance)
     changes = fit.nuisance[nuisance_prior.damping_indices] * nuisance_prior.damping_std
-    beyond = np.flatnonzero((np.abs(changes) > options.damping_tolerance) & nuisance_prior.is_stated)
+    tolerance = min(options.damping_tolerance, STATED_FROM)
+    beyond = np.flatnonzero((np.abs(changes) > tolerance) & nuisance_prior.is_stated)
+    if not len(beyond):
+        return ""
     ratios = [
         f"{100 * stated * (1 + change):.2g} % instead of {100 * stated:.2g} % at {omega / (2 * np.pi):.4g} Hz"
         for stated, change, omega in zip(
             modes.stated_ratio[beyond], np.maximum(changes[beyond], -1), modes.omega[beyond], strict=True
         )
     ]
-    return f"damping ratios are not those of the model ({', '.join(ratios)})"
+    return f"Damping is as measured, not as in the model: {', '.join(ratios)}."
 
 
 def describe_implausibility(fit: Fit) -> str:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.apply import correct_frfs, correct_model
-from frf_ipz.diagnosis.diagnose import diagnose as find_mismatch
+from frf_ipz.diagnosis.deadline import Deadline
+from frf_ipz.diagnosis.diagnose import find_causes
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
-from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.frf import FrfSet
 from frf_ipz.output_files import write_text
 
@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
+RUN_SECONDS = 60.0  # wall time of a search in a run, where the user states none
 
-def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagnosis:
+
+def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_asked: bool) -> Diagnosis:
     """Say what the model left out.
 
     Parameters
@@ -39,6 +41,8 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagn
         The FE model.
     frfs : FrfSet
         The measured FRFs.
+    is_asked : bool
+        A diagnosis is what was asked for: it takes its time, and searches whatever the misfit.
 
     Returns
     -------
@@ -46,20 +50,28 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet) -> Diagn
         The verdict and what it rests on.
     """
     inputs = runner.inputs
-    options = inputs.options.diagnose or DiagnoseOptions()
+    options = inputs.options.diagnose
+    seconds = RUN_SECONDS if options.seconds is None and not is_asked else options.seconds
+    only_where_they_differ = options.run == "auto" and not is_asked
     ingest_options = inputs.options.ingest
     band = {"fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz]}
 
     def compute(progress: Progress) -> Diagnosis:
         observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
-        return find_mismatch(
-            observations, model, options=options, effects=inputs.effects, folder=inputs.folder, progress=progress
+        return find_causes(
+            model,
+            observations,
+            EffectCatalogue(options=options, folder=inputs.folder, own=inputs.effects),
+            deadline=Deadline(seconds=seconds),
+            only_where_they_differ=only_where_they_differ,
+            progress=progress,
         )
 
     return runner.stage(
         "diagnose",
         {
-            "options": asdict(options),
+            # what a limit of time has cut is not what the search without one, or with another one, gives
+            "options": asdict(replace(options, run="auto" if only_where_they_differ else "always", seconds=seconds)),
             "effects": [repr(type(effect)) for effect in inputs.effects],
             "model": inputs.model_key,
             "after": runner.after("ingest"),
@@ -135,7 +147,7 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
     dict of str to Effect
         By name.
     """
-    options = runner.inputs.options.diagnose or DiagnoseOptions()
+    options = runner.inputs.options.diagnose
     return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
 
 

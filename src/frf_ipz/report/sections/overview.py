@@ -249,7 +249,7 @@ def _missing_card(run: Results) -> Card:
     rows = () if run.pairs is None else run.pairs.rows
     counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in PairVerdict}
     lacking = counts[PairVerdict.MISSING_IN_MODEL]
-    figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "nothing seen"
+    figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "not looked for"
     unsure = counts[PairVerdict.AMBIGUOUS]
     meaning = "measured without a counterpart" if lacking else "all identifiable poles and zeros are paired"
     meaning += f"; {unsure} are not identifiable" if unsure else ""

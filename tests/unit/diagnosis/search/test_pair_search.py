@@ -186,7 +186,7 @@ def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
         observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
     )
     assert diagnosis.verdict == "unexplained"
-    assert "damping ratios are not those of the model" in diagnosis.statement
+    assert "Damping is as measured, not as in the model" in diagnosis.statement
     assert "4 % instead of 1 %" in diagnosis.statement
     (finding,) = diagnosis.findings
     assert dict(finding.location) == {"nodes": [12]}

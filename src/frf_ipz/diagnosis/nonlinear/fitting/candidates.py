@@ -174,6 +174,7 @@ def _fit_scored(problem: LawFitProblem, laws: Sequence[Law]) -> list[LawFit]:
     selected += [score for score in scored[:OF_ALL_LAWS] if score not in selected]
     fits = []
     for score in selected:
+        problem.deadline.check()
         start = LawStart(
             law=score.law, location=score.location, strength=score.strength, shape=score.shape, nuisance=nuisance
         )
@@ -205,6 +206,7 @@ def _free_force_starts(problem: LawFitProblem, laws: Sequence[Law]) -> list[LawS
         for free in problem.localisation.forces[:BY_FREE_FORCE]
         for law in laws
     ]
+    problem.deadline.check()
     return [start for start in starts if start.strength]
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import all_locations, localise_force, neighbours
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import fit_linear
@@ -54,11 +55,14 @@ class LawFitProblem:
         The linear model.
     localisation : ForceLocalisation
         Where a force may act.
+    deadline : Deadline
+        When no further law is fitted: then DeadlineError is raised.
     """
 
     segments: SegmentSet
     linear: LinearFit
     localisation: ForceLocalisation
+    deadline: Deadline = NO_LIMIT
 
     @property
     def mean_misfit(self) -> float:
@@ -77,6 +81,7 @@ class LawFitProblem:
 
     def fit_output_error(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation, from a fit to these or other segments."""
+        self.deadline.check()
         n_structural = self.linear.nuisance_prior.n_structural
         nuisance = fit.nuisance
         if len(nuisance) != len(self.linear.nuisance) or fit.n_rows != self.linear.n_rows:
@@ -85,6 +90,7 @@ class LawFitProblem:
 
     def fit_output_error_afresh(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation from its parameters and the nominal linear model."""
+        self.deadline.check()
         start = fit.start(self.linear.start_nuisance)
         return fit_output_error(self.segments, self.linear.nuisance_prior, start, iterations=iterations)
 
@@ -103,6 +109,8 @@ class LawFitData:
         Of all records.
     options : DiagnoseOptions
         Tolerances.
+    deadline : Deadline
+        When no further law is fitted.
     dispersion_rad : float
         Dispersion of the converters that has been removed already, rad.
     """
@@ -112,6 +120,7 @@ class LawFitData:
     modal_model: ModalModel
     noise: ChannelNoise
     options: DiagnoseOptions
+    deadline: Deadline = NO_LIMIT
     dispersion_rad: float = 0.0
 
     def without_dispersion(self, dispersion_rad: float) -> LawFitData:
@@ -130,6 +139,7 @@ class LawFitData:
             segments=segments,
             linear=fit_linear(segments, nuisance_prior),
             localisation=all_locations(self.modal_model),
+            deadline=self.deadline,
         )
 
     def make_problems(self) -> tuple[LawFitProblem, LawFitProblem]:
@@ -171,6 +181,7 @@ class LawFitData:
         return max(_parabola_minimum(closer, costs_closer), 0.0)
 
     def _cost_without(self, dispersion_rad: float, long: LawFitProblem, fit: LawFit) -> float:
+        self.deadline.check()
         training = self.without_dispersion(dispersion_rad).training
         segments = cut_segments(training, self.modal_model, self.noise, long.segments.window)
         return fit_output_error(segments, long.linear.nuisance_prior, fit.start(), iterations=STEPS).cost

@@ -136,6 +136,7 @@ def fit_simple_laws(problem: LawFitProblem, location: int, n_rounds: int) -> Sim
     SimpleLawsFit
         The best round.
     """
+    problem.deadline.check()
     segments, linear = problem.segments, problem.linear
     laplace, nuisance_prior = NumericalLaplace(segments), linear.nuisance_prior
     nuisance = linear.start_nuisance

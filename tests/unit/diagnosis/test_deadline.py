@@ -1,0 +1,74 @@
+"""A search ends when its time is over, keeps what it has, and says what it did not look at."""
+
+import pytest
+
+from diagnosed import BAND_HZ, beam, measured, observed
+from frf_ipz.diagnosis.deadline import Deadline, DeadlineError
+from frf_ipz.diagnosis.diagnose import find_causes
+from frf_ipz.diagnosis.effect_selection import EffectCatalogue
+from frf_ipz.diagnosis.options import DiagnoseOptions
+
+EFFECTS = ("added_mass", "grounded_spring")
+
+
+class Clock:
+    """Each look at it takes a second: the time is that of so many hypotheses."""
+
+    def __init__(self):
+        self.looks = 0
+
+    def __call__(self):
+        self.looks += 1
+        return float(self.looks)
+
+
+@pytest.fixture
+def search(tmp_path):
+    def run(thickness_m, *, seconds=None, only_where_they_differ=False):
+        nominal = beam(tmp_path)
+        frfs = measured(beam(tmp_path, thickness_m=thickness_m))
+        clock = Clock()
+        diagnosis = find_causes(
+            nominal,
+            observed(frfs, BAND_HZ),
+            EffectCatalogue(options=DiagnoseOptions(effects=EFFECTS), folder=tmp_path),
+            deadline=Deadline(seconds=seconds, clock=clock),
+            only_where_they_differ=only_where_they_differ,
+        )
+        return diagnosis, clock.looks
+
+    return run
+
+
+def test_time_is_over_after_its_seconds():
+    clock = Clock()
+    deadline = Deadline(seconds=2.5, clock=clock)
+    deadline.check()
+    deadline.check()
+    with pytest.raises(DeadlineError):
+        deadline.check()
+
+
+def test_a_search_without_time_says_what_it_did_not_look_at(search):
+    diagnosis, looks = search(0.0052, seconds=3.0)
+    assert not diagnosis.is_complete
+    assert "any effect" in diagnosis.not_searched
+    assert diagnosis.not_searched in diagnosis.statement
+    assert diagnosis.to_json()["complete"] is False
+    assert looks < 10  # between one hypothesis and the next
+
+
+def test_a_search_that_is_cut_keeps_the_fits_it_has(search):
+    whole, looks = search(0.0052, seconds=1e9)
+    assert whole.is_complete
+    cut, _ = search(0.0052, seconds=0.9 * looks)
+    assert not cut.is_complete
+    assert cut.alternatives or cut.findings
+
+
+def test_no_cause_is_searched_for_where_nothing_differs(search):
+    diagnosis, _ = search(0.005, only_where_they_differ=True)
+    assert diagnosis.verdict == "consistent"
+    assert diagnosis.statement.startswith("Nothing missing was seen")
+    assert diagnosis.is_complete
+    assert diagnosis.numbers["hypotheses"] == 0
