@@ -424,7 +424,6 @@ def open_results(path: str | Path) -> Results:
     ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
     ... )
     >>> from pathlib import Path
-    from traceback import extract_tb
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     _ = frf_ipz.Campaign(frfs).run(Path(folder) / "results", until="fit")

@@ -58,13 +58,13 @@ def test_a_known_mass_stays_where_it_is(campaign):
 
 
 def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
-    rows = [f"{hz},{node}:+z,7:+z,{node},0.0" for node in (1, 2) for hz in (10.0, 20.0, 30.0)]
+    rows = [f"{hz},{node}:+z,7:+z,{node},0.5" for node in (1, 2) for hz in (10.0, 20.0, 30.0)]
     head = "frequency_hz,output_dof,input_dof,real,imag"
     (tmp_path / "frf.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
     write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
     frfs = estimate_frfs(read_inputs(hiding(tmp_path, "1:-z")).test, options=OPTIONS).frfs
     assert sensors(frfs) == ["2:+z"]
-    assert frfs.values[0, 0] == 2.0
+    assert frfs.values[0, 0] == 2.0 + 0.5j
 
 
 @pytest.mark.parametrize(
