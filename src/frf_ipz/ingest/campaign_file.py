@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from frf_ipz.arguments import as_path
+from frf_ipz.arguments import require_file
 from frf_ipz.dofs import Dof, as_direction, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
@@ -220,7 +220,7 @@ def read_test(path: str | Path) -> VibrationTest:
     ...     [str(label) for label in frf_ipz.read_test(f"{folder}/test.toml").labels]
     ['11:+z / 6:+z']
     """
-    path = as_path(path).resolve()
+    path = require_file(path).resolve()
     keys = read_toml(path, CampaignFileKeys, required="test")
     _check_sections(path, keys)
     channels = _read_channels(path, keys)
