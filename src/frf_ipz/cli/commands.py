@@ -129,11 +129,8 @@ def show(
     browser: Annotated[
         bool | None, typer.Option("--browser/--no-browser", help="Open the page; by default on a desktop only.")
     ] = None,
-    run_effects: Annotated[
-        bool, typer.Option("--run-effects", help="Let runs execute the files that [diagnose] extra_effects names.")
-    ] = False,
 ) -> None:
     """Open a local page on a run or a campaign: look, run, reject and pin poles; changes go to pipeline.toml."""
     from frf_ipz.cli.local_page import serve_page
 
-    serve_page(folder, port=port, browser=browser, run_effects=run_effects)
+    serve_page(folder, port=port, browser=browser)

@@ -8,7 +8,6 @@ import webbrowser
 from typing import TYPE_CHECKING
 
 from frf_ipz.cli.printing import say
-from frf_ipz.errors import InputError
 from frf_ipz.show.server import serve
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
 
 
-def serve_page(folder: Path, *, port: int, browser: bool | None, run_effects: bool = False) -> None:
+def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
     """Serve the page of a run or a campaign until the user stops it.
 
     Parameters
@@ -30,8 +29,6 @@ def serve_page(folder: Path, *, port: int, browser: bool | None, run_effects: bo
         Where to listen; 0 for any free port.
     browser : bool, optional
         Open the page in a browser; where it is left out, if there is a desktop.
-    run_effects : bool
-        Let a run execute the files of effects that its pipeline names.
 
     Raises
     ------
@@ -44,7 +41,7 @@ def serve_page(folder: Path, *, port: int, browser: bool | None, run_effects: bo
         if _has_desktop() if browser is None else browser:
             webbrowser.open(address)
 
-    serve(folder, _run if run_effects else _run_without_effects, _read, port=port, announce=announce)
+    serve(folder, _run, _read, port=port, announce=announce)
 
 
 def _run(path: Path, out: Path, *, progress: Progress) -> Results:
@@ -52,19 +49,6 @@ def _run(path: Path, out: Path, *, progress: Progress) -> Results:
     from frf_ipz.pipeline.run import run_pipeline
 
     return run_pipeline(path, out, progress=progress)
-
-
-def _run_without_effects(path: Path, out: Path, *, progress: Progress) -> Results:
-    """Run a pipeline that names no code: a folder to look at may come from anybody."""
-    from frf_ipz.pipeline.config import read_pipeline
-
-    options = read_pipeline(path).file.diagnose
-    if options is not None and options.extra_effects:
-        raise InputError(
-            f"{path}: [diagnose] extra_effects names files of code ({', '.join(options.extra_effects)}), and a run "
-            "executes them; if you trust them, stop this page and open it with --run-effects"
-        )
-    return _run(path, out, progress=progress)
 
 
 def _read(path: Path) -> PipelineInputs:
