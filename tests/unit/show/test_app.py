@@ -213,8 +213,8 @@ def test_requests_of_a_sandboxed_page_are_refused_even_with_the_token(client, be
 
 def test_code_that_a_pipeline_names_is_run_only_after_it_was_allowed(client, bench, runs):
     (bench.pipeline.parent / "own.py").write_text("raise SystemExit", encoding="utf-8")
-    with bench.pipeline.open("a", encoding="utf-8") as stream:
-        stream.write('\n[diagnose]\nextra_effects = ["own.py:Own"]\n')
+    text = bench.text().replace("[diagnose]\n", '[diagnose]\nextra_effects = ["own.py:Own"]\n')
+    bench.pipeline.write_text(text, encoding="utf-8")
     text = bench.text()
     for address, wish in (("run", {}), ("change", PIN)):
         answer = client.post(HOME + address, json=wish)
