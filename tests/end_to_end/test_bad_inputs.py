@@ -215,7 +215,7 @@ def test_a_full_disk_leaves_the_last_good_results(campaign, monkeypatch, capsys)
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     edit(campaign, "test.toml", '"15:+z"', '"15:-z"')
 
-    def full(_, path):
+    def full(_, path, **__):
         path.write_bytes(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

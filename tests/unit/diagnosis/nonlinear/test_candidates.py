@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.deadline import NO_LIMIT
 from frf_ipz.diagnosis.nonlinear.fitting import candidates
 from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import ForceLocalisation
@@ -113,7 +114,9 @@ def test_first_moments_lead_to_a_law_where_short_segments_do_not(monkeypatch, by
     """A linear model leaves 100 of the first moments, the law at location 7 leaves 10, or 90 in the last case."""
     localisation = ForceLocalisation(possible=LOCATIONS, equivalent=LOCATIONS)
     problems = {
-        name: SimpleNamespace(name=name, linear=SimpleNamespace(cost=100.0), localisation=localisation)
+        name: SimpleNamespace(
+            name=name, linear=SimpleNamespace(cost=100.0), localisation=localisation, deadline=NO_LIMIT
+        )
         for name in ("first", "short", "long")
     }
     costs = {
