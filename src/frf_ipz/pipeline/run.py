@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +17,10 @@ from frf_ipz.runs.digests import plain
 from frf_ipz.runs.folder import open_run
 from frf_ipz.runs.memory import RunMemory
 from frf_ipz.runs.results import Results, open_results
+from frf_ipz.runs.software import package_versions
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.stage_runner import RunStore
-
-PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "control")
 
 
 def run_pipeline(
@@ -119,14 +117,17 @@ def run_chain(
     Raises
     ------
     InputError
-        If a stage needs an FE model and there is none.
+        If a stage needs an FE model and there is none, or an effect of the user's ends the program.
     """
     if inputs.fe_model is None and until not in {"ingest", "fit", "report"}:
         raise InputError(f"{inputs.source}: the stage '{until}' needs an FE model; name it as [pipeline] model")
     store.manifest.update(_provenance(inputs))
-    for stage in chain(inputs, store, until=until, diagnosing=diagnosing, progress=progress):
-        if stage == until:
-            break
+    try:
+        for stage in chain(inputs, store, until=until, diagnosing=diagnosing, progress=progress):
+            if stage == until:
+                break
+    except SystemExit as error:  # nothing of the package ends the program here
+        raise InputError(f"{inputs.source}: an effect of your own ended the program (exit {error.code})") from error
 
 
 def _require_stage(until: str) -> None:
@@ -138,7 +139,7 @@ def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
     return {
         "frf_ipz": __version__,
         "python": platform.python_version(),
-        "packages": {name: version(name) for name in PACKAGES},
+        "packages": package_versions(),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
         "pipeline": inputs.source,
         "name": inputs.name,

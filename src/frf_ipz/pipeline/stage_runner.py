@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
-from frf_ipz import __version__
 from frf_ipz.errors import errors_of_arithmetic
 from frf_ipz.runs.digests import digest
+from frf_ipz.runs.software import software
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -103,7 +103,7 @@ class StageRunner:
         str
             The key.
         """
-        self.keys[name] = digest({"stage": name, "version": __version__, **depends})
+        self.keys[name] = digest({"stage": name, "software": software(), **depends})
         return self.keys[name]
 
     def stage_progress(self, name: str) -> Progress:

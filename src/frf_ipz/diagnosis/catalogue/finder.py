@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frf_ipz.diagnosis import catalogue
 from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.input_files import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,9 +77,10 @@ def _load(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise InputError(f"{WHERE}: {path} is no Python file")
     module = util.module_from_spec(spec)
+    source = read_bytes(path)
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file may raise
+        exec(compile(source, str(path), "exec"), module.__dict__)  # the text itself: a cached one may be older
+    except (Exception, SystemExit) as error:  # whatever a user's file may raise
         raise InputError(f"{WHERE}: {path} cannot be loaded: {type(error).__name__}: {error}") from error
     return module
 
