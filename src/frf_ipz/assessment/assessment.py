@@ -102,6 +102,11 @@ class LikelyCause:
     line_or_key: str
     probability: float
 
+    @property
+    def place(self) -> str:
+        """Where to correct, and how sure that is, for people."""
+        return f"{self.file}, {self.line_or_key}; probability {self.probability:.2f}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment(Tabulated):
@@ -129,8 +134,13 @@ class Assessment(Tabulated):
     likely_cause: LikelyCause | None = None
 
     def __repr__(self) -> str:
-        costly = [check.name for check in self.checks if check.verdict is not Verdict.USABLE]
+        costly = [check.name for check in self.costly]
         return f"Assessment: {self.verdict.value}" + (f", because of {', '.join(costly)}" if costly else "")
+
+    @property
+    def costly(self) -> tuple[Check, ...]:
+        """The checks that cost the verdict, the worst first."""
+        return tuple(check for check in self.checks if check.verdict is not Verdict.USABLE)
 
     @classmethod
     def of_checks(cls, checks: list[Check], likely_cause: LikelyCause | None = None) -> Assessment:

@@ -126,6 +126,8 @@ def run_chain(
         for stage in chain(inputs, store, until=until, diagnosing=diagnosing, progress=progress):
             if stage == until:
                 break
+        if store.is_stale("assess"):
+            store.manifest.pop("assessment", None)  # it was said of results that are no more
     except SystemExit as error:  # nothing of the package ends the program here
         raise InputError(f"{inputs.source}: an effect of your own ended the program (exit {error.code})") from error
 

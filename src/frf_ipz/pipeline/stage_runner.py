@@ -30,7 +30,7 @@ NEEDS = {
     "pair": ("fit", "reduce"),
     "update": ("pair",),
     "predict": ("update",),
-    "assess": ("predict", "diagnose"),
+    "assess": ("predict", "diagnose", "reference"),
     "export": ("update",),
 }
 

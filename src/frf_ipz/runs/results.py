@@ -275,8 +275,8 @@ class Results:
 
     @cached_property
     def assessment(self) -> Assessment | None:
-        """Whether the result can be used: verdict, checks and likely cause."""
-        return self._load("assess")  # type: ignore[no-any-return]
+        """Whether the result can be used: verdict, checks, likely cause; None where that was said of older results."""
+        return None if "assess" in self.stale else self._load("assess")
 
     @cached_property
     def state_space_arrays(self) -> StateSpaceModel | None:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.assessment.assessment import Verdict
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.visible_text import one_line
@@ -53,7 +52,7 @@ def summarise(results: Results) -> str:
         "export": (results.state_space_arrays, state_space_lines),
     }
     lines = [results.name]
-    if results.assessment is not None and "assess" not in results.stale:
+    if results.assessment is not None:
         lines += [f"{title:<12}{text}" for title, text in assessment_lines(results.assessment)]
     for stage, (result, write) in writers.items():
         if result is not None:
@@ -79,12 +78,11 @@ def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    costly = [check for check in assessment.checks if check.verdict is not Verdict.USABLE]
+    costly = assessment.costly
     lines = [("verdict", assessment.verdict.value)]
     cause = assessment.likely_cause
     if cause is not None:
-        place = f"{cause.file}, {cause.line_or_key}; probability {cause.probability:.2f}"
-        lines.append(("cause", f"{cause.says} ({place})"))
+        lines.append(("cause", f"{cause.says} ({cause.place})"))
     for check in costly[:MOST_CHECKS]:
         advice = f": {check.advice}" if check.advice and cause is None else ""
         lines.append(("because" if check is costly[0] else "", check.says + advice))

@@ -116,9 +116,11 @@ def assess(
     """
     inputs = runner.inputs
     named = {"test_file": inputs.test.path.name, "model_file": Path(next(iter(inputs.model_names), "FE model")).name}
+    optional = {"diagnose": diagnosis, "reference": inputs.reference}
+    rests_on = ("predict", *(name for name, result in optional.items() if result is not None))
     assessment = runner.stage(
         "assess",
-        {"after": runner.after("predict", *(["diagnose"] if diagnosis is not None else [])), **named},
+        {"after": runner.after(*rests_on), **named},
         lambda _: judge_run(
             Evidence(
                 frfs=frfs,
