@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.fe.response import compute_frfs
-from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.prediction.predict import band_of_magnitudes
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
@@ -115,13 +115,10 @@ class Evidence:
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
         """90 % band of the updated model's magnitudes at the measured points, two (n_lines, n_frfs) arrays."""
-        outputs = tuple(dict.fromkeys(label.output_dof.unsigned for label in self.frfs.labels))
-        frequency_hz = self.frfs.frequency_hz[self.lines]
-        predicted = predict_frfs(self.fit, self.updated_model, points=outputs, frequency_hz=frequency_hz)
-        places = {(label.output_dof.name, label.input_dof.name): place for place, label in enumerate(predicted.labels)}
-        columns = [places[label.output_dof.name, label.input_dof.name] for label in self.frfs.labels]
+        s = np.asarray(2j * np.pi * self.frfs.frequency_hz[self.lines], np.complex128)
+        low, high = band_of_magnitudes(self.fit, self.updated_model, self.frfs.labels, s)
         sizes = np.abs(self.gains)
-        return predicted.magnitude_low[:, columns] * sizes, predicted.magnitude_high[:, columns] * sizes
+        return low * sizes, high * sizes
 
     def _unscaled(self, model: ReducedModel) -> ComplexArray:
         return compute_frfs(model, self.frfs.labels, self.frfs.s[self.lines])

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from frf_ipz.option_types import NotNegative, Seed
 from frf_ipz.toml_files import STRICT, check_values
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,3 +68,18 @@ class DiagnoseOptions:
 
     def __post_init__(self) -> None:
         check_values(self)
+
+    def effect_files(self, folder: Path) -> tuple[Path, ...]:
+        """List the user's own files of effects, each once.
+
+        Parameters
+        ----------
+        folder : Path
+            Where paths start.
+
+        Returns
+        -------
+        tuple of Path
+            They need not be there.
+        """
+        return tuple(dict.fromkeys(folder / reference.rpartition(":")[0] for reference in self.extra_effects))

@@ -109,7 +109,9 @@ def read_inputs(path: Path) -> PipelineInputs:
             where="key 'predict.points'",
         )
     files_of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
-    files_of_model = (*files_of_model, *_effect_files(pipeline))
+    # what was found by other code of the user's is not what this one finds
+    effects = (file for file in pipeline.file.diagnose.effect_files(pipeline.path.parent) if file.is_file())
+    files_of_model = (*files_of_model, *effects)
     aside = pipeline.reference_path
     files = [pipeline.path, pipeline.test_path, *test.files, *files_of_model, *([] if aside is None else [aside])]
     return PipelineInputs(
@@ -126,13 +128,6 @@ def read_inputs(path: Path) -> PipelineInputs:
         reference=None if aside is None else read_frfs(aside, quantity=test.labels[0].quantity),
         reference_name="" if aside is None else str(aside),
     )
-
-
-def _effect_files(pipeline: Pipeline) -> list[Path]:
-    """List the user's own files of effects: what was found by other code is not what this one finds."""
-    references = pipeline.file.diagnose.extra_effects
-    paths = [pipeline.path.parent / reference.rpartition(":")[0] for reference in references]
-    return [path for path in dict.fromkeys(paths) if path.is_file()]
 
 
 def complete_model(fe_model: StructuralModel, test: VibrationTest, points: Sequence[Dof]) -> StructuralModel:

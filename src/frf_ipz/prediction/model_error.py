@@ -3,8 +3,9 @@
 At every line, what the updated model misses of the measured FRFs, beyond the spread of its ensemble and the noise of
 the fit, is divided by the size of the FRF: the sum of the moduli of its modes' contributions, which does not vanish at
 zeros. The mean square over the measured FRFs is the relative size of the error there; that of an FRF which was not
-measured is as large in relation to its own size. The mean square of n complex numbers is uncertain by itself, so that
-the error has a Student distribution with 2 n degrees of freedom.
+measured is as large in relation to its own size. The mean square of n independent complex numbers is uncertain by
+itself, so that the error has a Student distribution with 2 n degrees of freedom; n is the number of sensors or of
+excited DOFs, whichever are fewer, for what is wrong at one of them is so in all its FRFs.
 
 [Kennedy2001]: M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical
 Society B 63 (2001) 425-464 (doi:10.1111/1467-9868.00294), for a discrepancy beside the parameters.

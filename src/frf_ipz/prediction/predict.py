@@ -27,7 +27,6 @@ from frf_ipz.updating.updated_model import UpdatedModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.prediction.model_error import ModelError
     from frf_ipz.structure import ReducedModel
 
 BAND = (0.05, 0.95)
@@ -97,12 +96,8 @@ def predict_frfs(
     predicted = tuple(FrfLabel(point, dof, labels[0].quantity) for point in as_dofs(points) for dof in input_dofs)
     s: ComplexArray = np.asarray(2j * np.pi * frequency_hz)
     band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
-    lowest = float(np.abs(s[s != 0]).min())
-    ensemble = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
-    error = None
-    if isinstance(measured, ModalFit) and len(updated.ensemble):
-        error = estimate_model_error(measured, updated, ensemble, s)
-    low, high = _magnitude_bands(updated, ensemble, predicted, s, error)
+    ensemble = _ensemble(updated, s)
+    low, high = _magnitude_bands(measured, updated, ensemble, predicted, s)
     zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
     warnings = tuple(
         explain_wide_band(band, updated.model, ensemble, labels, predicted[band.frf], frequency_hz, zeros)
@@ -126,15 +121,40 @@ def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) 
     return compute_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
 
 
+def band_of_magnitudes(
+    measured: Measured, updated_model: UpdatedModel, labels: Sequence[FrfLabel], s: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Give the 90 % band of FRFs of an updated model, without the rest of a prediction.
+
+    Parameters
+    ----------
+    measured : ModalFit or FrfSet
+        What was measured.
+    updated_model : UpdatedModel
+        The updated model.
+    labels : sequence of FrfLabel
+        Which FRFs.
+    s : (n_lines,) complex array
+        Lines, rad/s; not all 0.
+
+    Returns
+    -------
+    low, high : (n_lines, n_frfs) array
+        Of the magnitudes; NaN where the method of updating gives no ensemble.
+    """
+    return _magnitude_bands(measured, updated_model, _ensemble(updated_model, s), labels, s)
+
+
+def _ensemble(updated: UpdatedModel, s: ComplexArray) -> ModelEnsemble:
+    return ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=float(np.abs(s[s != 0]).min()))
+
+
 def _magnitude_bands(
-    updated: UpdatedModel,
-    ensemble: ModelEnsemble,
-    labels: Sequence[FrfLabel],
-    s: ComplexArray,
-    error: ModelError | None,
+    measured: Measured, updated: UpdatedModel, ensemble: ModelEnsemble, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
+        error = estimate_model_error(measured, updated, ensemble, s) if isinstance(measured, ModalFit) else None
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         for number, label in enumerate(labels):
             output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)

@@ -53,9 +53,8 @@ def find_code(file: PipelineFile, folder: Path) -> OwnCode | None:
     InputError
         If a file that it names cannot be read.
     """
-    names = () if file.diagnose is None else file.diagnose.extra_effects
+    names = file.diagnose.extra_effects
     if not names:
         return None
-    paths = [folder / name.rpartition(":")[0] for name in names]
-    contents = [digest_file(path) if path.is_file() else "" for path in paths]
+    contents = [digest_file(path) if path.is_file() else "" for path in file.diagnose.effect_files(folder)]
     return OwnCode(names=names, digest=digest({"names": names, "contents": contents, "folder": str(folder)}))

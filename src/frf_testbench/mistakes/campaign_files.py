@@ -56,6 +56,13 @@ class CampaignFiles:
         return re.findall(r'role = "output"[^\[]*?dof = "([^"]+)"', self.test)
 
     @property
+    def channels_and_records(self) -> tuple[str, str]:
+        """``test.toml`` up to its first ``[[hit]]`` or ``[[record]]``, and from there on."""
+        start = re.search(r"^\[\[(?:hit|record)\]\]", self.test, re.MULTILINE)
+        place = len(self.test) if start is None else start.start()
+        return self.test[:place], self.test[place:]
+
+    @property
     def excited_dofs(self) -> list[str]:
         """DOFs of the hits or records."""
         return re.findall(r'\[\[(?:hit|record)\]\]\ndof = "([^"]+)"', self.test)

@@ -101,24 +101,19 @@ def _exchange_sensors(files: CampaignFiles, rng: np.random.Generator) -> bool:
     dofs = [f'dof = "{dof}"' for dof in files.sensor_dofs]
     if len(dofs) < 2:
         return False
-    first, second = rng.choice(len(dofs), 2, replace=False)
-    head, tail = files.test.split("[[hit]]" if "[[hit]]" in files.test else "[[record]]", 1)
-    table = "[[hit]]" if "[[hit]]" in files.test else "[[record]]"
-    head = _swapped(head, dofs[int(first)], dofs[int(second)])
-    files.edit_test(lambda _: head + table + tail)
+    channels, records = files.channels_and_records
+    first, second = rng.choice(dofs, 2, replace=False)
+    files.edit_test(lambda _: _swapped(channels, str(first), str(second)) + records)
     return True
 
 
 def _exchange_excited(files: CampaignFiles, rng: np.random.Generator) -> bool:
-    dofs = files.excited_dofs
+    dofs = [f'dof = "{dof}"' for dof in files.excited_dofs]
     if len(dofs) < 2:
         return False
-    first, second = rng.choice(len(dofs), 2, replace=False)
-    place = re.search(r"\[\[(hit|record)\]\]", files.test)
-    if place is None:
-        return False
-    head, tail = files.test[: place.start()], files.test[place.start() :]
-    files.edit_test(lambda _: head + _swapped(tail, f'dof = "{dofs[int(first)]}"', f'dof = "{dofs[int(second)]}"'))
+    channels, records = files.channels_and_records
+    first, second = rng.choice(dofs, 2, replace=False)
+    files.edit_test(lambda _: channels + _swapped(records, str(first), str(second)))
     return True
 
 

@@ -6,20 +6,11 @@ import numpy as np
 import pytest
 
 import frf_ipz
+from clamped_beam import BEAM
 from frf_ipz.assessment.causes.cause import Situation
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
 
-BEAM = {
-    "length_m": 0.5,
-    "width_m": 0.02,
-    "thickness_m": 0.005,
-    "youngs_modulus_Pa": 70e9,
-    "density_kg_m3": 2700,
-    "elements": 20,
-    "left": "clamped",
-    "modal_ratio": 0.005,
-}
 OUTPUTS, INPUTS = ("8:+z", "15:+z", "21:+z"), ("11:+z", "19:+z")
 LINES = np.arange(5.0, 900.0, 0.5)
 NOISE = 1e-3  # of the root mean square of an FRF

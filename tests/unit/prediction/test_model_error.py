@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 
 import frf_ipz
+from clamped_beam import BEAM
 
-BEAM = {
-    "length_m": 0.5,
-    "width_m": 0.02,
-    "thickness_m": 0.005,
-    "youngs_modulus_Pa": 70e9,
-    "density_kg_m3": 2700,
-    "elements": 20,
-    "left": "clamped",
-    "modal_ratio": 0.005,
-}
 LINES = np.arange(5.0, 700.0, 0.5)
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
 NOISE = 1e-3  # of the root mean square of an FRF

@@ -15,6 +15,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.identification.results.shapes import product_factors
+from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -107,16 +109,12 @@ def measured_modes(fit: ModalFit) -> MeasuredModes:
     MeasuredModes
         Of the band.
     """
-    poles = fit.model.poles[: fit.n_modes]
-    powers = np.array([label.quantity.power for label in fit.labels])
-    signs = np.array([label.sign for label in fit.labels])
-    delays = np.exp(-poles[:, None] * fit.model.delay_s)
-    to_products = signs * 2j * poles.imag[:, None] * delays / poles[:, None] ** powers
+    factors = product_factors(fit)
     deviations = np.sqrt(np.maximum(np.trace(fit.residue_covariance, axis1=2, axis2=3), 0.0))
     return MeasuredModes(
-        frequency_hz=np.abs(poles) / (2 * np.pi),
-        products=fit.model.residues[: fit.n_modes] * to_products,
-        deviations=deviations * np.abs(to_products),
+        frequency_hz=natural_frequency_hz(fit.model.poles[: fit.n_modes]),
+        products=fit.model.residues[: fit.n_modes] * factors,
+        deviations=deviations * np.abs(factors),
         labels=fit.labels,
         band_hz=fit.band_hz,
     )
@@ -168,22 +166,6 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
     alone = np.setdiff1d(np.arange(len(frequency_hz)), columns)
     not_measured = np.minimum(_costs_of_silence(measured, frequency_hz[alone], products[alone]), most)
     return float(-costs[rows, columns].sum() - (len(costs) - len(rows)) * most - not_measured.sum())
-
-
-def assign(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> tuple[IntArray, IntArray]:
-    """Assign a computed mode to each measured one.
-
-    Parameters
-    ----------
-    measured, frequency_hz, products
-        As for `log_likelihood`.
-
-    Returns
-    -------
-    pair of (n,) int array
-        Measured modes and their computed ones.
-    """
-    return _assign(_costs(measured, frequency_hz, products), _cost_of_no_counterpart(products.shape[1]))
 
 
 def _assign(costs: FloatArray, most: float) -> tuple[IntArray, IntArray]:

@@ -73,17 +73,36 @@ def driving_points(labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
     )
 
 
+def product_factors(fit: ModalFit) -> ComplexArray:
+    """Give what makes products of mode shapes, ``phi_output phi_input``, out of the residues of a fit.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    (n_modes, n_frfs) complex array
+        2 i omega_d over what the quantity, the delay, the gain and the signs of the labels have put into a residue.
+    """
+    poles = fit.model.poles[: fit.n_modes, None]
+    powers = np.array([label.quantity.power for label in fit.labels])
+    signs = np.array([label.sign for label in fit.labels])
+    receptance = np.exp(-poles * fit.model.delay_s) / poles**powers / fit.gain
+    return np.asarray(signs * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance)
+
+
 def _residue_matrices(
     fit: ModalFit, poles: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...]
 ) -> tuple[ComplexArray, BoolArray]:
     """Give 2 i omega_d times the receptances' residues, (n_modes, n_outputs, n_inputs), and what was measured."""
     matrices = np.zeros((len(poles), len(outputs), len(inputs)), complex)
     measured = np.zeros((len(outputs), len(inputs)), bool)
+    products = fit.model.residues[: len(poles)] * product_factors(fit)
     for column, label in enumerate(fit.labels):
         entry = outputs.index(label.output_dof.unsigned), inputs.index(label.input_dof.unsigned)
-        delay = np.exp(-poles * fit.model.delay_s[column])
-        receptance = fit.model.residues[: len(poles), column] * delay / poles**label.quantity.power / fit.gain[column]
-        matrices[:, *entry] = label.sign * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance
+        matrices[:, *entry] = products[:, column]
         measured[entry] = True
     return matrices, measured
 

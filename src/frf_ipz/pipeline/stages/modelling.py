@@ -153,7 +153,7 @@ def update(
         If the parameters are to be those of a diagnosis that is not applied.
     """
     options, stated = runner.inputs.options.update, runner.inputs.options.diagnose
-    tolerance = stated.position_tolerance_m_per_m if stated and corrected_by else 0.0
+    tolerance = stated.position_tolerance_m_per_m if corrected_by else 0.0
     sensors = unweighed_sensors(runner.inputs.test, modal_fit.labels)
     nominal = runner.inputs.fe_model
     if options.parameters == "diagnosis" and corrected_by is None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Verdict
+from frf_ipz.assessment.evidence import fitted_gains
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.prediction.agreement import compare_frfs
@@ -18,7 +19,6 @@ from frf_ipz.runs.picture_data import fitted_lines, model_values, update_targets
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.runs.results import Results
     from frf_ipz.updating.targets import Target
@@ -102,9 +102,8 @@ def assessment_sentence(assessment: Assessment) -> str:
     word = VERDICTS[assessment.verdict]
     cause = assessment.likely_cause
     if cause is not None:
-        place = f"{cause.file}, {cause.line_or_key}; probability {cause.probability:.2f}"
-        return f"{word}: most likely {cause.says} ({place})."
-    costly = [check for check in assessment.checks if check.verdict is not Verdict.USABLE]
+        return f"{word}: most likely {cause.says} ({cause.place})."
+    costly = assessment.costly
     return f"{word}: {costly[0].says}." if costly else f"{word}: all checks are within their limits."
 
 
@@ -128,7 +127,7 @@ def _checks(run: Results) -> list[Table]:
             caption="What the verdict rests on",
             columns=("check", "verdict", "figure", "limit", "where"),
             rows=rows,
-            marked=frozenset(place for place, check in enumerate(checks) if check.verdict is not Verdict.USABLE),
+            marked=frozenset(range(len(run.assessment.costly))),  # the worst stand first
             file="run.json",
         )
     ]
@@ -137,9 +136,9 @@ def _checks(run: Results) -> list[Table]:
 def _figure(value: float, unit: str) -> str:
     if not np.isfinite(value):
         return ""
-    return (
-        percent(value, 2) if unit == "1" and value <= 1 else f"{number(value, 2)} {'' if unit == '1' else unit}".strip()
-    )
+    if unit == "1":
+        return percent(value, 2) if value <= 1 else number(value, 2)
+    return f"{number(value, 2)} {unit}".strip()
 
 
 def _of_update(run: Results) -> str:
@@ -215,7 +214,7 @@ def _measured_card(run: Results) -> Card:
     for model in (updated.nominal, updated.model):
         values = model_values(run, model)
         if frfs.unknown_scale != "none":
-            values = values * _gains(values, measured)
+            values = values * fitted_gains(values, measured)
         decibels.append(number(float(np.median(compare_frfs(measured, values).median_db)), 2))
         errors.append(percent(float(np.linalg.norm(measured - values) / np.linalg.norm(measured)), 2))
     scaled = frfs.unknown_scale != "none"
@@ -223,14 +222,6 @@ def _measured_card(run: Results) -> Card:
     meaning += "; unknown gains are fitted" if scaled else f"; of the FRFs' norm: {errors[0]} → {errors[1]}"
     meaning += "; nothing was measured at the points of interest" if run.points else ""
     return Card("Error at the measured points", f"{decibels[0]} → {decibels[1]} dB", meaning)
-
-
-def _gains(values: ComplexArray, measured: ComplexArray) -> FloatArray:
-    """Give the real factor of each FRF that brings it to the measured one on most lines."""
-    tiny = np.finfo(float).tiny
-    ratio = np.median(np.log(np.maximum(np.abs(measured), tiny) / np.maximum(np.abs(values), tiny)), axis=0)
-    sign = np.sign(np.sum((values.conj() * measured).real, axis=0))
-    return np.asarray(sign * np.exp(ratio))
 
 
 def _target_card(run: Results) -> Card:
