@@ -33,8 +33,9 @@ def predict(machine, *, seed=0):
     reduced = frf_ipz.reduce_model(fit, model, points=[POINT])
     updated = frf_ipz.update_model(fit, reduced, fe_model=model)
     prediction = frf_ipz.predict_frfs(fit, updated, points=[POINT])
+    by_ensemble = frf_ipz.predict_frfs(frfs, updated, points=[POINT], frequency_hz=prediction.frequency_hz)
     truth = frf_ipz.compute_frfs(machine, labels([POINT]), 2j * np.pi * prediction.frequency_hz)
-    return prediction, np.abs(truth)
+    return prediction, by_ensemble, np.abs(truth)
 
 
 def share_inside(prediction, truth):
@@ -58,12 +59,14 @@ def lacking():
 
 
 def test_a_model_that_can_express_the_measurement_keeps_a_narrow_band(sound):
-    prediction, truth = sound
+    prediction, by_ensemble, truth = sound
     assert share_inside(prediction, truth) > 0.75
     assert half_width_db(prediction) < 0.05
+    assert half_width_db(prediction) < 1.2 * half_width_db(by_ensemble)
 
 
 def test_a_model_that_lacks_a_mass_has_a_band_that_holds_the_truth(lacking, sound):
-    prediction, truth = lacking
-    assert share_inside(prediction, truth) > 0.75
+    prediction, by_ensemble, truth = lacking
+    assert share_inside(prediction, truth) > 0.9 > share_inside(by_ensemble, truth)
+    assert half_width_db(prediction) > 1.2 * half_width_db(by_ensemble)
     assert half_width_db(prediction) > 3 * half_width_db(sound[0])

@@ -1,0 +1,200 @@
+"""Each check sees what it is there for, says where, and leaves a sound run alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import frf_ipz
+from clamped_beam import BEAM
+from frf_ipz.assessment.assess import assess
+from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
+from frf_ipz.assessment.evidence import Evidence, fitted_gains
+from frf_ipz.pairing.pairs import PairVerdict
+
+OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
+LINES = np.arange(5.0, 700.0, 0.5)
+NOISE = 1e-3  # of the root mean square of an FRF
+USABLE, WITH_CARE, NOT_USABLE = frf_ipz.Verdict
+
+
+def labels(outputs):
+    return [frf_ipz.FrfLabel(output, source, "accelerance") for output in outputs for source in INPUTS]
+
+
+@pytest.fixture(scope="module")
+def evidence():
+    """A sound run: the machine is 2 % stiffer than its model."""
+    machine = frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71.4e9})
+    values = frf_ipz.compute_frfs(machine, labels(OUTPUTS), 2j * np.pi * LINES)
+    std = NOISE * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    rng = np.random.default_rng(0)
+    noisy = values + std / np.sqrt(2) * (rng.normal(size=values.shape) + 1j * rng.normal(size=values.shape))
+    variance = np.broadcast_to(std**2, values.shape)[:, :, None]
+    frfs = frf_ipz.FrfSet.from_arrays(LINES, noisy[:, :, None], outputs=OUTPUTS, inputs=INPUTS, variance=variance)
+    fit = frf_ipz.fit_modes(frfs)
+    model = frf_ipz.make_beam(**BEAM)
+    reduced = frf_ipz.reduce_model(fit, model, points=[POINT])
+    pairs = frf_ipz.pair_roots(fit, reduced)
+    updated = frf_ipz.update_model(fit, reduced, fe_model=model)
+    predicted = frf_ipz.predict_frfs(fit, updated, points=[POINT])
+    return Evidence(frfs=frfs, fit=fit, fe_model=model, pairs=pairs, updated_model=updated, prediction=predicted)
+
+
+def the(ask, evidence):
+    (check,) = ask(evidence)
+    return check
+
+
+def with_frf(evidence, column, factor, **changed):
+    """The run with one FRF measured otherwise."""
+    factors = np.where(np.arange(len(OUTPUTS)) == column, factor, 1.0)
+    frfs = replace(evidence.frfs, values=evidence.frfs.values * factors, variance=evidence.frfs.variance, **changed)
+    return replace(evidence, frfs=frfs)
+
+
+def reference(evidence, factor):
+    values = evidence.prediction.values * factor
+    frequency_hz = evidence.prediction.frequency_hz
+    return frf_ipz.FrfSet.from_arrays(frequency_hz, values[:, :, None], outputs=[POINT], inputs=INPUTS)
+
+
+def test_a_sound_run_is_usable(evidence):
+    found = assess(evidence)
+    assert found.verdict is USABLE
+    assert found.costly == ()
+    assert found.likely_cause is None
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict", "decibels"), [(1.05, USABLE, 0.42), (1.2, WITH_CARE, 1.58), (2.0, NOT_USABLE, 6.02)]
+)
+def test_an_amplitude_that_is_off_is_seen_at_its_frf(evidence, factor, verdict, decibels):
+    check = the(agreement.amplitude, with_frf(evidence, 1, factor))
+    assert check.verdict is verdict
+    assert check.figure == pytest.approx(decibels, abs=0.02)
+    assert check.where == "16:+z / 12:+z" or verdict is USABLE
+
+
+@pytest.mark.parametrize(
+    ("degrees", "verdict", "is_reversed"), [(3.0, USABLE, False), (10.0, WITH_CARE, False), (180.0, NOT_USABLE, True)]
+)
+def test_a_phase_that_is_off_is_seen_at_its_frf(evidence, degrees, verdict, is_reversed):
+    check = the(agreement.phase, with_frf(evidence, 2, np.exp(1j * np.radians(degrees))))
+    assert check.verdict is verdict
+    assert check.figure == pytest.approx(degrees, abs=0.3)
+    assert ("its sign is reversed" in check.says) == ("turn the sign" in check.advice) == is_reversed
+
+
+def test_an_update_that_made_it_worse_is_seen(evidence):
+    assert the(agreement.improvement, evidence).verdict is USABLE
+    updated = evidence.updated_model
+    worse = replace(updated, model=replace(updated.nominal, stiffness=1.3 * updated.nominal.stiffness))
+    check = the(agreement.improvement, replace(evidence, updated_model=worse))
+    assert check.verdict is WITH_CARE
+    assert check.figure > check.limit
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, USABLE), (3.0, WITH_CARE), (1 / 3, WITH_CARE)])
+def test_a_band_that_does_not_hold_what_was_measured_is_seen(evidence, factor, verdict):
+    check = the(agreement.own_band, with_frf(evidence, 0, factor))
+    assert check.verdict is verdict
+    assert check.figure == pytest.approx(1.0 if factor == 1.0 else 2 / 3, abs=0.1)
+    assert check.where == "9:+z / 12:+z" or verdict is USABLE
+
+
+def without_counterpart(evidence, kind, count):
+    """The run with the first rows of a kind missing in the model."""
+    rows, left = [], count
+    for row in evidence.pairs.rows:
+        is_lacking = left > 0 and row.kind == kind and row.verdict is PairVerdict.PAIRED
+        rows.append(replace(row, verdict=PairVerdict.MISSING_IN_MODEL) if is_lacking else row)
+        left -= is_lacking
+    return replace(evidence, pairs=replace(evidence.pairs, rows=tuple(rows)))
+
+
+@pytest.mark.parametrize(("count", "verdict"), [(0, USABLE), (1, WITH_CARE), (3, NOT_USABLE)])
+def test_modes_that_the_model_lacks_are_seen(evidence, count, verdict):
+    assert evidence.fit.n_modes == 4
+    check = the(counterparts.modes, without_counterpart(evidence, "pole", count))
+    assert check.verdict is verdict
+    assert check.figure == pytest.approx(1 - count / 4)
+    assert check.where.count("Hz") == (count > 0)
+
+
+def test_zeros_that_the_model_lacks_are_seen(evidence):
+    assert the(counterparts.zeros, evidence).verdict is USABLE
+    assert the(counterparts.zeros, without_counterpart(evidence, "zero", 100)).verdict is WITH_CARE
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, USABLE), (1.05, WITH_CARE), (1.2, WITH_CARE), (2.0, NOT_USABLE)])
+def test_a_reference_is_believed(evidence, factor, verdict):
+    check = the(prediction.reference, replace(evidence, reference=reference(evidence, factor)))
+    assert check.verdict is verdict  # 5 % is near enough, but far outside of the band
+    assert check.figure == pytest.approx(20 * np.log10(factor), abs=1e-6)
+    assert list(prediction.reference(evidence)) == []
+
+
+@pytest.mark.parametrize(("half_width_db", "verdict"), [(0.5, USABLE), (2.0, WITH_CARE), (4.0, NOT_USABLE)])
+def test_a_wide_band_is_seen(evidence, half_width_db, verdict):
+    values, factor = np.abs(evidence.prediction.values), 10 ** (half_width_db / 20)
+    wide = replace(evidence.prediction, magnitude_low=values / factor, magnitude_high=values * factor)
+    check = the(prediction.band_width, replace(evidence, prediction=wide))
+    assert (check.verdict, check.figure) == (verdict, pytest.approx(half_width_db))
+    nothing = np.full(values.shape, np.nan)
+    unknown = replace(evidence.prediction, magnitude_low=nothing, magnitude_high=nothing)
+    assert the(prediction.band_width, replace(evidence, prediction=unknown)).verdict is WITH_CARE
+
+
+def test_a_misfit_far_above_the_noise_is_seen(evidence):
+    assert the(quality.fit, evidence).verdict is USABLE
+    misfit = evidence.fit.misfit.assign(ratio=[1.0] * (len(evidence.fit.misfit) - 1) + [20.0])
+    check = the(quality.fit, replace(evidence, fit=replace(evidence.fit, misfit=misfit)))
+    assert (check.verdict, check.figure) == (WITH_CARE, 20.0)
+
+
+@pytest.mark.parametrize(("ratio", "verdict"), [(0.6, USABLE), (0.4, WITH_CARE), (2.5, WITH_CARE)])
+def test_changes_that_no_tolerance_explains_are_seen(evidence, ratio, verdict):
+    parts = pd.DataFrame({"kind": ["element"] * 2, "name": ["1", "2"], "stiffness_ratio": [1.0, ratio]})
+    changed = replace(evidence, updated_model=replace(evidence.updated_model, parts=parts))
+    check = the(quality.parameters, changed)
+    assert (check.verdict, check.where) == (verdict, "2")
+
+
+def test_an_update_without_targets_is_no_use(evidence):
+    assert list(quality.targets(evidence)) == []
+    nothing = replace(evidence.updated_model, before=np.zeros(0, complex), after=np.zeros(0, complex))
+    assert the(quality.targets, replace(evidence, updated_model=nothing)).verdict is NOT_USABLE
+
+
+def test_an_unknown_scale_is_fitted_and_said(evidence):
+    relative = with_frf(evidence, 1, -7.0, unknown_scale="per_channel")
+    assert the(quality.scale, relative).verdict is WITH_CARE
+    assert the(agreement.amplitude, relative).verdict is the(agreement.phase, relative).verdict is USABLE
+    assert the(agreement.own_band, relative).verdict is USABLE
+    assert list(quality.scale(evidence)) == []
+    np.testing.assert_allclose(fitted_gains(evidence.updated, -7.0 * evidence.updated), -7.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("found", "verdict"),
+    [(None, USABLE), ("consistent", USABLE), ("explained", USABLE), ("unexplained", WITH_CARE)],
+)
+def test_what_a_diagnosis_found_is_said(evidence, found, verdict):
+    class Found:
+        pass
+
+    Found.verdict = found
+    check = the(quality.diagnosis, replace(evidence, diagnosis=None if found is None else Found()))
+    assert check.verdict is verdict
+    assert ("not looked for" in check.says) == (found is None)
+
+
+def test_the_worst_check_stands_first():
+    checks = [frf_ipz.Check(name=verdict.value, verdict=verdict) for verdict in (USABLE, NOT_USABLE, WITH_CARE)]
+    found = frf_ipz.Assessment.of_checks(checks)
+    assert [check.name for check in found.checks] == ["not usable", "with care", "usable"]
+    assert found.verdict is NOT_USABLE
+    cause = frf_ipz.LikelyCause(says="it is in g", file="test.toml", line_or_key="unit", probability=0.9)
+    assert frf_ipz.Assessment.of_checks(checks[:1], cause).verdict is WITH_CARE
