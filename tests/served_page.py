@@ -33,6 +33,7 @@ class Page:
 
     def __init__(self, browser, address):
         self.browser = browser
+        browser.get("about:blank")  # the page before goes on asking its server, which is no more
         browser.get_log("browser")
         browser.get(address)
         self.wait_until(self.is_drawn)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from frf_ipz.arguments import as_path
 from frf_ipz.option_types import NotNegative, Seed
 from frf_ipz.toml_files import STRICT, check_values
 
@@ -69,12 +70,12 @@ class DiagnoseOptions:
     def __post_init__(self) -> None:
         check_values(self)
 
-    def effect_files(self, folder: Path) -> tuple[Path, ...]:
+    def effect_files(self, folder: str | Path) -> tuple[Path, ...]:
         """List the user's own files of effects, each once.
 
         Parameters
         ----------
-        folder : Path
+        folder : str or Path
             Where paths start.
 
         Returns
@@ -82,4 +83,4 @@ class DiagnoseOptions:
         tuple of Path
             They need not be there.
         """
-        return tuple(dict.fromkeys(folder / reference.rpartition(":")[0] for reference in self.extra_effects))
+        return tuple(dict.fromkeys(as_path(folder) / reference.rpartition(":")[0] for reference in self.extra_effects))
