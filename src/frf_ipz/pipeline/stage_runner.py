@@ -103,8 +103,25 @@ class StageRunner:
         str
             The key.
         """
-        self.keys[name] = digest({"stage": name, "software": software(), **depends})
+        self.keys[name] = _key(name, depends)
         return self.keys[name]
+
+    def holds(self, name: str, depends: Mapping[str, object]) -> bool:
+        """Tell whether the folder has the result of a stage as it would be computed.
+
+        Parameters
+        ----------
+        name : str
+            The stage.
+        depends : mapping
+            What its result depends on.
+
+        Returns
+        -------
+        bool
+            True if the keys agree.
+        """
+        return bool(self.store.manifest.get("stages", {}).get(name, {}).get("key") == _key(name, depends))
 
     def stage_progress(self, name: str) -> Progress:
         """Give the progress of one stage, with its name before what it says.
@@ -140,6 +157,10 @@ class StageRunner:
             Their keys.
         """
         return [self.keys[name] for name in names]
+
+
+def _key(name: str, depends: Mapping[str, object]) -> str:
+    return digest({"stage": name, "software": software(), **depends})
 
 
 def dependents(name: str) -> list[str]:

@@ -113,11 +113,9 @@ def write_pipeline(folders: Folders, name: str, *, applies: bool) -> Path:
     for key in ("test", "model"):
         if key in head:
             head[key] = str(case / head[key])
-    options = document.pop("diagnose", None)
-    if applies:
-        options = tomlkit.table() if options is None else options
-        options["apply"] = True
-        document["diagnose"] = options
+    options = document.pop("diagnose", tomlkit.table()) if applies else tomlkit.table()
+    options.update({"apply": True} if applies else {"run": "never"})
+    document["diagnose"] = options
     path = folders.root / "pipelines" / f"{name}_{'with' if applies else 'without'}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(tomlkit.dumps(document), encoding="utf-8")

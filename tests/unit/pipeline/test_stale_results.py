@@ -1,6 +1,7 @@
 """A result is computed anew where anything that it depends on has changed: inputs, code, libraries, effects."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from frf_ipz.errors import InputError
 from frf_ipz.pipeline import run as run_module
 from frf_ipz.pipeline import stage_runner
 from frf_ipz.pipeline.inputs import read_inputs
+from frf_ipz.pipeline.stages import mismatch
 from frf_ipz.runs import software
 from small_campaign import write_campaign
+from synthetic_run import synthetic_folder
 
 EFFECT = '"""An effect."""\nfrom frf_ipz import Effect\n\nclass Own(Effect):\n    name = "own"\n'
 
@@ -96,3 +99,24 @@ def test_an_effect_that_ends_the_program_in_a_run_is_an_error(campaign, monkeypa
     monkeypatch.setattr(run_module, "chain", chain)
     with pytest.raises(InputError, match="an effect of your own ended the program"):
         frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="ingest")
+
+
+def test_a_run_takes_over_what_a_diagnosis_in_any_time_has_found(campaign, monkeypatch):
+    searches = []
+
+    def find_causes(*_, deadline, only_where_they_differ, **__):
+        searches.append((deadline.seconds, only_where_they_differ))
+        return replace(synthetic_folder(diagnosed=True).results["diagnose"], verdict="consistent", findings=())
+
+    monkeypatch.setattr(mismatch, "find_causes", find_causes)
+    path, out = campaign / "pipeline.toml", campaign / "out"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('run = "never"', 'run = "auto"'), encoding="utf-8")
+    frf_ipz.run_pipeline(path, out, until="predict")
+    assert searches == [(mismatch.RUN_SECONDS, True)]
+    frf_ipz.run_pipeline(path, out, until="diagnose", diagnosing=True)
+    assert searches[1:] == [(None, False)]
+    frf_ipz.run_pipeline(path, out, until="predict")
+    path.write_text(text.replace('run = "never"', 'run = "auto"\napply = true'), encoding="utf-8")
+    frf_ipz.run_pipeline(path, out, until="predict")
+    assert len(searches) == 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.deadline import Deadline
@@ -51,10 +51,22 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
     """
     inputs = runner.inputs
     options = inputs.options.diagnose
-    seconds = RUN_SECONDS if options.seconds is None and not is_asked else options.seconds
-    only_where_they_differ = options.run == "auto" and not is_asked
     ingest_options = inputs.options.ingest
-    band = {"fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz]}
+
+    def rests_on(run: Literal["auto", "always"], seconds: float | None) -> dict[str, object]:
+        # what a limit of time has cut is not what the search without one gives; whether it is applied is no matter
+        return {
+            "options": asdict(replace(options, apply=False, run=run, seconds=seconds)),
+            "effects": [repr(type(effect)) for effect in inputs.effects],
+            "model": inputs.model_key,
+            "after": runner.after("ingest"),
+            "fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz],
+        }
+
+    # a run takes over what the verb has found in any time, before it searches again in a short one
+    is_whole = is_asked or runner.holds("diagnose", rests_on("always", options.seconds))
+    seconds = RUN_SECONDS if options.seconds is None and not is_whole else options.seconds
+    only_where_they_differ = options.run == "auto" and not is_whole
 
     def compute(progress: Progress) -> Diagnosis:
         observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
@@ -69,14 +81,7 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
 
     return runner.stage(
         "diagnose",
-        {
-            # what a limit of time has cut is not what the search without one, or with another one, gives
-            "options": asdict(replace(options, run="auto" if only_where_they_differ else "always", seconds=seconds)),
-            "effects": [repr(type(effect)) for effect in inputs.effects],
-            "model": inputs.model_key,
-            "after": runner.after("ingest"),
-            **band,
-        },
+        rests_on("auto" if only_where_they_differ else "always", seconds),
         compute,
         lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
     )
