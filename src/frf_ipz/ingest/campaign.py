@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 UNITS = dict(zip(RESPONSES, ("m", "m/s", "m/s^2"), strict=True))
+PARTICULARS = ("operator", "date", "equipment", "customer", "serial_number")  # shown, and used for nothing else
 ROTATIONAL_UNITS = dict(zip(RESPONSES, ("rad", "rad/s", "rad/s^2"), strict=True))
 
 
@@ -231,6 +232,9 @@ class VibrationTest(Concise):
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
         FRFs that are in memory.
+    particulars : mapping of str to str
+        Who measured, when, with what, for whom, and which machine: ``operator``, ``date``, ``equipment``,
+        ``customer``, ``serial_number``, as far as they are stated.
 
     Examples
     --------
@@ -264,6 +268,7 @@ class VibrationTest(Concise):
     table: TableKeys = field(default_factory=TableKeys)
     signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
     frfs: FrfSet | None = field(default=None, repr=False)
+    particulars: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
     def from_recordings(

@@ -11,12 +11,12 @@ from frf_ipz.arguments import require_file
 from frf_ipz.dofs import Dof, as_direction, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
+from frf_ipz.ingest.campaign import PARTICULARS, Channel, TestSetup, VibrationTest, setup_labels
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
-from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Ratio
+from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
@@ -45,6 +45,14 @@ class TestKeys:
         Samples a second, for recordings without a column of time, or with too few digits in it.
     header_row : int, optional
         Line of the columns' names in the recordings, counted from 1; found where it is left out.
+    operator : str
+        Who measured; shown on the page, as the keys below, and used for nothing else.
+    date : str
+        When it was measured: a date, such as 2026-11-27, or any text.
+    equipment, customer : str
+        What it was measured with, and for whom.
+    serial_number : str
+        Of the machine that was measured.
     """
 
     __pydantic_config__ = STRICT
@@ -56,6 +64,11 @@ class TestKeys:
     time_column: str | int = ""
     sample_rate_hz: Positive | None = None
     header_row: Count | None = None
+    operator: str = ""
+    date: Day = ""
+    equipment: str = ""
+    customer: str = ""
+    serial_number: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,6 +260,7 @@ def read_test(path: str | Path) -> VibrationTest:
         channels=channels,
         setups=setups,
         frf_sources=sources,
+        particulars={name: text for name in PARTICULARS if (text := getattr(keys.test, name).strip())},
         labels=tuple(dict.fromkeys(labels)),
     )
 

@@ -145,6 +145,7 @@ def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
         "pipeline": inputs.source,
         "name": inputs.name,
+        "test": {"name": inputs.test.name, "kind": inputs.test.kind, **inputs.test.particulars},
         "configuration": plain(inputs.options),
         "inputs": dict(inputs.digests),
     }

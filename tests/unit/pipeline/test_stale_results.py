@@ -55,6 +55,31 @@ def test_another_recording_computes_anew(campaign):
     assert ingest_key(campaign) != before
 
 
+def test_another_operator_makes_the_page_anew_and_nothing_else(campaign):
+    (campaign / "pipeline.toml").write_text(
+        (campaign / "pipeline.toml")
+        .read_text(encoding="utf-8")
+        .replace('model = "model.toml"', "")
+        .replace('points = ["11:+z"]', ""),
+        encoding="utf-8",
+    )
+    run = run_with_operator(campaign, "A. Meier")
+    later = run_with_operator(campaign, "B. Huber")
+    assert run["test"] == {"name": "small cantilever", "kind": "hammer", "operator": "A. Meier"}
+    assert later["test"]["operator"] == "B. Huber"
+    changed = [name for name, stage in later["stages"].items() if stage["key"] != run["stages"][name]["key"]]
+    assert changed == ["report"]
+
+
+def run_with_operator(campaign, operator):
+    path = campaign / "test.toml"
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("operator")]
+    lines.insert(lines.index("[test]") + 1, f'operator = "{operator}"')
+    path.write_text("\n".join(lines), encoding="utf-8")
+    frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out")
+    return json.loads((campaign / "out" / "run.json").read_text(encoding="utf-8"))
+
+
 def test_the_code_of_the_package_is_digested(monkeypatch, tmp_path):
     (tmp_path / "__init__.py").write_text("first", encoding="utf-8")
     monkeypatch.setattr(frf_ipz, "__file__", str(tmp_path / "__init__.py"))
