@@ -228,6 +228,8 @@ class VibrationTest(Concise):
         The FRFs that the test gives, each once.
     table : TableKeys
         Where the time, the rate and the names stand in the recordings, as far as the test says so.
+    applied_window_s : float, optional
+        Time constant of an exponential window that the responses in the files have already been given, s.
     signals : mapping of Path to (n_samples, 2 + n_outputs) array
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
@@ -266,6 +268,7 @@ class VibrationTest(Concise):
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
     table: TableKeys = field(default_factory=TableKeys)
+    applied_window_s: float | None = None
     signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
     frfs: FrfSet | None = field(default=None, repr=False)
     particulars: Mapping[str, str] = field(default_factory=dict, repr=False)

@@ -45,6 +45,9 @@ class TestKeys:
         Samples a second, for recordings without a column of time, or with too few digits in it.
     header_row : int, optional
         Line of the columns' names in the recordings, counted from 1; found where it is left out.
+    applied_exponential_window_s : float, optional
+        Time constant of a window that the analyser has already put on the responses, 1 at the first sample, s. Its
+        damping is taken back.
     operator : str
         Who measured; shown on the page, as the keys below, and used for nothing else.
     date : str
@@ -64,6 +67,7 @@ class TestKeys:
     time_column: str | int = ""
     sample_rate_hz: Positive | None = None
     header_row: Count | None = None
+    applied_exponential_window_s: Positive | None = None
     operator: str = ""
     date: Day = ""
     equipment: str = ""
@@ -257,6 +261,7 @@ def read_test(path: str | Path) -> VibrationTest:
             sample_rate_hz=keys.test.sample_rate_hz,
             header_row=keys.test.header_row,
         ),
+        applied_window_s=keys.test.applied_exponential_window_s,
         channels=channels,
         setups=setups,
         frf_sources=sources,
@@ -278,6 +283,9 @@ def _check_sections(path: Path, keys: CampaignFileKeys) -> None:
     for name in present:
         if name != entry:
             raise FileFormatError(path, f"a test of kind '{kind}' has [[{entry}]] entries", where=f"key '{name}'")
+    if kind == "random" and keys.test.applied_exponential_window_s is not None:
+        problem = "an exponential window belongs to impacts: on the record of a shaker it distorts; record without it"
+        raise FileFormatError(path, problem, where="key 'test.applied_exponential_window_s'")
     if not present:
         raise FileFormatError(path, f"a test of kind '{kind}' needs at least one [[{entry}]]")
     if kind == "frf" and keys.channel:
