@@ -86,7 +86,7 @@ def read_inputs(path: Path) -> PipelineInputs:
     Parameters
     ----------
     path : Path
-        ``pipeline.toml``.
+        ``pipeline.toml``, or a folder that holds exactly one pipeline.
 
     Returns
     -------

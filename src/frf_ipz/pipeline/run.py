@@ -36,7 +36,7 @@ def run_pipeline(
     Parameters
     ----------
     path : str or Path
-        ``pipeline.toml``.
+        ``pipeline.toml``, or a folder that holds exactly one pipeline.
     out : str or Path
         The run's folder; made where there is none. A run that fails leaves what was there.
     until : str
