@@ -122,7 +122,7 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
         If keys or values do not fit: names every one of them.
     """
     try:
-        return TypeAdapter(options_type).validate_python(dict(table))
+        return _adapter(options_type).validate_python(dict(table))
     except ValidationError as error:
         problems = _problems(error, options_type)
     if len(problems) == 1:
@@ -155,6 +155,11 @@ def check_values(options: object) -> None:
             object.__setattr__(options, name, adapter.validate_python(value))
         except ValidationError as error:
             raise InputError(f"{kind.__name__}.{name}: {_explain(error.errors()[0], kind)}") from None
+
+
+@lru_cache
+def _adapter(options_type: type[Options]) -> TypeAdapter[Options]:
+    return TypeAdapter(options_type)
 
 
 @lru_cache
