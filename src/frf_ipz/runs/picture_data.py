@@ -65,11 +65,13 @@ def model_values(run: Results, model: ReducedModel) -> ComplexArray:
     Returns
     -------
     (n_used, n_frfs) complex array
-        SI; empty without a measurement.
+        In the unit of the measurement; empty without one.
     """
     if run.frfs is None:
         return np.zeros((0, 0), complex)
-    return compute_frfs(model, run.frfs.labels, run.frfs.s[fitted_lines(run)])
+    values = compute_frfs(model, run.frfs.labels, run.frfs.s[fitted_lines(run)])
+    updated = run.updated_model
+    return values if updated is None else values * updated.scale_of(model).gains(run.frfs.labels)
 
 
 def update_targets(run: Results) -> list[Target]:

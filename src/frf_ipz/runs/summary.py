@@ -240,7 +240,8 @@ def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
         with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
             width = 10 * np.log10(prediction.magnitude_high[:, index] / prediction.magnitude_low[:, index])
         band = f", 90 % band +-{np.nanmedian(width):.2g} dB (median)" if np.isfinite(width).any() else ""
-        lines.append(("prediction", f"{label}{band}"))
+        shape = ", its shape only" if index in prediction.relative else ""
+        lines.append(("prediction", f"{label}{shape}{band}"))
     return [*lines, *_warnings(prediction.warnings)]
 
 

@@ -45,7 +45,7 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
         return
     before = float(np.nanmedian(_decibels(evidence, evidence.nominal)[:, worst]))
     where = str(evidence.frfs.labels[worst])
-    relative = " (a gain of each FRF is fitted: the scale is unknown)" if evidence.is_relative else ""
+    relative = " (with the gains that are fitted: the scale is unknown)" if evidence.is_relative else ""
     yield Check(
         name="amplitude at the measured points",
         verdict=judge(after, SIXTH * GAIN_MARGIN_DB, HALF * GAIN_MARGIN_DB),

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Verdict
-from frf_ipz.assessment.evidence import fitted_gains
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.prediction.agreement import compare_frfs
@@ -151,7 +150,8 @@ def _of_update(run: Results) -> str:
     width = _half_width_db(run)
     points = [str(dof) for dof in run.points]
     if points and np.isfinite(width):
-        text += f", and predicts {listed(points, 3)} to ±{number(width, 2)} dB (90 % band, median)"
+        shape = "the shape of " if run.prediction is not None and run.prediction.relative else ""
+        text += f", and predicts {shape}{listed(points, 3)} to ±{number(width, 2)} dB (90 % band, median)"
     return text + "."
 
 
@@ -213,8 +213,6 @@ def _measured_card(run: Results) -> Card:
     decibels, errors = [], []
     for model in (updated.nominal, updated.model):
         values = model_values(run, model)
-        if frfs.unknown_scale != "none":
-            values = values * fitted_gains(values, measured)
         decibels.append(number(float(np.median(compare_frfs(measured, values).median_db)), 2))
         errors.append(percent(float(np.linalg.norm(measured - values) / np.linalg.norm(measured)), 2))
     scaled = frfs.unknown_scale != "none"
