@@ -8,6 +8,7 @@ import pytest
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.plotting.wording import number
 from frf_ipz.prediction.agreement import compare_frfs
+from frf_ipz.report.section import Cards
 from frf_ipz.report.sections.overview import build, verdict
 from frf_ipz.runs.picture_data import update_targets
 from frf_ipz.runs.results import Results
@@ -21,7 +22,9 @@ def run():
 
 
 def card(run, title):
-    return next(card for card in build(run).blocks[0].cards if card.title == title)
+    return next(
+        card for block in build(run).blocks if isinstance(block, Cards) for card in block.cards if card.title == title
+    )
 
 
 def test_the_error_at_the_point_of_interest_is_that_against_the_frf_kept_aside(run):

@@ -78,7 +78,7 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
             ]
             for finding in entries
         ]
-    columns = ("effect", "", "where", "parameters", "probability", "log Bayes factor", "in words")
+    columns = ("effect", "rank", "where", "parameters", "probability", "log Bayes factor", "in words")
     caption = "Findings and alternatives" if diagnosis.findings else "What was tried and is not needed"
     return Table(caption=caption, columns=columns, rows=rows, file="diagnosis.json")
 
@@ -118,7 +118,7 @@ def _check_table(diagnosis: Diagnosis) -> Table:
         for check in diagnosis.data_checks
     ]
     return Table(
-        caption="Checks", columns=("check", "value", "limit", "", "in words"), rows=rows, file="diagnosis.json"
+        caption="Checks", columns=("check", "value", "limit", "result", "in words"), rows=rows, file="diagnosis.json"
     )
 
 

@@ -1,4 +1,4 @@
-"""The first screen: the verdict, three numbers, the structure."""
+"""The first screen: the verdict, the FRF at the point of interest, three numbers, the checks, the structure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from frf_ipz.plotting.wording import counted, listed, number, percent, small_per
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.findings import card_texts, verdict_of
-from frf_ipz.report.section import Card, Headline, Section, Table, run_figures
+from frf_ipz.report.section import Card, Cards, Headline, Section, Table, run_figures
 from frf_ipz.runs.picture_data import fitted_lines, model_values, update_targets
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ def build(run: Results) -> Section:
         The section.
     """
     sentence, addition = verdict(run)
-    headline = Headline(sentence=sentence, addition=addition, cards=tuple(_cards(run)))
     notes: tuple[str, ...] = ()
     if run.stale:
         notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale), 10)}.",)
@@ -52,7 +51,13 @@ def build(run: Results) -> Section:
         anchor="overview",
         title="Overview",
         lead="",
-        blocks=(headline, *_checks(run), *run_figures(run, "structure")),
+        blocks=(
+            Headline(sentence=sentence, addition=addition),
+            *run_figures(run, "prediction")[:1],
+            Cards(tuple(_cards(run))),
+            *_checks(run),
+            *run_figures(run, "structure"),
+        ),
         notes=notes,
     )
 

@@ -38,11 +38,12 @@ def build(run: Results) -> Section | None:
     lead = f"{counted(len(prediction.labels), 'FRF')} predicted at {points}, in the quantity that was measured."
     if not known:
         lead += " Nothing was measured there."
+    lead += f" {'The first' if len(prediction.labels) > 1 else 'It'} is drawn on the first screen."
     return Section(
         anchor="prediction",
         title="Points of interest",
         lead=lead,
-        blocks=(*run_figures(run, "prediction"), _table(prediction, known)),
+        blocks=(*run_figures(run, "prediction")[1:], _table(prediction, known)),
         notes=prediction.warnings,
     )
 
