@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from frf_ipz.runs.digests import digest_file
+from frf_ipz.input_files import digest_file
 from frf_ipz.runs.folder_lock import LOCK
 from frf_ipz.runs.generations import GENERATIONS, HIDDEN, POINTER, current_folder
 from frf_ipz.runs.results import open_results

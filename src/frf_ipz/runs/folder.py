@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.input_files import digest_file
 from frf_ipz.output_files import cannot_write, write_text
 from frf_ipz.progress import silent
 from frf_ipz.runs.codec import load_result, save_result
-from frf_ipz.runs.digests import digest_file
 from frf_ipz.runs.folder_lock import HOLDER, LOCK, lock_folder
 from frf_ipz.runs.generations import HIDDEN, Generations, current_folder, forget_empty
 from frf_ipz.runs.manifest import MANIFEST, load_manifest

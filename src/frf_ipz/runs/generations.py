@@ -35,7 +35,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.input_files import read_text
+from frf_ipz.input_files import digest_file, read_text
 from frf_ipz.output_files import (
     BESIDE,
     cannot_write,
@@ -47,7 +47,6 @@ from frf_ipz.output_files import (
     sync_folder,
     write_text,
 )
-from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

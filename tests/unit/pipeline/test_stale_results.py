@@ -1,6 +1,7 @@
 """A result is computed anew where anything that it depends on has changed: inputs, code, libraries, effects."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,12 @@ import frf_ipz
 from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.catalogue.finder import read_class
 from frf_ipz.errors import InputError
+from frf_ipz.input_files import Ledger, digest_file, entering, open_input
+from frf_ipz.pipeline import inputs as inputs_module
 from frf_ipz.pipeline import run as run_module
 from frf_ipz.pipeline import stage_runner
 from frf_ipz.pipeline.inputs import read_inputs
-from frf_ipz.pipeline.stages import mismatch
+from frf_ipz.pipeline.stages import measurement, mismatch
 from frf_ipz.runs import software
 from small_campaign import write_campaign
 from synthetic_run import synthetic_folder
@@ -78,6 +81,83 @@ def run_with_operator(campaign, operator):
     path.write_text("\n".join(lines), encoding="utf-8")
     frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out")
     return json.loads((campaign / "out" / "run.json").read_text(encoding="utf-8"))
+
+
+def test_another_model_computes_anew(campaign):
+    def key():
+        frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="pair")
+        return json.loads((campaign / "out" / "run.json").read_text(encoding="utf-8"))["stages"]["reduce"]["key"]
+
+    before = key()
+    assert key() == before
+    model = campaign / "model.toml"
+    model.write_text(model.read_text(encoding="utf-8").replace("0.33", "0.30"), encoding="utf-8")
+    assert key() != before
+
+
+def save_again(path):
+    """As an editor does: in place of the old one, and as long."""
+    text = path.read_text(encoding="utf-8")
+    beside = path.with_name("beside")
+    beside.write_text(text.replace("1", "2", 1), encoding="utf-8")
+    beside.replace(path)
+
+
+@pytest.mark.parametrize("name", ["test.toml", "model.toml"])
+def test_a_file_that_is_saved_between_being_read_and_digested_is_refused(campaign, monkeypatch, name):
+    reader = {"test.toml": "read_test", "model.toml": "read_model"}[name]
+    read = getattr(inputs_module, reader)
+
+    def read_and_save(path):
+        content = read(path)
+        save_again(path)
+        return content
+
+    monkeypatch.setattr(inputs_module, reader, read_and_save)
+    with pytest.raises(InputError, match=rf"{name}: has been changed while this command was at work"):
+        frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="ingest")
+    assert not (campaign / "out").exists()
+
+
+def test_a_recording_that_is_saved_between_being_digested_and_read_is_refused(campaign, monkeypatch):
+    recording = sorted((campaign / "hits").glob("*.csv"))[0]
+    frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="ingest")
+    before = (campaign / "out" / "run.json").read_bytes()
+    (campaign / "pipeline.toml").write_text(
+        (campaign / "pipeline.toml").read_text(encoding="utf-8") + '[ingest]\nestimator = "H2"\n', "utf-8"
+    )
+    estimate = measurement.estimate_frfs
+
+    def save_and_estimate(*arguments, **options):
+        save_again(recording)
+        return estimate(*arguments, **options)
+
+    monkeypatch.setattr(measurement, "estimate_frfs", save_and_estimate)
+    with pytest.raises(InputError, match=rf"{recording.name}: has been changed while this command was at work"):
+        frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="ingest")
+    assert (campaign / "out" / "run.json").read_bytes() == before
+
+
+def test_a_file_that_is_written_to_while_it_is_read_is_refused(campaign):
+    path = campaign / "model.toml"
+    with entering(Ledger()):
+        with pytest.raises(InputError, match="has been changed"), open_input(path):
+            os.utime(path, ns=(1, 1))
+        assert digest_file(path)
+
+
+def test_an_effect_that_is_saved_between_being_digested_and_executed_is_refused(campaign):
+    (campaign / "own.py").write_text(EFFECT, encoding="utf-8")
+    ledger = Ledger()
+    with entering(ledger):
+        digest_file(campaign / "own.py")
+        with pytest.raises(InputError, match="has no effect"):  # it was executed, and the class is abstract
+            read_class("own.py:Own", campaign, (Effect,))
+    (campaign / "own.py").write_text(EFFECT.replace("Own", "New"), encoding="utf-8")
+    with pytest.raises(InputError, match="has been changed"), entering(ledger):
+        read_class("own.py:New", campaign, (Effect,))
+    with pytest.raises(InputError, match="has no effect"):
+        read_class("own.py:New", campaign, (Effect,))
 
 
 def test_the_code_of_the_package_is_digested(monkeypatch, tmp_path):

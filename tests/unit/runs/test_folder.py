@@ -10,7 +10,8 @@ import pytest
 
 import frf_ipz
 from frf_ipz.errors import InputError
-from frf_ipz.runs.digests import digest, digest_file
+from frf_ipz.input_files import digest_file
+from frf_ipz.runs.digests import digest
 from frf_ipz.runs.folder import open_run, read_manifest, read_run
 from frf_ipz.runs.folder_lock import LOCK
 from frf_ipz.runs.generations import POINTER, current_folder

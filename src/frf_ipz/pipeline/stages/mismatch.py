@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.frf import FrfSet
+from frf_ipz.input_files import entering
 from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
@@ -153,7 +154,8 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
         By name.
     """
     options = runner.inputs.options.diagnose
-    return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
+    with entering(runner.inputs.ledger):
+        return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
 
 
 def corrections(diagnosis: Diagnosis | None) -> str:
