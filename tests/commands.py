@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from frf_ipz.cli.main import main
+from frf_ipz.runs import folder_lock
 
 CHANGES = {"os.rename", "os.link", "os.remove", "os.mkdir", "os.rmdir", "os.symlink", "os.truncate"}
 LOADED = (
@@ -63,13 +64,23 @@ class Command:
     def wait_for(self, n_changes):
         """Wait until it has made so many changes, or has come to its end."""
         end = time.monotonic() + LONGEST_S
-        while self.counter.value < n_changes and self._process.is_alive() and time.monotonic() < end:
-            time.sleep(PAUSE_S)
+        while self.counter.value < n_changes and self.is_at_work and time.monotonic() < end:
+            self.pause()
+
+    @property
+    def is_at_work(self):
+        """Whether it has not come to its end."""
+        return self._process.is_alive()
+
+    @staticmethod
+    def pause():
+        """Let it work for a moment."""
+        time.sleep(PAUSE_S)
 
     @property
     def said(self):
         """All that it has printed."""
-        return self.log.read_text(encoding="utf-8", errors="replace")
+        return self.log.read_text(encoding="utf-8", errors="replace") if self.log.exists() else ""
 
 
 def run(*arguments, log, **options):
@@ -103,6 +114,12 @@ def command_line(*arguments):
     """``frf-ipz`` with these arguments."""
     sys.argv = ["frf-ipz", *arguments]
     main()
+
+
+def impatient(*arguments):
+    """``frf-ipz`` with these arguments; where another command is at work it does not wait."""
+    folder_lock.WAIT_S = 0.0
+    command_line(*arguments)
 
 
 def _watch(counter, *, within, killed_before, refused):
